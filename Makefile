@@ -1,0 +1,55 @@
+# Every target makes or reuses its own environment: two commands on a fresh machine, `make demo` and `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+BENCH_VENV ?= .venv-bench
+BIN := $(VENV)/bin
+export PIP_DISABLE_PIP_VERSION_CHECK = 1
+
+.PHONY: demo test lint format bench build clean
+
+demo: $(VENV)/.user
+	$(BIN)/rotorid demo demo
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest -q
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/codespell
+
+format: $(VENV)/.dev
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: $(BENCH_VENV)/.bench
+	$(BENCH_VENV)/bin/python -m benchmarks
+
+build: $(VENV)/.dev
+	$(BIN)/python -m pip -q install build
+	$(BIN)/python -m build
+
+$(VENV)/.pip:
+	$(PYTHON) -c 'import sys; sys.exit("rotorid needs Python 3.11 or newer; set PYTHON=") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip -q install --upgrade 'pip>=25.1'
+	touch $@
+
+$(VENV)/.user: $(VENV)/.pip pyproject.toml
+	$(BIN)/python -m pip -q install -e .
+	touch $@
+
+$(VENV)/.dev: $(VENV)/.user
+	$(BIN)/python -m pip -q install --group dev
+	touch $@
+
+$(BENCH_VENV)/.bench: pyproject.toml
+	$(PYTHON) -m venv $(BENCH_VENV)
+	$(BENCH_VENV)/bin/python -m pip -q install --upgrade 'pip>=25.1'
+	$(BENCH_VENV)/bin/python -m pip -q install -e . --group bench
+	touch $@
+
+clean:
+	rm -rf $(VENV) $(BENCH_VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

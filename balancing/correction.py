@@ -1,0 +1,343 @@
+"""Correction weights: D minimises |Y₀ + W D| over all sensors and speeds ([S] (28)–(40), Den Hartog)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.baseline import match_speeds, starting_point
+from balancing.determined import check_planes
+from balancing.errors import Source, reading_covariance
+from balancing.influence import Influence
+from balancing.labels import Labels
+from balancing.propagation import correction_covariance, prediction_covariance
+from balancing.trials import ReadingErrors, Trials
+from rotorid.regression import coverage_factor, least_squares, unstretch
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+ILL_CONDITIONED = 30.0
+"""Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
+
+_RISES_NAMED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Weights to mount, and the vibration they should leave.
+
+    Attributes
+    ----------
+    speeds, sensors, planes
+        rad/s (S,), names (C) and (P).
+    weights
+        Total correction weights for the bare rotor (every weight of the runs removed), angle with the
+        rotation, shape (P,).
+    before, after
+        Vibration of the bare rotor and its prediction with the corrections mounted, shape (S, C).
+    covariance
+        Of (Re D₁, Im D₁, …), shape (2P, 2P); None where errors are unknown.
+    after_covariance
+        Of a reading in a check run around its prediction, shape (S, C, 2, 2); None where errors are unknown.
+    dof
+        Degrees of freedom of the errors; None for stated ones.
+    errors, error_source
+        Of a single reading, and where they come from.
+    condition_number
+        Of the stacked, column-scaled W.
+    rank
+        Number of planes whose weights the readings determine (all, or `correct` raises).
+    method
+        "least-squares".
+    mounted
+        Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    weights: ComplexArray
+    before: ComplexArray
+    after: ComplexArray
+    covariance: FloatArray | None
+    after_covariance: FloatArray | None
+    dof: int | None
+    errors: ReadingErrors | None
+    error_source: Source
+    condition_number: float
+    rank: int
+    method: str
+    mounted: tuple[str, tuple[str, ...], ComplexArray] | None
+    labels: Labels
+    warnings: tuple[str, ...]
+
+    @property
+    def plane_covariance(self) -> FloatArray | None:
+        """Covariance (P, 2, 2) of each plane's weight; None where errors are unknown."""
+        if self.covariance is None:
+            return None
+        P = len(self.planes)
+        return np.asarray(np.einsum("papb->pab", self.covariance.reshape(P, 2, P, 2)))
+
+    @property
+    def mass_std(self) -> FloatArray | None:
+        """Standard deviation (P,) of the weights' sizes; None where errors are unknown."""
+        return self._along(1.0)
+
+    @property
+    def angle_std(self) -> FloatArray | None:
+        """Standard deviation (P,) of the weights' angles, rad; NaN for a weight within its own error.
+
+        Within its own error is a weight whose 95 % region contains zero: its angle is not determined.
+        """
+        across, covariance = self._along(1j), self.plane_covariance
+        if across is None or covariance is None:
+            return None
+        vector = np.stack((self.weights.real, self.weights.imag), axis=-1)
+        regular = covariance + 1e-12 * np.trace(covariance, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        regular[~regular.any(axis=(1, 2))] = np.eye(2) * np.finfo(float).tiny
+        distance = np.einsum("pi,pi->p", vector, np.linalg.solve(regular, vector[..., None])[..., 0])
+        clear = (distance > region_radius(self.dof) ** 2) & (np.abs(self.weights) > 0)
+        return np.where(clear, across / np.where(clear, np.abs(self.weights), 1.0), np.nan)
+
+    def _along(self, turn: complex) -> FloatArray | None:
+        covariance = self.plane_covariance
+        if covariance is None:
+            return None
+        size = np.abs(self.weights)
+        unit = turn * np.where(size > 0, self.weights, 1.0) / np.where(size > 0, size, 1.0)
+        u = np.stack((unit.real, unit.imag), axis=-1)
+        return np.asarray(np.sqrt(np.maximum(np.einsum("pi,pij,pj->p", u, covariance, u), 0.0)))
+
+    @property
+    def coverage_factor(self) -> float | None:
+        """Half width of a 95 % interval in standard deviations; None where errors are unknown."""
+        return None if self.covariance is None else coverage_factor(self.dof)
+
+    @property
+    def to_add(self) -> ComplexArray | None:
+        """What to add to the weights mounted in the last run, one per plane of `mounted`; None without it."""
+        if self.mounted is None:
+            return None
+        _, planes, weights = self.mounted
+        total = dict(zip(self.planes, self.weights, strict=True))
+        return np.array([total.get(p, 0.0) for p in planes], dtype=complex) - weights
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        from balancing.sheet import correction_dict
+
+        return correction_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown)."""
+        import pandas as pd
+
+        rows = [{k: v for k, v in row.items() if k != "covariance"} for row in self.to_dict()["corrections"]]
+        frame = pd.DataFrame(rows)
+        return frame.astype({"mass_std": float, "angle_std_deg": float})
+
+    def residuals_frame(self) -> pd.DataFrame:
+        """One row per speed and sensor: amplitude and phase before and after."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_dict()["residuals"]).drop(columns="after_covariance")
+
+    def summary(self) -> str:
+        """Text for an engineer, 80 columns: warnings, corrections with 95 %, vibration before and after."""
+        from balancing.sheet import summary
+
+        return summary(self)
+
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
+        """Draw the corrections and the vibration before and after.
+
+        Parameters
+        ----------
+        ax
+            None: a new figure with all pictures. Polar axes: the corrections only. Other axes: the amplitudes
+            before and after only.
+
+        Returns
+        -------
+        The new figure, or `ax`.
+        """
+        from balancing import plots
+
+        if ax is None:
+            return plots.overview(self)
+        if ax.name == "polar":
+            return plots.corrections(self, ax)
+        return plots.amplitudes(self, ax)
+
+
+def correct(
+    influence: Influence,
+    baseline: Trials | ArrayLike | None = None,
+    planes: Sequence[str] | None = None,
+    speeds: ArrayLike | None = None,
+) -> Correction:
+    """Correction weights by least squares over all chosen sensors and speeds.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, from `estimate_influence` or stored.
+    baseline
+        Vibration to correct, where it is not that of the trial runs: new runs (what is mounted in them is
+        taken into account), or complex amplitudes of the bare rotor (S, C).
+    planes
+        Names of the planes to use; default all. The others stay empty.
+    speeds
+        rad/s, to use; default all.
+
+    Returns
+    -------
+    Correction
+        With first-order errors through both W and Y₀ (`balancing.propagation`) where errors are known.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the readings do not tell the planes apart; says which act alike.
+    ValueError
+        For an unknown plane or speed, a missing or unfit baseline.
+    """
+    start = starting_point(influence, baseline)
+    chosen = _plane_indices(influence, planes)
+    used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
+    names = tuple(influence.planes[p] for p in chosen)
+    W = influence.W[used][..., chosen].reshape(-1, len(chosen))
+    Y = start.readings[used]
+    check_planes(W, names)
+    estimate = least_squares(W, -Y.ravel(), names=names)
+    D = unstretch(estimate.solution)
+    after = Y + influence.W[used][..., chosen] @ D
+    covariance = after_covariance = None
+    errors = start.model.errors
+    if start.covariance is not None and errors is not None:
+        index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
+        channels = start.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
+        covariance = correction_covariance(W, D, after.ravel(), channels)
+        own = reading_covariance(after, errors)
+        after_covariance = own + prediction_covariance(D, channels).reshape(own.shape)
+    result = Correction(
+        speeds=influence.speeds[used],
+        sensors=influence.sensors,
+        planes=names,
+        weights=D,
+        before=Y,
+        after=after,
+        covariance=covariance,
+        after_covariance=after_covariance,
+        dof=start.model.dof,
+        errors=errors,
+        error_source=start.model.source,
+        condition_number=estimate.condition_number,
+        rank=estimate.rank // 2,
+        method="least-squares",
+        mounted=start.mounted,
+        labels=start.labels,
+        warnings=(),
+    )
+    warnings = influence.warnings + start.warnings + _cautions(result, W)
+    warnings += _left_out(influence, start.readings, chosen, used, D, start.labels)
+    return _with_warnings(result, warnings)
+
+
+def region_radius(dof: int | None) -> float:
+    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
+    from scipy.special import chdtri, fdtri
+
+    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+
+def _plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
+    if planes is None:
+        return list(range(len(influence.planes)))
+    if isinstance(planes, str):
+        planes = [planes]
+    unknown = [p for p in planes if p not in influence.planes]
+    if unknown:
+        raise ValueError(
+            f"there is no plane {', '.join(map(repr, unknown))}; the planes are "
+            f"{', '.join(map(repr, influence.planes))}"
+        )
+    if not planes or len(set(planes)) < len(planes):
+        raise ValueError("choose at least one plane, each once")
+    return [influence.planes.index(p) for p in planes]
+
+
+def _cautions(result: Correction, W: ComplexArray) -> tuple[str, ...]:
+    out = []
+    if result.condition_number > ILL_CONDITIONED:
+        # the planes that the weakest direction is made of
+        weakest = np.abs(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
+        alike = [p for p, share in zip(result.planes, weakest, strict=True) if share > 0.3]
+        out.append(
+            f"planes {', '.join(map(repr, alike))} act nearly alike (condition number "
+            f"{result.condition_number:.3g}): small errors of the readings become large weights; "
+            "leave one out, or add sensors or speeds"
+        )
+    std = result.angle_std
+    if std is not None:
+        out += [
+            f"the weight in plane {p!r} lies within its own error: its angle is not determined"
+            for p, s in zip(result.planes, std, strict=True)
+            if np.isnan(s)
+        ]
+    return tuple(out) + _rises(result.speeds, result.sensors, result.before, result.after, result.labels, "")
+
+
+def _left_out(
+    influence: Influence, Y: ComplexArray, chosen: list[int], used: list[int], D: ComplexArray, labels: Labels
+) -> tuple[str, ...]:
+    rest = [s for s in range(len(influence.speeds)) if s not in used]
+    after = Y[rest] + influence.W[rest][..., chosen] @ D
+    words = ", a speed left out"
+    return _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, words)
+
+
+def _rises(
+    speeds: FloatArray,
+    sensors: tuple[str, ...],
+    before: ComplexArray,
+    after: ComplexArray,
+    labels: Labels,
+    where: str,
+) -> tuple[str, ...]:
+    old, new = labels.vibration(before)[0], labels.vibration(after)[0]
+    places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
+    places.sort(key=lambda place: old[place] - new[place])
+    words = [
+        f"the vibration of sensor {sensors[c]!r} at {speeds[s] * 30 / np.pi:.6g} rpm{where} is predicted "
+        f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_unit}".rstrip()
+        for s, c in places[:_RISES_NAMED]
+    ]
+    if len(places) > _RISES_NAMED:
+        words[-1] += f"; {len(places) - _RISES_NAMED} more readings{where} rise less"
+    return tuple(words)
+
+
+def _with_warnings(result: Correction, warnings: tuple[str, ...]) -> Correction:
+    from dataclasses import replace
+
+    for name in ("weights", "before", "after", "covariance", "after_covariance"):
+        array = getattr(result, name)
+        if array is not None:
+            array.flags.writeable = False
+    return replace(result, warnings=warnings)

@@ -1,0 +1,250 @@
+"""A correction as people read it, in the job's own units: text of 80 columns, and JSON types."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.baseline import describe_errors
+
+if TYPE_CHECKING:
+    from balancing.correction import Correction
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+WIDTH = 80
+_SOURCES = {
+    "stated": "as stated in the job",
+    "repeats": "from repeated readings",
+    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
+    "residuals": "from the disagreement of the runs",
+}
+
+
+def correction_dict(c: Correction) -> dict[str, Any]:
+    """`Correction.to_dict`: the keys of INTERFACE.md for `rotorid balance`, and a few more."""
+    mass, angle = c.labels.weight(c.weights)
+    old, old_phase = c.labels.vibration(c.before)
+    new, new_phase = c.labels.vibration(c.after)
+    covariance = None if c.plane_covariance is None else c.labels.weight_covariance(c.plane_covariance)
+    after_covariance = c.after_covariance
+    if after_covariance is not None:
+        after_covariance = c.labels.vibration_covariance(after_covariance)
+    mass_std, angle_std = c.mass_std, c.angle_std
+    unit = c.labels.weight_unit
+    return {
+        "method": c.method,
+        "conventions": c.labels.conventions(),
+        "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
+        "corrections": [
+            {
+                "plane": plane,
+                "mass": float(mass[p]),
+                "unit": unit,
+                "angle_deg": float(angle[p]),
+                "mass_std": None if mass_std is None else float(mass_std[p] * c.labels.weight_scale),
+                "angle_std_deg": None if angle_std is None else _number(np.degrees(angle_std[p])),
+                "covariance": None if covariance is None else covariance[p].tolist(),
+            }
+            for p, plane in enumerate(c.planes)
+        ],
+        **_mounted(c),
+        "residuals": [
+            {
+                "speed_rpm": _rpm(speed),
+                "sensor": sensor,
+                "before": float(old[s, k]),
+                "before_phase_deg": float(old_phase[s, k]),
+                "after": float(new[s, k]),
+                "after_phase_deg": float(new_phase[s, k]),
+                "after_covariance": None if after_covariance is None else after_covariance[s, k].tolist(),
+            }
+            for s, speed in enumerate(c.speeds)
+            for k, sensor in enumerate(c.sensors)
+        ],
+        "rms_before": float(np.sqrt(np.mean(old**2))),
+        "rms_after": float(np.sqrt(np.mean(new**2))),
+        "max_before": float(old.max()),
+        "max_after": float(new.max()),
+        "condition_number": _number(c.condition_number),
+        "rank": c.rank,
+        "errors": _errors(c),
+        "warnings": list(c.warnings),
+    }
+
+
+def summary(c: Correction) -> str:
+    """`Correction.summary`."""
+    blocks = [
+        *(_wrap(f"Warning: {w}", "  ") for w in c.warnings),
+        _corrections(c),
+        _add(c),
+        _vibration(c),
+        _quality(c),
+    ]
+    return "\n\n".join(b for b in blocks if b)
+
+
+def _corrections(c: Correction) -> str:
+    mass, angle = c.labels.weight(c.weights)
+    unit, factor = c.labels.weight_unit, c.coverage_factor
+    rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
+    mass_std, angle_std = c.mass_std, c.angle_std
+    for p, plane in enumerate(c.planes):
+        row = [plane, figures(mass[p]), f"{_degrees(angle[p])}°"]
+        if factor and mass_std is not None and angle_std is not None:
+            row.append(f"± {figures(factor * mass_std[p] * c.labels.weight_scale, 2)} {unit}")
+            half = factor * np.degrees(angle_std[p])
+            row.append("angle not determined" if np.isnan(half) else f"± {figures(half, 2)}°")
+        rows.append(row)
+    head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
+    turn = "with" if c.labels.angle_sign > 0 else "against"
+    foot = f"Angles from the mark {turn} the rotation; phases as {c.labels.phase}."
+    return f"{head}\n{table(rows)}\n{foot}"
+
+
+def _add(c: Correction) -> str:
+    if c.mounted is None or c.to_add is None:
+        return ""
+    run, planes, weights = c.mounted
+    mass, angle = c.labels.weight(weights)
+    more, more_angle = c.labels.weight(c.to_add)
+    unit = c.labels.weight_unit
+    rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
+    rows += [
+        [plane, figures(mass[p]), f"{_degrees(angle[p])}°", figures(more[p]), f"{_degrees(more_angle[p])}°"]
+        for p, plane in enumerate(planes)
+    ]
+    head = _wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
+    return f"{head}\n{table(rows)}"
+
+
+def _vibration(c: Correction) -> str:
+    from balancing.correction import region_radius
+
+    old, old_phase = c.labels.vibration(c.before)
+    new, new_phase = c.labels.vibration(c.after)
+    rows = [["rpm", "sensor", "before", "phase", "after", "phase"]]
+    bound: FloatArray | None = None
+    if c.after_covariance is not None:
+        largest = np.sqrt(np.linalg.eigvalsh(c.after_covariance)[..., -1]) * c.labels.vibration_scale
+        bound = region_radius(c.dof) * largest
+        rows[0].append("95 % within")
+    for s, speed in enumerate(c.speeds):
+        for k, sensor in enumerate(c.sensors):
+            row = [f"{_rpm(speed):.6g}", sensor, figures(old[s, k], 3), f"{old_phase[s, k]:.0f}°"]
+            shown = _small(new[s, k], old.max())
+            row += [shown, "" if shown == "0" else f"{new_phase[s, k]:.0f}°"]
+            if bound is not None:
+                row.append(f"± {figures(bound[s, k], 2)}")
+            rows.append(row)
+    unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
+    last = [
+        f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)} → "
+        f"{_small(float(np.sqrt(np.mean(new**2))), old.max())}, "
+        f"largest {figures(old.max(), 3)} → {_small(new.max(), old.max())}"
+    ]
+    return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), *last])
+
+
+def _quality(c: Correction) -> str:
+    n = len(c.planes)
+    planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
+    unit, scale = c.labels.vibration_unit, c.labels.vibration_scale
+    numbers = f"rank {c.rank} of {n}, condition number {c.condition_number:.3g}"
+    lines = [f"{planes.capitalize()} determined ({numbers})."]
+    if c.covariance is None:
+        lines.append(
+            "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
+            if c.errors is None
+            else "No intervals: the errors of the readings are not known."
+        )
+    else:
+        dof = "" if c.dof is None else f", {c.dof} degrees of freedom"
+        lines.append(
+            f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
+            f"({_SOURCES[c.error_source]}{dof})."
+        )
+    return "\n".join(_wrap(line, "") for line in lines)
+
+
+def _mounted(c: Correction) -> dict[str, Any]:
+    if c.mounted is None or c.to_add is None:
+        return {"mounted_in_last_run": None, "add_to_mounted": None}
+    run, planes, weights = c.mounted
+    return {
+        "mounted_in_last_run": {"run": run, "weights": _weights(c, planes, weights)},
+        "add_to_mounted": _weights(c, planes, c.to_add),
+    }
+
+
+def _weights(c: Correction, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
+    mass, angle = c.labels.weight(weights)
+    return [
+        {"plane": p, "mass": float(mass[i]), "unit": c.labels.weight_unit, "angle_deg": float(angle[i])}
+        for i, p in enumerate(planes)
+    ]
+
+
+def _errors(c: Correction) -> dict[str, Any]:
+    e = c.errors
+    return {
+        "source": c.error_source,
+        "amplitude_percent": None if e is None else 100 * e.amplitude,
+        "phase_deg": None if e is None else float(np.degrees(e.phase)),
+        "floor": None if e is None else e.floor * c.labels.vibration_scale,
+        "degrees_of_freedom": c.dof,
+    }
+
+
+def figures(value: float, digits: int = 4) -> str:
+    """A number with so many significant digits, written out where that is short."""
+    if not 1e-4 <= abs(value) < 1e6:
+        return "0" if value == 0 else f"{value:.{digits - 1}e}"
+    places = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
+    return f"{value:.{places}f}"
+
+
+def table(rows: list[list[str]], left: int = 1) -> str:
+    """Columns right-aligned, except for the first `left` ones; names are cut where 80 columns need it."""
+    columns = len(rows[0])
+    widths = [max(len(r[i]) for r in rows) for i in range(columns)]
+    names = left - 1
+    widths[names] = max(min(widths[names], WIDTH - 2 * columns - (sum(widths) - widths[names])), 8)
+    lines = []
+    for row in rows:
+        cells = [_cut(cell, widths[i]) for i, cell in enumerate(row)]
+        cells = [f"{x:<{widths[i]}}" if i < left else f"{x:>{widths[i]}}" for i, x in enumerate(cells)]
+        lines.append(("  " + "  ".join(cells)).rstrip())
+    return "\n".join(lines)
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def _small(value: float, scale: float) -> str:
+    """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
+    return "0" if value <= 1e-9 * scale else figures(value, 3)
+
+
+def _degrees(angle: float) -> str:
+    text = f"{angle:.1f}"
+    return "0.0" if text == "360.0" else text
+
+
+def _rpm(speed: float) -> float:
+    # 3000 rpm must come back as 3000, not as 3000.0000000000005
+    return float(f"{speed * 30 / np.pi:.12g}")
+
+
+def _wrap(text: str, indent: str) -> str:
+    return textwrap.fill(text, WIDTH, subsequent_indent=indent)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,8 @@
+"""Side-by-side benchmarks: `make bench`, or `python -m benchmarks [NAME …]` where the peers are installed.
+
+Method: both programs solve the same problem in one process, their answers are compared before anything is
+timed, every timed call gets a model made afresh just before it (peers cache results; making the model is
+not timed on either side), and the shortest of several calls counts. Nothing is written to disk.
+
+A benchmark is a module with a function `run() -> list[Row]`, listed in `benchmarks.__main__`.
+"""

@@ -1,0 +1,47 @@
+"""Run benchmarks and print the table; exit status 1 if answers differ or a required ratio is missed."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import sys
+
+BENCHMARKS = ("critical_speeds", "unbalance_response")
+
+
+def main(names: list[str]) -> int:
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        print(f"no benchmark is called {unknown[0]!r}; there are: {', '.join(BENCHMARKS)}", file=sys.stderr)
+        return 2
+    import numpy
+    import scipy
+
+    print(__import__("benchmarks").__doc__)
+    print(
+        f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}, "
+        f"{os.cpu_count()} processors\n"
+    )
+    head = f"{'task':56}{'':16}{'ms':>9}  {'peer':29}{'ms':>10}{'ratio':>9}{'needed':>8}{'difference':>12}"
+    print(head)
+    failed = False
+    for name in names or BENCHMARKS:
+        for row in importlib.import_module(f"benchmarks.{name}").run():
+            verdict = ""
+            if not row.agrees:
+                verdict = f"  ANSWERS DIFFER by more than {row.allowed:.0e}"
+            elif not row.fast_enough:
+                verdict = "  TOO SLOW"
+            failed |= bool(verdict)
+            print(
+                f"{row.task:56}{row.ours:16}{1e3 * row.our_seconds:9.3f}  {row.peer:29}"
+                f"{1e3 * row.peer_seconds:10.2f}{row.ratio:9.0f}{row.required_ratio:8.0f}"
+                f"{row.difference:12.1e}{verdict}",
+                flush=True,
+            )
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

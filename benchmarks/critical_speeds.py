@@ -1,0 +1,40 @@
+"""Three critical speeds and mode shapes of the 23-element rotor, against ROSS `run_modal`.
+
+ROSS' `run_modal(speed=0)` finds each frequency twice, once per lateral plane, besides the rigid axial and
+torsional motions, which its filter drops; `num_modes=10` is the smallest that holds the third speed. This is
+the fastest public way in ROSS: `run_critical_speed` calls it several times.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import fem
+from benchmarks.rotors import ROSS, ross_rotor, rotorid_rotor, table
+from benchmarks.timing import Row, best_of, relative_difference
+
+
+def with_ross(rotor: Any) -> np.ndarray:
+    return rotor.run_modal(speed=0.0, num_modes=10).wn[:5:2]
+
+
+def run() -> list[Row]:
+    rows = table()
+    ours = fem.critical_speeds(rotorid_rotor(rows, 0.0), n=3).frequencies
+    theirs = with_ross(ross_rotor(rows, 0.0))
+    return [
+        Row(
+            task="3 critical speeds and shapes, 23 elements",
+            ours="rotorid",
+            our_seconds=best_of(
+                lambda: rotorid_rotor(rows, 0.0), lambda rotor: fem.critical_speeds(rotor, n=3), 50
+            ),
+            peer=f"{ROSS} run_modal",
+            peer_seconds=best_of(lambda: ross_rotor(rows, 0.0), with_ross, 7),
+            difference=relative_difference(ours, theirs),
+            allowed=1e-6,
+            required_ratio=20.0,
+        )
+    ]

@@ -1,0 +1,64 @@
+"""Timing and comparing, the same for every benchmark."""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    task: str
+    ours: str
+    our_seconds: float
+    peer: str
+    peer_seconds: float
+    difference: float  # relative, between the two answers
+    allowed: float
+    required_ratio: float
+
+    @property
+    def ratio(self) -> float:
+        return self.peer_seconds / self.our_seconds
+
+    @property
+    def agrees(self) -> bool:
+        return bool(self.difference <= self.allowed)
+
+    @property
+    def fast_enough(self) -> bool:
+        return self.ratio >= self.required_ratio
+
+
+def best_of(make: Callable[[], T], call: Callable[[T], object], repeat: int) -> float:
+    """Shortest of `repeat` calls, s, each on a fresh model; the first one, untimed, warms up."""
+    call(make())
+    times = []
+    for _ in range(repeat):
+        model = make()
+        gc.disable()
+        try:
+            start = time.perf_counter()
+            call(model)
+            times.append(time.perf_counter() - start)
+        finally:
+            gc.enable()
+    return min(times)
+
+
+def relative_difference(a: ArrayLike, b: ArrayLike) -> float:
+    """Largest |a − b| / |b| over all entries."""
+    a, b = np.asarray(a), np.asarray(b)
+    if a.shape != b.shape or not (np.isfinite(a).all() and np.isfinite(b).all()):
+        return float("inf")
+    return float((np.abs(a - b) / np.abs(b)).max())

@@ -1,0 +1,70 @@
+"""rotorid: what a vibrating rotor hides.
+
+Identification, reduction and file reading; the direct problem is in `fem`, balancing in `balancing`.
+Every name below is loaded when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotorid.estimate import Combination as Combination
+    from rotorid.estimate import Estimate as Estimate
+    from rotorid.reduction import Reduction as Reduction
+    from rotorid.reduction import equivalent_masses as equivalent_masses
+    from rotorid.reduction import mac as mac
+    from rotorid.reduction import natural_frequencies as natural_frequencies
+    from rotorid.reduction import reduce as reduce
+    from rotorid.regression import least_squares as least_squares
+    from rotorid.regression import stack as stack
+    from rotorid.regression import stretch as stretch
+    from rotorid.regression import unstretch as unstretch
+    from rotorid.tables import InputError as InputError
+    from rotorid.tables import Job as Job
+    from rotorid.tables import read_influence as read_influence
+    from rotorid.tables import read_job as read_job
+    from rotorid.tables import read_rotor as read_rotor
+    from rotorid.tables import read_trials as read_trials
+    from rotorid.tables import write_influence as write_influence
+
+__version__ = "0.1.0"
+
+_HOME = {
+    # K θ = Y
+    "least_squares": "regression",
+    "stretch": "regression",
+    "unstretch": "regression",
+    "stack": "regression",
+    "Estimate": "estimate",
+    "Combination": "estimate",
+    # a rotor as a few masses
+    "reduce": "reduction",
+    "Reduction": "reduction",
+    "equivalent_masses": "reduction",
+    "natural_frequencies": "reduction",
+    "mac": "reduction",
+    # files
+    "read_rotor": "tables",
+    "read_trials": "tables",
+    "read_influence": "tables",
+    "write_influence": "tables",
+    "read_job": "tables",
+    "Job": "tables",
+    "InputError": "tables",
+}
+
+__all__ = ["__version__", *_HOME]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - PEP 562
+    if name in _HOME:
+        value = getattr(import_module(f"rotorid.{_HOME[name]}"), name)
+        globals()[name] = value
+        return value
+    raise AttributeError(f"module 'rotorid' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

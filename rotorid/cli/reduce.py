@@ -1,0 +1,46 @@
+"""`rotorid reduce`: a rotor as a few masses."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    RotorArgument,
+    check_targets,
+    emit,
+    numbers,
+    picture,
+)
+
+
+def reduce(
+    rotor: RotorArgument,
+    nodes: Annotated[str, typer.Option(help="Where the masses stand, such as 7,12,18.")],
+    modes: Annotated[int, typer.Option(min=1, help="How many modes of the rotor the regression uses.")] = 2,
+    json: JsonOption = False,
+    plot: PlotOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Equivalent masses at chosen nodes (formula 50) and the natural frequencies of the small model.
+
+    Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
+    """
+    from rotorid.reduction import reduce as reduce_rotor
+    from rotorid.tables import read_rotor
+
+    check_targets(plot, output)
+    result = reduce_rotor(read_rotor(rotor), numbers(nodes, "--nodes"), modes)
+    emit(
+        result.to_dict(),
+        result.summary,
+        as_json=json,
+        files=[rotor],
+        options={"nodes": nodes, "modes": modes},
+        figure=(plot, picture(result.plot)),
+        table=(output, result.to_frame),
+    )

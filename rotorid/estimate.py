@@ -1,0 +1,278 @@
+"""What an estimation found, and what the data do not say: the result of every regression."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+
+WORD_TOLERANCE = 1e-7
+"""A parameter whose share in the null space is below this is taken as determined."""
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A linear combination of parameters that the data determine.
+
+    Attributes
+    ----------
+    coefficients
+        Shape (n,), one per parameter.
+    words
+        Such as "b − 0.5·d".
+    value, std
+        Its estimate and standard deviation (None: unknown).
+    """
+
+    coefficients: FloatArray
+    words: str
+    value: float
+    std: float | None
+
+    def line(self) -> str:
+        """One line of text: "b − 0.5·d = 3.1 ± 0.2"."""
+        return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters estimated from `K θ = Y`, and what the data do not say about them.
+
+    Attributes
+    ----------
+    names
+        Of the n parameters.
+    values
+        Shape (n,); NaN for a parameter that the data do not determine.
+    solution
+        Shape (n,); the solution of smallest (column-scaled) norm, equal to `values` at full rank.
+    covariance
+        Shape (n, n), or None where errors are unknown; NaN rows for parameters that are not determined.
+    residuals
+        Y − K θ, shape (m,).
+    dof
+        Degrees of freedom, m − rank (rows of zero weight not counted).
+    rank, condition_number, singular_values
+        Of the row-weighted, column-scaled matrix.
+    errors_stated
+        Whether the covariance comes from errors that the user stated (normal intervals) and not from the
+        residuals (Student's t).
+    chi_square
+        Weighted sum of squared residuals over the stated variances; None without stated errors.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    solution: FloatArray
+    covariance: FloatArray | None
+    residuals: FloatArray
+    dof: int
+    rank: int
+    condition_number: float
+    singular_values: FloatArray
+    errors_stated: bool
+    chi_square: float | None
+    row_space: FloatArray
+    solution_covariance: FloatArray | None
+
+    @property
+    def full_rank(self) -> bool:
+        """Whether the data determine every parameter."""
+        return self.rank == len(self.names)
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
+        if self.covariance is None:
+            return None
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def coverage_factor(self) -> float | None:
+        """Half width of the 95 % interval in standard deviations; None where there is no interval."""
+        return coverage_factor(None if self.errors_stated else self.dof)
+
+    @property
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals, shape (n, 2); None where errors are unknown."""
+        std, factor = self.std, self.coverage_factor
+        if std is None or factor is None:
+            return None
+        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
+
+    @property
+    def correlation(self) -> FloatArray | None:
+        """Correlation matrix (n, n); None where errors are unknown."""
+        std = self.std
+        if self.covariance is None or std is None:
+            return None
+        scale = np.where(std > 0, std, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+    @cached_property
+    def combinations(self) -> tuple[Combination, ...]:
+        """What the data determine instead, where they do not determine every parameter (else empty).
+
+        A basis of the row space of K in reduced echelon form; combinations of a single parameter are left
+        out, for that parameter is determined.
+        """
+        if self.full_rank:
+            return ()
+        rows = echelon(self.row_space)
+        return tuple(self._combination(row) for row in rows if np.count_nonzero(row) > 1)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of the parameters that the data do not determine."""
+        return tuple(n for n, v in zip(self.names, self.values, strict=True) if np.isnan(v))
+
+    def describe_rank(self) -> str:
+        """Say in words what the data determine."""
+        if self.full_rank:
+            n, condition = len(self.names), self.condition_number
+            return f"all {n} parameters are determined (condition number {condition:.3g})"
+        known = [n for n in self.names if n not in self.undetermined]
+        known += [c.words for c in self.combinations]
+        verb = "is" if len(known) == 1 else "are"
+        seen = f"only {' and '.join(known)} {verb} determined" if known else "nothing is determined"
+        missing = ", ".join(self.undetermined)
+        return f"{seen}; {missing} by themselves are not (rank {self.rank} of {len(self.names)})"
+
+    def _combination(self, row: FloatArray) -> Combination:
+        cov = self.solution_covariance
+        std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
+        return Combination(row, combination_words(row, self.names), float(row @ self.solution), std)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        std, ci95 = self.std, self.ci95
+        return {
+            "parameters": {
+                name: {
+                    "value": _number(self.values[i]),
+                    "std": None if std is None else _number(std[i]),
+                    "ci95": None if ci95 is None or np.isnan(ci95[i]).any() else ci95[i].tolist(),
+                }
+                for i, name in enumerate(self.names)
+            },
+            "rank": self.rank,
+            "condition_number": _number(self.condition_number),
+            "identifiable": self.full_rank,
+            "unidentifiable": [] if self.full_rank else [self.describe_rank()],
+            "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
+            "residual_rms": float(np.sqrt(np.mean(self.residuals**2))),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
+        import pandas as pd
+
+        unknown = np.full(len(self.names), np.nan)
+        ci95 = self.ci95
+        return pd.DataFrame(
+            {
+                "parameter": self.names,
+                "value": self.values,
+                "std": unknown if self.std is None else self.std,
+                "ci95_low": unknown if ci95 is None else ci95[:, 0],
+                "ci95_high": unknown if ci95 is None else ci95[:, 1],
+            }
+        )
+
+    def summary(self) -> str:
+        """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
+        width = max(len(n) for n in self.names)
+        lines = [self._line(i, width) for i in range(len(self.names))]
+        lines += [c.line() for c in self.combinations]
+        lines.append(self.describe_rank())
+        if self.covariance is None:
+            lines.append("no intervals: no errors are stated and there are no more equations than parameters")
+        if self.chi_square is not None and self.dof > 0:
+            ratio = np.sqrt(self.chi_square / self.dof)
+            lines.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
+        return "\n".join(lines)
+
+    def _line(self, i: int, width: int) -> str:
+        name, std, ci95 = self.names[i], self.std, self.ci95
+        if np.isnan(self.values[i]):
+            return f"{name:<{width}} = not determined by these data"
+        text = f"{name:<{width}} = {self.values[i]:.6g}"
+        if std is not None:
+            share = f" ({100 * std[i] / abs(self.values[i]):.2g} %)" if self.values[i] else ""
+            text += f" ± {std[i]:.2g}{share}"
+        if ci95 is not None:
+            text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
+        return text
+
+
+def coverage_factor(dof: int | None) -> float | None:
+    """Half width of a 95 % interval in standard deviations.
+
+    Parameters
+    ----------
+    dof
+        Degrees of freedom of the variance; None for a stated (known) variance.
+
+    Returns
+    -------
+    1.96 for a known variance, Student's t otherwise, None at dof = 0, where no interval exists.
+    """
+    from scipy.special import ndtri, stdtrit
+
+    if dof is None:
+        return float(ndtri(0.975))
+    return float(stdtrit(dof, 0.975)) if dof > 0 else None
+
+
+def combination_words(coefficients: FloatArray, names: Sequence[str]) -> str:
+    """Write a linear combination as an engineer would: "b − 0.5·d"."""
+    text = ""
+    for c, name in zip(coefficients, names, strict=True):
+        if c == 0:
+            continue
+        sign = ("−" if c < 0 else "") if not text else (" − " if c < 0 else " + ")
+        size = f"{abs(c):.4g}"
+        text += sign + (name if size == "1" else f"{size}·{name}")
+    return text
+
+
+def echelon(rows: FloatArray) -> list[FloatArray]:
+    """Reduced row echelon form with clean zeros; columns are compared after scaling to unit length."""
+    norms = np.linalg.norm(rows, axis=0)
+    scale = np.where(norms > 0, norms, 1.0)
+    A = rows / scale
+    pivots: list[int] = []
+    for column in range(A.shape[1]):
+        r = len(pivots)
+        if r == A.shape[0]:
+            break
+        best = r + int(np.argmax(np.abs(A[r:, column])))
+        if abs(A[best, column]) <= WORD_TOLERANCE:
+            continue
+        A[[r, best]] = A[[best, r]]
+        A[r] /= A[r, column]
+        others = np.arange(A.shape[0]) != r
+        A[others] -= np.outer(A[others, column], A[r])
+        pivots.append(column)
+    A[np.abs(A) <= WORD_TOLERANCE] = 0.0
+    back = A * scale
+    return [_snap(back[i] / back[i, p]) for i, p in enumerate(pivots)]
+
+
+def _snap(row: FloatArray) -> FloatArray:
+    """Whole and half numbers that rounding has blurred become exact again."""
+    near = np.round(2 * row) / 2
+    return np.where(np.abs(row - near) <= WORD_TOLERANCE * np.maximum(1.0, np.abs(row)), near, row)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

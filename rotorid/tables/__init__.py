@@ -1,0 +1,32 @@
+"""Reading and writing files: the only place with units, conventions and file formats.
+
+Everything behind it is plain data in SI, with positive phase = lead and angles with the rotation. Every
+complaint about a file names the file, row and column, what was found and what was expected (`InputError`).
+"""
+
+from rotorid.tables.conventions import Conventions, StatedErrors
+from rotorid.tables.influence import influence_frame, read_influence, write_influence
+from rotorid.tables.job import Job, job_from_files, read_job
+from rotorid.tables.problems import InputError, Problem, TableWarning
+from rotorid.tables.rotor import read_rotor
+from rotorid.tables.rotorfile import rotor_files
+from rotorid.tables.trials import read_trials
+from rotorid.tables.writing import write_table
+
+__all__ = [
+    "Conventions",
+    "InputError",
+    "Job",
+    "Problem",
+    "StatedErrors",
+    "TableWarning",
+    "influence_frame",
+    "job_from_files",
+    "read_influence",
+    "read_job",
+    "read_rotor",
+    "read_trials",
+    "rotor_files",
+    "write_influence",
+    "write_table",
+]

@@ -1,0 +1,298 @@
+"""Influence tables: stored coefficients, one row per speed × sensor × plane."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.influence import Influence
+from balancing.labels import Labels
+from balancing.trials import Trials
+from rotorid.tables import units
+from rotorid.tables.columns import Column, Table, must_be, read_table
+from rotorid.tables.conventions import ANGLES, FULL_TURN, PHASES, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.runs import PHASE, SPEED
+from rotorid.tables.speeds import same_speed, show_speed
+from rotorid.tables.units import Unit, UnitError
+from rotorid.tables.writing import write_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+_CONVENTION = re.compile(r"(phase|angles)\s*[:=]\s*[\"']?(.*?)[\"']?")
+_PATTERN = (
+    "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
+)
+
+
+class Coefficients(Protocol):
+    """What can be written as an influence table: results of `balancing` and of `fem`."""
+
+    @property
+    def speeds(self) -> NDArray[np.float64]:
+        """rad/s, shape (S,)."""
+
+    @property
+    def sensors(self) -> Sequence[str | int]:
+        """Names or nodes, length C."""
+
+    @property
+    def planes(self) -> Sequence[str | int]:
+        """Names or nodes, length P."""
+
+    @property
+    def W(self) -> NDArray[np.complex128]:
+        """Shape (S, C, P), SI."""
+
+
+def _split(name: str) -> tuple[Unit, Unit]:
+    """Units of the vibration and of the weight from `um_pp_per_g`."""
+    above, separator, below = name.rpartition("per_")
+    if not separator or (above and not above.endswith("_")):
+        raise UnitError(f"a name like {_PATTERN}")
+    return units.vibration(above.rstrip("_")), units.weight(below)
+
+
+def _influence_unit(name: str) -> Unit:
+    vibration, weight = _split(name)
+    return Unit(name, "influence", vibration.multiply * weight.divide, vibration.divide * weight.multiply)
+
+
+COLUMNS = (
+    SPEED,
+    Column("sensor"),
+    Column("plane"),
+    Column("influence", _influence_unit, ("influence_um_pp_per_g", "influence_m_per_kg_m")),
+    PHASE,
+)
+
+
+def read_influence(
+    path: str | Path, *, phase: Phase | None = None, angles: Angles | None = None
+) -> Influence:
+    """Read stored influence coefficients.
+
+    The phase of a coefficient is the phase reading that a weight at angle 0 causes; whether it leads or lags
+    stands in a comment line `# phase = lag`, or else in `phase`.
+
+    Parameters
+    ----------
+    path
+        `.csv` or `.xlsx` (sheet `influence`).
+    phase, angles
+        Conventions of the job: to print results in, and to read the table with if it states none itself
+        (default: its own, else lead and with rotation).
+
+    Returns
+    -------
+    balancing.Influence
+        In SI, phase lead, with labels to print in; without baseline and covariance.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems = Problems()
+    influence = load_influence(Path(path), phase, angles, problems)
+    problems.stop()
+    assert influence is not None
+    return influence
+
+
+def load_influence(
+    path: Path, phase: Phase | None, angles: Angles | None, problems: Problems
+) -> Influence | None:
+    """As `read_influence`, or None and problems."""
+    before = len(problems)
+    table = read_table(path, "influence", COLUMNS, problems)
+    if table is None:
+        return None
+    said = _conventions(table, problems)
+    speed, size, angle = (table.numbers(stem) for stem in ("speed", "influence", "phase"))
+    must_be(table, "speed", speed > 0, "a speed above 0", problems)
+    must_be(table, "influence", size >= 0, "a coefficient of 0 or more", problems)
+    must_be(table, "phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    sensor, plane = table.texts("sensor"), table.texts("plane")
+    sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    planes = tuple(dict.fromkeys(name for name in plane if name))
+    speeds = sorted({float(value) for value in speed if value > 0})
+    seen: dict[tuple[int, int, int], int] = {}
+    for i in range(len(table)):
+        if not (sensor[i] and plane[i] and speed[i] > 0):
+            continue
+        key = (speeds.index(float(speed[i])), sensors.index(sensor[i]), planes.index(plane[i]))
+        if key in seen:
+            expected = (
+                f"one coefficient per speed, sensor and plane (row {table.rows[seen[key]]} has the same)"
+            )
+            table.complain(problems, i, "plane", expected)
+        seen.setdefault(key, i)
+    if len(problems) > before:
+        return None
+    for s, c, p in np.ndindex(len(speeds), len(sensors), len(planes)):
+        if (s, c, p) not in seen:
+            at = show_speed(speeds[s], table.unit("speed"))
+            expected = f"a coefficient of sensor {sensors[c]!r} and plane {planes[p]!r} at {at}"
+            problems.add(table.source, None, "plane", None, expected)
+    if len(problems) > before:
+        return None
+    sign = -1 if (said.get("phase") or phase) == "lag" else 1
+    values = polar(size, angle, sign)
+    W = np.empty((len(speeds), len(sensors), len(planes)), dtype=complex)
+    for key, i in seen.items():
+        W[key] = values[i]
+    vibration, weight = _split(table.unit("influence").name)
+    labels = Labels(
+        vibration_unit=vibration.name,
+        vibration_scale=vibration.scale,
+        weight_unit=weight.name,
+        weight_scale=weight.scale,
+        phase=phase or as_phase(said.get("phase", "lead")),
+        angles=angles or as_angles(said.get("angles", "with rotation")),
+    )
+    return Influence(speeds=np.array(speeds), sensors=sensors, planes=planes, W=W, labels=labels)
+
+
+def _conventions(table: Table, problems: Problems) -> dict[str, str]:
+    """What comment lines of the table say about its conventions."""
+    said: dict[str, str] = {}
+    for comment in table.comments:
+        match = _CONVENTION.fullmatch(comment)
+        if match is None:
+            continue
+        key, word = match.groups()
+        allowed = PHASES if key == "phase" else ANGLES
+        if word not in allowed or said.get(key, word) != word:
+            expected = f"# {key} = {listing(allowed)}, once{did_you_mean(word, allowed)}"
+            problems.add(table.source, None, None, f"# {comment}", expected)
+        said[key] = word
+    return said
+
+
+def influence_frame(coefficients: Coefficients, labels: Labels | None = None) -> pd.DataFrame:
+    """Influence coefficients as the table that `read_influence` reads.
+
+    Parameters
+    ----------
+    coefficients
+        Of `balancing` or of a rotor model (`fem`).
+    labels
+        Units and conventions to write; default: those of the coefficients, or m per kg·m and phase lead.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `speed_rad_s`, `sensor`, `plane`, `influence_<unit>`, `phase_deg`.
+    """
+    import pandas as pd
+
+    labels = labels or labels_of(coefficients)
+    W = np.asarray(coefficients.W)
+    S, C, P = W.shape
+    above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""
+    size, phase = labels.vibration(W / labels.weight_scale)
+    return pd.DataFrame(
+        {
+            "speed_rad_s": np.repeat(np.asarray(coefficients.speeds, dtype=float), C * P),
+            "sensor": [str(name) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
+            "plane": [str(name) for _ in range(S * C) for name in coefficients.planes],
+            f"influence_{above}per_{labels.weight_unit}": size.ravel(),
+            "phase_deg": phase.ravel(),
+        }
+    )
+
+
+def labels_of(coefficients: Coefficients) -> Labels:
+    """How the coefficients are labelled; SI and lead for a rotor model."""
+    labels = getattr(coefficients, "labels", None)
+    return labels if isinstance(labels, Labels) else Labels(weight_unit="kg_m")
+
+
+def write_influence(path: str | Path, influence: Coefficients) -> None:
+    """Write influence coefficients, with their conventions in comment lines, to `.csv` or `.xlsx`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; nothing half written is left.
+    """
+    labels = labels_of(influence)
+    comments = (
+        f"phase = {labels.phase}",
+        f"angles = {labels.angles}",
+        "phase_deg is the phase reading that a weight at angle 0 causes",
+    )
+    write_table(path, influence_frame(influence, labels), comments=comments, sheet="influence")
+
+
+def fit_to_readings(
+    influence: Influence, trials: Trials, tolerance_percent: float, source: str, problems: Problems
+) -> Influence | None:
+    """The part of stored coefficients that belongs to the readings, in their order, or None and problems.
+
+    Every speed and sensor of the readings must be there; further ones are left out.
+    """
+    ours, theirs = trials.labels, influence.labels
+    unlike = _kind(ours.vibration_unit) != _kind(theirs.vibration_unit)
+    if unlike:
+        expected = (
+            f"coefficients for readings in {ours.vibration_unit or 'no unit'}, "
+            f"as the runs table has, or in a unit that converts to it"
+        )
+        problems.add(source, None, "influence", theirs.vibration_unit or "no unit", expected)
+    if trials.planes and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
+        expected = (
+            f"coefficients per {ours.weight_unit}, or a unit that converts to it, as the weights table has"
+        )
+        problems.add(source, None, "influence", theirs.weight_unit, expected)
+    rows, columns = [], []
+    rpm = units.SPEED["rpm"]
+    for speed in trials.speeds:
+        near = int(np.argmin(np.abs(influence.speeds - speed)))
+        if not same_speed(float(influence.speeds[near]), float(speed), tolerance_percent):
+            known = listing((show_speed(float(value), rpm) for value in influence.speeds), "and")
+            expected = (
+                f"coefficients at {show_speed(float(speed), rpm)}, as the runs table has; there are {known}"
+            )
+            problems.add(source, None, "speed", None, expected)
+        rows.append(near)
+    for sensor in trials.sensors:
+        if sensor not in influence.sensors:
+            known = listing(influence.sensors, "and")
+            hint = did_you_mean(sensor, influence.sensors)
+            expected = f"coefficients of sensor {sensor!r}, as the runs table has; there are {known}{hint}"
+            problems.add(source, None, "sensor", None, expected)
+            continue
+        columns.append(influence.sensors.index(sensor))
+    for plane in trials.planes:
+        if plane not in influence.planes:
+            known = listing(influence.planes, "and")
+            expected = f"coefficients of plane {plane!r}, as the weights table has; there are {known}"
+            problems.add(source, None, "plane", None, expected + did_you_mean(plane, influence.planes))
+    if len(problems):
+        return None
+    labels = replace(
+        ours,
+        weight_unit=ours.weight_unit if trials.planes else theirs.weight_unit,
+        weight_scale=ours.weight_scale if trials.planes else theirs.weight_scale,
+    )
+    return replace(
+        influence,
+        speeds=trials.speeds,
+        sensors=trials.sensors,
+        W=influence.W[np.ix_(rows, columns, range(len(influence.planes)))],
+        labels=labels,
+    )
+
+
+def _kind(unit: str) -> str:
+    return units.vibration(unit).kind

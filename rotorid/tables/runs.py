@@ -1,0 +1,154 @@
+"""Runs tables: what the sensors read, one row per run × speed × sensor (and repeat)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.tables import units
+from rotorid.tables.columns import Column, Table, make_table, must_be, read_table
+from rotorid.tables.conventions import FULL_TURN, Conventions, polar
+from rotorid.tables.grid import Grid
+from rotorid.tables.problems import Problems
+from rotorid.tables.speeds import merge_speeds, same_speed, show_speed
+from rotorid.tables.units import Unit, one_of
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
+PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
+COLUMNS = (
+    Column("run"),
+    SPEED,
+    Column("sensor"),
+    Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
+    PHASE,
+    Column("repeat", required=False),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Readings of all runs; arrays as in `balancing.Trials`."""
+
+    source: str
+    runs: tuple[str, ...]
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    readings: ComplexArray
+    unit: Unit
+    speed_unit: Unit
+
+
+def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Problems) -> Runs | None:
+    """Read a runs table, or None and problems.
+
+    Parameters
+    ----------
+    source
+        A file, or the cells of a sheet.
+    conventions
+        What phases mean, and which speeds count as one.
+    problems
+        Collects the complaints.
+    """
+    if isinstance(source, Grid):
+        table = make_table(source, COLUMNS, problems)
+    else:
+        table = read_table(source, "runs", COLUMNS, problems)
+    if table is None:
+        return None
+    speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
+    must_be(table, "speed", speed > 0, "a speed above 0", problems)
+    must_be(table, "amplitude", amplitude >= 0, "an amplitude of 0 or more", problems)
+    must_be(table, "phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    run, sensor = table.texts("run"), table.texts("sensor")
+    usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
+    before = len(problems)
+    speeds, index = merge_speeds(table, usable, conventions.speed_tolerance_percent, problems)
+    runs = tuple(dict.fromkeys(name for name in run if name))
+    sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
+    for i in usable:
+        cells[runs.index(run[i]), index[i], sensors.index(sensor[i])].append(i)
+    if len(problems) == before:  # with unclear speeds all the rest would be noise
+        _complain_about_repeats(table, list(cells.values()), problems)
+    if table.complete and len(usable) == len(table) and len(problems) == before:
+        _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions, problems)
+    values = polar(amplitude, phase, conventions.phase_sign)
+    order = _repeat_order(table)
+    most = max((len(rows) for rows in cells.values()), default=1)
+    readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
+    for place, rows in cells.items():
+        for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
+            readings[(k, *place)] = values[row]
+    return Runs(table.source, runs, speeds, sensors, readings, table.unit("amplitude"), table.unit("speed"))
+
+
+def _repeat_order(table: Table) -> list[int]:
+    if "repeat" not in table:
+        return list(range(len(table)))
+    labels = list(dict.fromkeys(table.texts("repeat")))
+    return [labels.index(label) for label in table.texts("repeat")]
+
+
+def _complain_about_repeats(table: Table, cells: list[list[int]], problems: Problems) -> None:
+    """Two readings of one run, speed and sensor must say that they are repeats."""
+    for rows in cells:
+        if len(rows) < 2:
+            continue
+        if "repeat" not in table:
+            for row in rows[1:]:
+                expected = (
+                    f"one reading per run, speed and sensor (row {table.rows[rows[0]]} has the same); "
+                    "repeated readings need a column repeat"
+                )
+                table.complain(problems, row, "sensor", expected)
+            continue
+        first: dict[str, int] = {}
+        for row in rows:
+            label = table.texts("repeat")[row]
+            if label and first.setdefault(label, row) != row:
+                same = table.rows[first[label]]
+                table.complain(
+                    problems, row, "repeat", f"another repeat than in row {same}, the same reading"
+                )
+
+
+def _complain_about_gaps(
+    table: Table,
+    runs: tuple[str, ...],
+    speeds: FloatArray,
+    sensors: tuple[str, ...],
+    present: set[tuple[int, int, int]],
+    conventions: Conventions,
+    problems: Problems,
+) -> None:
+    """Every run needs every sensor at every speed: influence coefficients compare runs."""
+    unit = table.unit("speed")
+    for r, run in enumerate(runs):
+        at = [s for s in range(len(speeds)) if any((r, s, c) in present for c in range(len(sensors)))]
+        for s, speed in enumerate(speeds):
+            shown = show_speed(speed, unit)
+            if s not in at:
+                near = min(at, key=lambda k: abs(speeds[k] - speed))
+                hint = f"; its nearest speed is {show_speed(speeds[near], unit)}"
+                if same_speed(speed, speeds[near], 10.0):
+                    hint += f", speeds count as one within {conventions.speed_tolerance_percent:g} %"
+                expected = f"readings of run {run!r} at {shown}, as other runs have{hint}"
+                problems.add(table.source, None, table.fields["speed"].name, None, expected)
+                continue
+            for c, sensor in enumerate(sensors):
+                if (r, s, c) not in present:
+                    expected = f"a reading of sensor {sensor!r} in run {run!r} at {shown}, as other runs have"
+                    if not any((other, s, c) in present for other in range(len(runs))):
+                        expected = (
+                            f"a reading of sensor {sensor!r} in run {run!r} at {shown}: every run needs "
+                            "every sensor at every speed"
+                        )
+                    problems.add(table.source, None, "sensor", None, expected)

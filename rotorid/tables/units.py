@@ -1,0 +1,159 @@
+"""Units: the last part of a column's name, and how its numbers become SI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from math import pi, sqrt
+
+from rotorid.tables.problems import did_you_mean, listing
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit: SI = value × multiply / divide (two numbers, so that 318 mm are exactly 0.318 m).
+
+    Attributes
+    ----------
+    name
+        As in a column's name ("um_pp").
+    kind
+        The quantity ("length"); units of one kind may be converted into each other.
+    multiply, divide
+        See above; for vibrations SI means a peak amplitude.
+    """
+
+    name: str
+    kind: str
+    multiply: float = 1.0
+    divide: float = 1.0
+
+    @property
+    def scale(self) -> float:
+        """Shown = SI × scale."""
+        return self.divide / self.multiply
+
+    def to_si(self, value: float) -> float:
+        """A number written in this unit, in SI."""
+        return value * self.multiply / self.divide
+
+
+class UnitError(ValueError):
+    """A unit that cannot be used; the message says what was expected."""
+
+
+UnitReader = Callable[[str], Unit]
+
+_SPELLING = str.maketrans(
+    {"\N{MICRO SIGN}": "u", "\N{GREEK SMALL LETTER MU}": "u", "/": "_", "·": "_", "*": "_"}
+)
+_LENGTHS = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "um": (1.0, 1e6), "mil": (254.0, 1e7), "in": (254.0, 1e4)}
+_MASSES = {
+    "kg": (1.0, 1.0),
+    "g": (1.0, 1e3),
+    "mg": (1.0, 1e6),
+    "oz": (0.45359237, 16.0),
+    "lb": (0.45359237, 1.0),
+}
+_RADII = {"m": (1.0, 1.0), "mm": (1.0, 1e3), "in": (254.0, 1e4)}
+
+
+def _table(kind: str, factors: dict[str, tuple[float, float]]) -> dict[str, Unit]:
+    return {name: Unit(name, kind, up, down) for name, (up, down) in factors.items()}
+
+
+LENGTH = _table("length", _LENGTHS)
+MASS = _table("mass", _MASSES)
+UNBALANCE = {
+    f"{mass}_{radius}": Unit(f"{mass}_{radius}", "unbalance", up * far, down * near)
+    for mass, (up, down) in _MASSES.items()
+    for radius, (far, near) in _RADII.items()
+}
+SPEED = _table("speed", {"rpm": (2.0 * pi, 60.0), "rad_s": (1.0, 1.0), "Hz": (2.0 * pi, 1.0)})
+ANGLE = _table("angle", {"deg": (pi, 180.0), "rad": (1.0, 1.0)})
+INERTIA = _table("inertia", {"kg_m2": (1.0, 1.0)})
+STIFFNESS = _table("stiffness", {"N_per_m": (1.0, 1.0), "N_per_mm": (1e3, 1.0), "N_per_um": (1e6, 1.0)})
+DAMPING = _table("damping", {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0)})
+MODULUS = _table("modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0)})
+DENSITY = _table("density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0)})
+
+_PEAK = {
+    **LENGTH,
+    **_table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)}),
+    **_table("acceleration", {"g": (STANDARD_GRAVITY, 1.0), "m_s2": (1.0, 1.0), "mm_s2": (1.0, 1e3)}),
+}
+VIBRATION = {
+    name + suffix: Unit(name + suffix, unit.kind, unit.multiply * up, unit.divide * down)
+    for name, unit in _PEAK.items()
+    for suffix, up, down in (("", 1.0, 1.0), ("_pp", 1.0, 2.0), ("_rms", sqrt(2.0), 1.0))
+}
+
+
+def one_of(units: dict[str, Unit]) -> UnitReader:
+    """A reader that accepts exactly these units.
+
+    Returns
+    -------
+    Callable[[str], Unit]
+        Raises `UnitError` for any other name.
+    """
+
+    def read(name: str) -> Unit:
+        unit = units.get(spelt(name))
+        if unit is None:
+            found = f"not {name!r}" if name else "which is missing"
+            raise UnitError(f"one of the units {listing(units)}, {found}{did_you_mean(name, units)}")
+        return unit
+
+    return read
+
+
+def vibration(name: str) -> Unit:
+    """The unit of a vibration: a known one, or any label at all, which is then only printed.
+
+    Raises
+    ------
+    UnitError
+        Where a known unit was meant but is misspelt (`MM`, `um_pk`): as a label it would lose its meaning.
+    """
+    name = spelt(name)
+    if name in VIBRATION:
+        return VIBRATION[name]
+    for known in VIBRATION:
+        if name.casefold() == known.casefold():
+            raise UnitError(f"the unit written {known}, not {name}")
+    base = max((known for known in _PEAK if name.startswith(f"{known}_")), key=len, default=None)
+    if base is not None:
+        raise UnitError(
+            f"{base} (peak), {base}_pp (peak to peak) or {base}_rms, not {name}; known vibration units are "
+            f"{listing(_PEAK)}"
+        )
+    return Unit(name, f"label {name!r}")
+
+
+def weight(name: str) -> Unit:
+    """The unit of a weight: a mass or a mass × radius.
+
+    Raises
+    ------
+    UnitError
+        For any other name.
+    """
+    name = spelt(name)
+    unit = MASS.get(name) or UNBALANCE.get(name)
+    if unit is None:
+        known = weights()
+        raise UnitError(f"a unit of weight: {listing(known)}, not {name!r}{did_you_mean(name, known)}")
+    return unit
+
+
+def weights() -> Iterable[str]:
+    """Names of all units of weight."""
+    return [*MASS, *UNBALANCE]
+
+
+def spelt(name: str) -> str:
+    """A unit's name as this project spells it: `µm` is `um`, `mm/s` is `mm_s`, `g·mm` is `g_mm`."""
+    return name.translate(_SPELLING)

@@ -1,0 +1,36 @@
+"""Shared by all tests: the command line run in this process."""
+
+import json
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+import rotorid.cli
+
+
+@dataclass
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self):
+        return json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+
+
+@pytest.fixture
+def cli(capsys, monkeypatch):
+    """Run `rotorid ARGS`; returns exit status, standard output and standard error."""
+
+    def run(*args):
+        monkeypatch.setattr(sys, "argv", ["rotorid", *map(str, args)])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stop:
+            rotorid.cli.main()
+        captured = capsys.readouterr()
+        code = stop.value.code
+        return Outcome(0 if code is None else code, captured.out, captured.err)
+
+    return run

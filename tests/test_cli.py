@@ -1,0 +1,241 @@
+"""The commands as scripts and people meet them."""
+
+import hashlib
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.cli.common import speeds
+from rotorid.samples import sample_data
+
+ROTOR = sample_data() / "rotor23.csv"
+BK = sample_data() / "bk_two_plane"
+TURBO = sample_data() / "turbo_job" / "job.toml"
+
+
+def test_critical_gives_the_reference_speeds(cli):
+    document = cli("critical", ROTOR, "-n", 3, "--json").json
+    np.testing.assert_allclose(
+        document["critical_speeds_rad_s"], [135.24041, 540.73289, 1163.80513], rtol=1e-7, atol=0
+    )
+    np.testing.assert_allclose(
+        document["critical_speeds_rpm"], np.array(document["critical_speeds_rad_s"]) * 30 / np.pi, rtol=1e-12
+    )
+    assert len(document["mode_shapes"]) == 3
+    assert {len(shape) for shape in document["mode_shapes"]} == {24} == {len(document["positions_m"])}
+    assert [shape[0] for shape in document["mode_shapes"]] == [1.0, 1.0, 1.0]
+
+
+def test_provenance_names_version_files_hashes_date_and_options(cli):
+    record = cli("critical", ROTOR, "-n", 2, "--json").json["provenance"]
+    assert record["inputs"] == [
+        {"file": str(ROTOR), "sha256": hashlib.sha256(ROTOR.read_bytes()).hexdigest()}
+    ]
+    assert record["options"] == {"number": 2}
+    assert record["version"] == "0.1.0"
+    assert record["date"].endswith("+00:00")
+
+
+@pytest.mark.parametrize(
+    ("modes", "masses", "frequencies"),
+    [
+        (1, [140.357, 191.941, 160.680], [135.2404, 530.68, 1062.8]),
+        (2, [134.203, 196.617, 157.083], [135.2358, 539.05, 1069.3]),
+        (3, [133.760, 197.102, 156.497], [135.2377, 539.99, 1069.8]),
+    ],
+)
+def test_reduce_gives_the_reference_masses(cli, modes, masses, frequencies):
+    document = cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", modes, "--json").json
+    np.testing.assert_allclose(document["masses_kg"], masses, atol=1e-3)
+    np.testing.assert_allclose(document["natural_frequencies_rad_s"], frequencies, rtol=5e-5)
+
+
+def test_balance_solves_the_published_two_plane_example(cli):
+    document = cli("balance", BK / "job.toml", "--json").json
+    one, two = document["corrections"]
+    assert one["mass"] == pytest.approx(2.951, rel=1e-3)
+    assert one["angle_deg"] == pytest.approx(50.2, abs=0.05)
+    assert two["mass"] == pytest.approx(2.844, rel=1e-3)
+    assert two["angle_deg"] == pytest.approx(278.1, abs=0.05)
+    assert document["rms_after"] < 1e-12
+    by_tables = cli("balance", BK / "runs.csv", BK / "weights.csv", "--json").json
+    assert by_tables["corrections"] == document["corrections"]
+
+
+def test_balance_reports_every_key_of_the_interface(cli):
+    document = cli("balance", TURBO, "--json").json
+    assert set(document) >= {
+        "method", "conventions", "corrections", "residuals", "rms_before", "rms_after", "max_before",
+        "max_after", "condition_number", "rank", "warnings", "provenance",
+    }  # fmt: skip
+    assert set(document["corrections"][0]) >= {
+        "plane", "mass", "unit", "angle_deg", "mass_std", "angle_std_deg", "covariance"
+    }  # fmt: skip
+    assert set(document["residuals"][0]) >= {
+        "speed_rpm", "sensor", "before", "before_phase_deg", "after", "after_phase_deg", "after_covariance"
+    }  # fmt: skip
+    assert len(document["corrections"]) == 3
+    assert len(document["residuals"]) == 20
+    assert all(c["mass_std"] > 0 for c in document["corrections"])
+
+
+def test_stated_errors_on_the_command_line_give_intervals(cli):
+    without = cli("balance", BK / "runs.csv", BK / "weights.csv", "--json").json
+    assert without["corrections"][0]["mass_std"] is None
+    with_errors = cli(
+        "balance", BK / "runs.csv", BK / "weights.csv", "--amplitude-error", 2, "--phase-error", 1, "--json"
+    ).json
+    assert 0.01 < with_errors["corrections"][0]["mass_std"] < 0.5
+    assert with_errors["corrections"][0]["mass"] == pytest.approx(without["corrections"][0]["mass"])
+
+
+def test_saved_coefficients_balance_from_a_single_run(cli, tmp_path):
+    saved = tmp_path / "influence.csv"
+    full = cli("balance", BK / "job.toml", "--save-influence", saved, "--json").json
+    rows = (BK / "runs.csv").read_text(encoding="utf-8").splitlines()
+    header = next(r for r in rows if r.startswith("run,"))
+    baseline = tmp_path / "baseline.csv"
+    initial = [r for r in rows if r.startswith("initial")]
+    assert len(initial) == 2
+    baseline.write_text("\n".join([header, *initial]) + "\n", encoding="utf-8")
+    again = cli("balance", baseline, "--influence", saved, "--json").json
+    for a, b in zip(full["corrections"], again["corrections"], strict=True):
+        assert a["mass"] == pytest.approx(b["mass"], rel=1e-9)
+        assert a["angle_deg"] == pytest.approx(b["angle_deg"], abs=1e-7)
+
+
+def test_influence_of_the_model_is_symmetric_and_feeds_balance(cli, tmp_path):
+    table = tmp_path / "w.csv"
+    options = ("--planes", "7,12", "--sensors", "7,12", "--speeds", "100:120:10", "--output", table)
+    document = cli("influence", ROTOR, *options, "--json").json
+    rows = document["rows"]
+    assert len(rows) == 3 * 2 * 2
+    W = {(r["speed"], r["sensor"], r["plane"]): r["influence"] for r in rows}
+    assert W[100.0, "7", "12"] == pytest.approx(W[100.0, "12", "7"], rel=1e-9)
+    readings = tmp_path / "runs.csv"
+    readings.write_text(
+        "run,speed_rad_s,sensor,amplitude_um,phase_deg\n"
+        + "".join(f"1,{s},{n},{10 + int(n)},{40 + s}\n" for s in (100, 110, 120) for n in (7, 12)),
+        encoding="utf-8",
+    )
+    result = cli("balance", readings, "--influence", table, "--json").json
+    assert [c["plane"] for c in result["corrections"]] == ["7", "12"]
+    assert result["rms_after"] < result["rms_before"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("critical", ROTOR),
+        ("reduce", ROTOR, "--nodes", "7,12,18"),
+        ("influence", ROTOR, "--planes", "7", "--sensors", "2,12", "--speeds", "50:700:5"),
+        ("balance", TURBO),
+    ],
+)
+def test_pictures_and_tables_are_written_and_named(cli, tmp_path, command):
+    for ending in ("csv", "xlsx"):
+        picture, table = tmp_path / f"p-{ending}.png", tmp_path / f"t.{ending}"
+        outcome = cli(*command, "--plot", picture, "--output", table)
+        assert outcome.code == 0, outcome.err
+        assert f"written: {picture}" in outcome.out
+        assert f"written: {table}" in outcome.out
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        frame = pd.read_csv(table, comment="#") if ending == "csv" else pd.read_excel(table)
+        assert len(frame) > 0
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv", ".png", ".png", ".xlsx"]
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("critical", "nowhere.csv"), "nowhere.csv"),
+        (("critical", ROTOR, "--plot", "modes.gif"), ".png, .svg, .pdf"),
+        (("critical", ROTOR, "--output", "modes.txt"), ".csv, .xlsx"),
+        (("critical", ROTOR, "--plot", "no/such/folder/modes.png"), "does not exist"),
+        (("critical", ROTOR, "-n", "0"), "-n"),
+        (("critical", ROTOR, "-n", "1000"), "1000"),
+        (("reduce", ROTOR, "--nodes", "7,x"), "node numbers with commas"),
+        (("reduce", ROTOR, "--nodes", "7,12,99"), "node 99 does not exist"),
+        (("influence", ROTOR, "--planes", "99", "--sensors", "1", "--speeds", "100"), "99"),
+        (("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "a:b"), "not a range"),
+        (
+            ("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "5:1:1"),
+            "step must be positive",
+        ),
+        (("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "nan"), "finite"),
+        (("balance", TURBO, "--planes", "Z9"), "Z9"),
+        (("balance", TURBO, "--speeds", "17rpm"), "17"),
+        (("balance", TURBO, "--phase", "leading"), "leading"),
+        (("balance", "a.csv", "b.csv", "c.csv"), "a runs table and a weights table"),
+        (("balance", ROTOR, ROTOR), "rotor23.csv"),
+        (("nonsense",), "nonsense"),
+        (("critical",), "ROTOR"),
+    ],
+)
+def test_bad_input_ends_with_status_2_and_one_message(cli, args, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = cli(*args)
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert outcome.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failing_command_leaves_an_old_picture_alone(cli, tmp_path):
+    picture = tmp_path / "p.png"
+    picture.write_bytes(b"old")
+    assert cli("critical", "nowhere.csv", "--plot", picture).code == 2
+    assert picture.read_bytes() == b"old"
+
+
+def test_demo_writes_the_job_and_says_where_the_pictures_are(cli, tmp_path):
+    outcome = cli("demo", tmp_path / "d")
+    assert outcome.code == 0, outcome.err
+    for name in ("modes.png", "reduction.png", "balance.png"):
+        assert (tmp_path / "d" / name).read_bytes().startswith(b"\x89PNG")
+        assert str(tmp_path / "d" / name) in outcome.out
+    assert "135.240" in outcome.out
+    assert "134.203 kg" in outcome.out
+    document = cli("demo", tmp_path / "d", "--json").json
+    assert document["balance"]["corrections"] == cli("balance", tmp_path / "d" / "turbo_job" / "job.toml", "--json").json["corrections"]  # fmt: skip  # noqa: E501
+
+
+def test_help_has_an_example_for_every_command(cli):
+    listing = cli("--help").out
+    for command in ("demo", "critical", "influence", "balance", "reduce"):
+        assert command in listing
+        assert "Example: rotorid " + command in cli(command, "--help").out
+    assert cli("--version").out == "rotorid 0.1.0\n"
+
+
+def test_module_and_script_are_the_same_program():
+    module = subprocess.run(
+        [sys.executable, "-m", "rotorid", "--version"], capture_output=True, text=True, check=True
+    )
+    script = shutil.which("rotorid", path=str(sys.executable.rpartition("/")[0]))
+    assert script
+    assert (
+        subprocess.run([script, "--version"], capture_output=True, text=True, check=True).stdout
+        == module.stdout
+    )
+
+
+def test_a_closed_pipe_is_no_error():
+    command = f"{sys.executable} -m rotorid critical {ROTOR} --json | true"
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True, check=False
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_speeds_are_read_with_units_and_ranges():
+    assert speeds("100:200:50") == [100.0, 150.0, 200.0]
+    assert speeds("0:1:0.1")[-1] == pytest.approx(1.0)
+    assert speeds("60,120rpm") == pytest.approx([2 * np.pi, 4 * np.pi])
+    assert speeds("1:2:1Hz") == pytest.approx([2 * np.pi, 4 * np.pi])
+    assert speeds("100:140:30") == [100.0, 130.0]

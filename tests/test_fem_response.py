@@ -1,0 +1,264 @@
+import json
+import math
+
+import numpy as np
+import pytest
+from fem_rotors import mirrored, refined, rotor23, rotors, uniform
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fem
+from fem import receptance
+
+K, C, MASS = 2e7, 4e3, 12.0
+
+
+def laval(damping=C):
+    """A disc amid a massless shaft on two damped supports."""
+    return fem.Rotor(
+        [0.3, 0.3],
+        0.04,
+        density=0.0,
+        discs=[fem.Disc(2, MASS)],
+        supports=[fem.Support(1, K, damping), fem.Support(3, K, damping)],
+        stations={"disc": 2},
+    )
+
+
+def laval_closed_form(omega, damping=C):
+    """Disc and support amplitude per unbalance at the disc."""
+    bending = 48 * 2.1e11 * math.pi * 0.04**4 / 64 / 0.6**3
+    support = 2 * (K + 1j * omega * damping)
+    total = 1 / (1 / bending + 1 / support)
+    disc = omega**2 / (total - MASS * omega**2)
+    return disc, disc * total / support
+
+
+def worst(a, b):
+    """Largest difference relative to the largest amplitude at each speed."""
+    return float((np.abs(a - b).max(axis=(1, 2)) / np.abs(b).max(axis=(1, 2))).max())
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+def test_laval_rotor_on_damped_supports_through_resonance(method):
+    critical = fem.critical_speeds(laval(), n=1).frequencies[0]
+    speeds = np.concatenate(
+        (np.linspace(0.0, 3 * critical, 301), [critical], critical * np.array([1 - 1e-7, 1 + 1e-9]))
+    )
+    response = fem.unbalance_response(laval(), {"disc": 2e-3 * np.exp(0.7j)}, speeds, method=method)
+    disc, support = laval_closed_form(speeds)
+    U = 2e-3 * np.exp(0.7j)
+    np.testing.assert_allclose(response.at("disc"), U * disc, rtol=1e-9)
+    np.testing.assert_allclose(response.at(1), U * support, rtol=1e-9)
+    np.testing.assert_allclose(response.amplitudes[:, 2], U * support, rtol=1e-9)
+    assert response.amplitudes[0].max() == 0.0
+
+
+def test_the_vibration_lags_the_unbalance_by_a_right_angle_at_resonance():
+    rotor = laval(damping=400.0)
+    critical = fem.critical_speeds(rotor, n=1).frequencies[0]
+    W = fem.influence(rotor, ["disc"], ["disc"], [0.05 * critical, critical, 20 * critical]).W[:, 0, 0]
+    np.testing.assert_allclose(np.degrees(np.angle(W[:2])), [0, -90], atol=4)
+    assert abs(np.degrees(np.angle(-W[2]))) < 4
+    assert abs(W[2] + 1 / MASS) < 0.01 / MASS  # far above, the disc turns about its mass centre
+
+
+@given(rotors(elements=(2, 40)), st.integers(0, 10**6))
+@settings(max_examples=60, deadline=None)
+def test_the_fast_way_is_the_exact_solution(rotor, seed):
+    rng = np.random.default_rng(seed)
+    planes = rng.integers(1, rotor.n_nodes + 1, 3).tolist()
+    sensors = rng.integers(1, rotor.n_nodes + 1, 4).tolist()
+    top = fem.critical_speeds(rotor, n=4).frequencies[rng.integers(0, 4)] * rng.uniform(0.5, 2)
+    speeds = np.linspace(0.02 * top, top, 37)
+    fast = fem.influence(rotor, planes, sensors, speeds)
+    exact = fem.influence(rotor, planes, sensors, speeds, method="exact")
+    assert worst(fast.W, exact.W) < 1e-6
+    assert fast.W.shape == (37, 4, 3)
+
+
+@given(rotors(elements=(33, 60)))
+@settings(max_examples=25, deadline=None)
+def test_few_modes_with_static_corrections_are_as_good_as_all(rotor):
+    top = fem.critical_speeds(rotor, n=5).frequencies[-1]
+    speeds = np.linspace(0.05, 1.0, 23) * top
+    planes, sensors = [1, rotor.n_nodes // 2], [2, 8, rotor.n_nodes]
+    few = fem.influence(rotor, planes, sensors, speeds).W
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(receptance, "DENSE", 10**6)
+        every = fem.influence(rotor, planes, sensors, speeds).W
+    assert worst(few, every) < 1e-7
+
+
+@given(rotors())
+@settings(max_examples=25, deadline=None)
+def test_reciprocity_and_superposition(rotor):
+    nodes = list(range(1, rotor.n_nodes + 1))
+    speeds = [37.0, 400.0, 2000.0]
+    W = fem.influence(rotor, nodes, nodes, speeds).W
+    np.testing.assert_allclose(W, W.transpose(0, 2, 1), rtol=0, atol=1e-7 * np.abs(W).max())
+    U = {1: 1e-3 - 2e-3j, rotor.n_nodes: 3e-3j}
+    Z = fem.unbalance_response(rotor, U, speeds).amplitudes
+    expected = W[:, :, 0] * U[1] + W[:, :, -1] * U[rotor.n_nodes]
+    np.testing.assert_allclose(Z, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+    backwards = fem.influence(mirrored(rotor), nodes, nodes, speeds).W
+    np.testing.assert_allclose(backwards[:, ::-1, ::-1], W, rtol=0, atol=1e-6 * np.abs(W).max())
+
+
+@given(rotors())
+@settings(max_examples=25, deadline=None)
+def test_the_power_of_the_unbalance_is_what_the_dampers_take(rotor):
+    U = {1: 2e-3, rotor.n_nodes: 1e-3j}
+    speeds = np.array([50.0, 300.0, 1500.0])
+    Z = fem.unbalance_response(rotor, U, speeds).amplitudes
+    forces = sum(np.conj(u) * speeds**2 * Z[:, node - 1] for node, u in U.items())
+    put_in = -speeds * forces.imag
+    taken = sum(s.damping * speeds**2 * np.abs(Z[:, s.node - 1]) ** 2 for s in rotor.supports)
+    scale = speeds * np.abs(forces)
+    np.testing.assert_allclose(put_in / scale, taken / scale, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("damping", [1e-3, 1e2, 1e6, 1e10, 1e14])
+def test_any_damping_from_none_to_a_lock(damping):
+    rotor = refined(rotor23(damping), 2)
+    rotor = fem.Rotor(
+        rotor.length,
+        rotor.outer_diameter,
+        discs=rotor.discs,
+        supports=[*rotor.supports, fem.Support(20, 0.0, damping)],
+    )
+    speeds = np.linspace(7.0, 3000.0, 200)
+    fast = fem.influence(rotor, [13, 24], [3, 20, 47], speeds).W
+    assert worst(fast, fem.influence(rotor, [13, 24], [3, 20, 47], speeds, method="exact").W) < 1e-6
+
+
+def test_a_free_rotor_has_a_response_and_approaches_a_free_body():
+    rotor = uniform(20)
+    Z = fem.unbalance_response(rotor, {11: 1e-3}, [0.5]).amplitudes[0]
+    np.testing.assert_allclose(Z, -1e-3 / rotor.total_mass, rtol=1e-6)
+    # The banded equations lose digits where ω² M is small beside K, and say so.
+    exact = fem.unbalance_response(rotor, {11: 1e-3}, [0.5], method="exact")
+    np.testing.assert_allclose(exact.amplitudes[0], Z, rtol=1e-3)
+    assert any("rounding may change the response" in text for text in exact.warnings)
+    fine = fem.influence(uniform(60), [1, 31], [1, 31, 61], [100.0, 5000.0]).W
+    coarse = fem.influence(rotor, [1, 11], [1, 11, 21], [100.0, 5000.0], method="exact").W
+    assert worst(coarse, fine) < 2e-4
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+@pytest.mark.parametrize("times", [1, 3])
+def test_an_undamped_rotor_at_its_critical_speed_is_refused(method, times):
+    rotor = refined(rotor23(), times)
+    critical = fem.critical_speeds(rotor).frequencies
+    for omega in critical:
+        with pytest.raises(
+            ValueError, match=r"undamped rotor stands exactly at its critical speed .*no limit"
+        ):
+            fem.influence(rotor, [7], [7], [50.0, omega], method=method)
+    with pytest.raises(ValueError, match="critical speed 0 rad/s"):
+        fem.influence(uniform(5), [1], [1], [0.0], method=method)
+    near = fem.influence(rotor, [7], [7], critical * (1 + 1e-6), method=method).W
+    assert np.isfinite(near).all()
+    assert np.abs(near).min() > 50
+
+
+def test_at_a_damped_critical_speed_the_exact_solution_takes_over():
+    rotor = rotor23(2e4)
+    critical = fem.critical_speeds(rotor).frequencies
+    beside = critical * (1 + 1e-6)
+    at = fem.influence(rotor, [7, 12], [2, 18], critical).W
+    np.testing.assert_allclose(
+        at, fem.influence(rotor, [7, 12], [2, 18], beside, method="exact").W, rtol=2e-3
+    )
+    np.testing.assert_allclose(
+        at, fem.influence(rotor, [7, 12], [2, 18], critical, method="exact").W, rtol=1e-12
+    )
+
+
+def test_hardly_any_damping_on_a_fine_mesh_is_said():
+    rotor = refined(rotor23(1.0), 10)
+    (critical,) = fem.critical_speeds(rotor, n=1).frequencies
+    result = fem.influence(rotor, [61], [61], [critical])
+    assert any("hardly any damping" in text for text in result.warnings)
+    assert any("mesh is fine" in text for text in result.warnings)
+    assert not any("damping" in text for text in fem.influence(rotor, [61], [61], [critical / 2]).warnings)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"speeds": []}, "at least one"),
+        ({"speeds": [1.0, float("nan")]}, "speeds must be finite and not negative, in rad/s"),
+        ({"speeds": [-1.0]}, "speeds must be finite and not negative"),
+        ({"speeds": "fast"}, "speeds must be numbers in rad/s"),
+        ({"speeds": [[1.0]]}, "one number or a list"),
+        ({"planes": [25]}, "node 25 does not exist: the rotor has nodes 1 to 24"),
+        ({"sensors": ["left"]}, "no station is called 'left'"),
+        ({"sensors": []}, "name at least one plane and one sensor"),
+        ({"method": "quick"}, 'method must be "fast" or "exact", not \'quick\''),
+    ],
+)
+def test_impossible_requests_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        fem.influence(rotor23(1e4), **{"planes": [7], "sensors": [2], "speeds": [100.0], **arguments})
+
+
+@pytest.mark.parametrize(
+    ("unbalance", "message"),
+    [
+        ({}, "no unbalance is given"),
+        ({3: complex("nan")}, "unbalance at node 3 must be finite"),
+        ({99: 1}, "node 99"),
+    ],
+)
+def test_an_impossible_unbalance_is_refused(unbalance, message):
+    with pytest.raises(ValueError, match=message):
+        fem.unbalance_response(rotor23(1e4), unbalance, [100.0])
+
+
+def test_many_speeds_are_the_same_as_each_alone():
+    rotor = rotor23(2e4)
+    speeds = np.linspace(1, 1000, 333)
+    together = fem.influence(rotor, [7], [2, 22], speeds).W
+    alone = [fem.influence(rotor, [7], [2, 22], omega).W[0] for omega in speeds[::37]]
+    np.testing.assert_allclose(together[::37], alone, rtol=1e-11)
+
+
+def test_results_as_tables_json_and_text():
+    rotor = fem.Rotor(
+        rotor23().length,
+        rotor23().outer_diameter,
+        discs=[*rotor23().discs, fem.Disc(3, 1.0, 0.2)],
+        supports=rotor23(2e4).supports,
+        stations={"A": 2},
+    )
+    W = fem.influence(rotor, [7, 12], ["A", 22], [100.0, 200.0, 300.0])
+    frame = W.to_frame()
+    assert list(frame.columns) == ["speed_rad_s", "sensor", "plane", "influence_m_per_kg_m", "phase_deg"]
+    row = frame[(frame.speed_rad_s == 200.0) & (frame.sensor == 22) & (frame.plane == 7)].iloc[0]
+    back = row.influence_m_per_kg_m * np.exp(1j * np.radians(row.phase_deg))
+    assert back == pytest.approx(W.W[1, 1, 0], rel=1e-12)
+    assert frame.phase_deg.between(0, 360, inclusive="left").all()
+    document = json.loads(json.dumps(W.to_dict()))
+    assert len(document["rows"]) == 12
+    assert document["rows"][0]["sensor"] == "A"
+    assert "ignored" in document["warnings"][0]
+    assert "3 speeds from 100 to 300 rad/s" in W.summary()
+    assert "phase lead" in fem.influence(rotor, [7], [2], 100.0).summary()
+    with pytest.raises(ValueError, match="read-only"):
+        W.W[0, 0, 0] = 0
+
+    Z = fem.unbalance_response(rotor, {"A": 1e-3, 2: 1e-3j}, [100.0, 135.0])
+    assert Z.unbalance == {2: 1e-3 + 1e-3j}
+    document = json.loads(json.dumps(Z.to_dict(["A", 22])))
+    assert document["sensors"] == ["A", 22]
+    assert np.shape(document["amplitude_m"]) == (2, 2)
+    assert document["amplitude_m"][1][0] == pytest.approx(abs(Z.at(22)[0]), rel=1e-12)
+    assert len(Z.to_frame()) == 48
+    assert "135 rad/s" in Z.summary()
+    assert "Warning: " in Z.summary()
+
+
+def test_no_unbalance_no_vibration():
+    for rotor in (rotor23(1e4), refined(rotor23(1e4), 3)):
+        assert not fem.unbalance_response(rotor, {5: 0.0}, [10.0, 500.0]).amplitudes.any()

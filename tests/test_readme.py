@@ -1,0 +1,52 @@
+"""What the README tells a reader to type works as written."""
+
+import re
+import shlex
+import shutil
+
+import pytest
+
+from rotorid.samples import sample_data
+
+ROOT = sample_data().parent
+BLOCKS = re.findall(r"```(\w*)\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+COMMANDS = [
+    line for kind, text in BLOCKS if not kind for line in text.splitlines() if line.startswith("rotorid ")
+]
+SCRIPTS = [text for kind, text in BLOCKS if kind == "python"]
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    shutil.copytree(ROOT / "sample_data", tmp_path / "sample_data")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_readme_shows_commands_and_code():
+    assert len(COMMANDS) >= 4
+    assert len(SCRIPTS) >= 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_of_the_readme_runs(cli, workplace, command):
+    words = shlex.split(command)[1:]
+    outcome = cli(*words)
+    assert outcome.code == 0, outcome.err
+    for option in ("--plot", "--output"):
+        if option in words:
+            assert (workplace / words[words.index(option) + 1]).stat().st_size > 0
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_every_script_of_the_readme_runs(workplace, script, capsys):
+    exec(compile(script, "README.md", "exec"), {})
+    assert "135.240" in capsys.readouterr().out
+    assert (workplace / "corrections.csv").stat().st_size > 0
+
+
+def test_every_file_the_readme_links_to_exists():
+    links = re.findall(r"\]\(([^)#]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert links
+    for link in links:
+        assert (ROOT / link).exists() or link.startswith("http"), link

@@ -1,0 +1,281 @@
+"""The kernel against certified values, closed forms and its own promises."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rotorid.regression import coverage_factor, least_squares, stack, stretch, unstretch
+
+# NIST StRD, Longley: total employment; GNP deflator, GNP, unemployed, armed forces, population, year
+LONGLEY = """
+60323  83.0 234289 2356 1590 107608 1947
+61122  88.5 259426 2325 1456 108632 1948
+60171  88.2 258054 3682 1616 109773 1949
+61187  89.5 284599 3351 1650 110929 1950
+63221  96.2 328975 2099 3099 112075 1951
+63639  98.1 346999 1932 3594 113270 1952
+64989  99.0 365385 1870 3547 115094 1953
+63761 100.0 363112 3578 3350 116219 1954
+66019 101.2 397469 2904 3048 117388 1955
+67857 104.6 419180 2822 2857 118734 1956
+68169 108.4 442769 2936 2798 120445 1957
+66513 110.8 444546 4681 2637 121950 1958
+68655 112.6 482704 3813 2552 123366 1959
+69564 114.2 502601 3931 2514 125368 1960
+69331 115.7 518173 4806 2572 127852 1961
+70551 116.9 554894 4007 2827 130081 1962
+"""
+LONGLEY_VALUES = [
+    -3482258.63459582,
+    15.0618722713733,
+    -0.358191792925910e-01,
+    -2.02022980381683,
+    -1.03322686717359,
+    -0.511041056535807e-01,
+    1829.15146461355,
+]
+LONGLEY_STD = [
+    890420.383607373,
+    84.9149257747669,
+    0.334910077722432e-01,
+    0.488399681651699,
+    0.214274163161675,
+    0.226073200069370,
+    455.478499142212,
+]
+LONGLEY_RESIDUAL_STD = 304.854073561965
+
+
+def test_longley_agrees_with_the_certified_values_to_nine_digits():
+    table = np.array([row.split() for row in LONGLEY.strip().splitlines()], dtype=float)
+    assert table.shape == (16, 7)
+    estimate = least_squares(np.column_stack((np.ones(16), table[:, 1:])), table[:, 0])
+    np.testing.assert_allclose(estimate.values, LONGLEY_VALUES, rtol=1e-9)
+    np.testing.assert_allclose(estimate.std, LONGLEY_STD, rtol=1e-9)
+    residual_std = np.sqrt(estimate.residuals @ estimate.residuals / estimate.dof)
+    np.testing.assert_allclose(residual_std, LONGLEY_RESIDUAL_STD, rtol=1e-9)
+    assert estimate.dof == 9
+
+
+complex_numbers = st.complex_numbers(max_magnitude=1e3, allow_nan=False, allow_infinity=False)
+
+
+@given(st.integers(1, 5), st.integers(1, 4), st.randoms(use_true_random=False))
+def test_stretching_turns_complex_products_into_real_ones(m, n, random):
+    rng = np.random.default_rng(random.randrange(2**32))
+    A = rng.normal(size=(m, n)) + 1j * rng.normal(size=(m, n))
+    x = rng.normal(size=n) + 1j * rng.normal(size=n)
+    np.testing.assert_allclose(stretch(A) @ stretch(x), stretch(A @ x), atol=1e-12)
+    real = rng.normal(size=n)
+    np.testing.assert_allclose(stack(A) @ real, stack(A @ real), atol=1e-12)
+    np.testing.assert_array_equal(unstretch(stretch(x)), x)
+
+
+def test_stretch_and_unstretch_refuse_other_shapes():
+    with pytest.raises(ValueError, match="vector or a matrix"):
+        stretch(np.zeros((2, 2, 2)))
+    with pytest.raises(ValueError, match="Re, Im pairs"):
+        unstretch([1.0, 2.0, 3.0])
+
+
+def test_complex_equations_with_complex_unknowns():
+    rng = np.random.default_rng(1)
+    K = rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2))
+    truth = np.array([1 + 2j, -0.5j])
+    estimate = least_squares(K, K @ truth, names=["A", "B"])
+    np.testing.assert_allclose(unstretch(estimate.values), truth, atol=1e-12)
+    assert estimate.names == ("Re A", "Im A", "Re B", "Im B")
+    assert estimate.dof == 12 - 4
+
+
+def straight_line(seed=0, scatter=0.3):
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0, 5, 12)
+    return np.column_stack((np.ones(12), x)), 2 + 0.7 * x + scatter * rng.normal(size=12)
+
+
+def test_unstated_errors_give_student_intervals_from_the_residuals():
+    K, Y = straight_line()
+    estimate = least_squares(K, Y)
+    x = K[:, 1]
+    slope_std = np.sqrt(estimate.residuals @ estimate.residuals / 10 / ((x - x.mean()) ** 2).sum())
+    assert estimate.std[1] == pytest.approx(slope_std, rel=1e-12)
+    assert estimate.coverage_factor == pytest.approx(2.228138852, rel=1e-9)  # t(0.975, 10), tables
+    assert estimate.ci95[1, 1] - estimate.values[1] == pytest.approx(2.228138852 * slope_std, rel=1e-9)
+    assert not estimate.errors_stated
+    assert estimate.chi_square is None
+
+
+def test_stated_errors_give_normal_intervals_whatever_the_residuals():
+    K, Y = straight_line(scatter=30.0)
+    estimate = least_squares(K, Y, sigma=0.3)
+    x = K[:, 1]
+    slope_std = 0.3 / np.sqrt(((x - x.mean()) ** 2).sum())
+    assert estimate.std[1] == pytest.approx(slope_std, rel=1e-12)
+    assert estimate.coverage_factor == pytest.approx(1.959963984540054, rel=1e-12)
+    assert estimate.chi_square == pytest.approx((estimate.residuals / 0.3) @ (estimate.residuals / 0.3))
+    assert "times as large as the stated errors explain" in estimate.summary()
+
+
+def test_no_degrees_of_freedom_no_interval():
+    estimate = least_squares([[1.0, 0.0], [1.0, 1.0]], [1.0, 2.0], names=["a", "b"])
+    assert estimate.std is None
+    assert estimate.ci95 is None
+    assert estimate.correlation is None
+    assert "no intervals" in estimate.summary()
+    assert estimate.to_dict()["parameters"]["a"] == {"value": pytest.approx(1.0), "std": None, "ci95": None}
+    assert coverage_factor(0) is None
+
+
+def test_sigma_weights_rows_and_equals_the_full_covariance_matrix():
+    K, Y = straight_line()
+    sigma = np.linspace(0.1, 1.0, 12)
+    diagonal = least_squares(K, Y, sigma=sigma)
+    full = least_squares(K, Y, sigma=np.diag(sigma**2))
+    weighted = least_squares(K, Y, weights=1 / sigma**2)
+    np.testing.assert_allclose(diagonal.values, full.values, rtol=1e-12)
+    np.testing.assert_allclose(diagonal.values, weighted.values, rtol=1e-12)
+    np.testing.assert_allclose(diagonal.covariance, full.covariance, rtol=1e-10)
+    assert diagonal.chi_square == pytest.approx(full.chi_square, rel=1e-12)
+
+
+def test_correlated_errors_against_the_generalised_least_squares_formula():
+    K, Y = straight_line()
+    rng = np.random.default_rng(5)
+    L = np.tril(rng.normal(size=(12, 12))) + 3 * np.eye(12)
+    S = L @ L.T
+    estimate = least_squares(K, Y, sigma=S)
+    information = K.T @ np.linalg.solve(S, K)
+    np.testing.assert_allclose(estimate.covariance, np.linalg.inv(information), rtol=1e-9)
+    expected = np.linalg.solve(information, K.T @ np.linalg.solve(S, Y))
+    np.testing.assert_allclose(estimate.values, expected, rtol=1e-9)
+
+
+def test_chosen_weights_with_stated_errors_propagate_the_errors_not_the_weights():
+    K, Y = straight_line()
+    weights, sigma = np.linspace(1, 9, 12), np.linspace(0.2, 0.5, 12)
+    estimate = least_squares(K, Y, weights=weights, sigma=sigma)
+    gain = np.linalg.solve(K.T @ (weights[:, None] * K), K.T * weights)
+    np.testing.assert_allclose(estimate.covariance, gain @ np.diag(sigma**2) @ gain.T, rtol=1e-10)
+
+
+def test_a_row_of_weight_zero_is_left_out():
+    K, Y = straight_line()
+    weights = np.ones(12)
+    weights[3] = 0.0
+    spoilt = Y.copy()
+    spoilt[3] = 1e6
+    kept = np.arange(12) != 3
+    np.testing.assert_allclose(
+        least_squares(K, spoilt, weights=weights).values, least_squares(K[kept], Y[kept]).values, rtol=1e-10
+    )
+    assert least_squares(K, spoilt, weights=weights).dof == 9
+
+
+def test_opposite_columns_are_named_with_what_is_determined():
+    rng = np.random.default_rng(2)
+    c, b = rng.normal(size=(2, 9))
+    estimate = least_squares(np.column_stack((c, b, -b)), 3 * c - 2 * b, names=["c", "b", "δb"], sigma=0.1)
+    assert estimate.rank == 2
+    assert estimate.undetermined == ("b", "δb")
+    assert estimate.values[0] == pytest.approx(3.0)
+    assert np.isnan(estimate.values[1:]).all()
+    (combination,) = estimate.combinations
+    assert combination.words == "b − δb"
+    assert combination.value == pytest.approx(-2.0)
+    expected = least_squares(np.column_stack((c, b)), 3 * c - 2 * b, sigma=0.1)
+    assert combination.std == pytest.approx(expected.std[1], rel=1e-9)
+    assert estimate.std[0] == pytest.approx(expected.std[0], rel=1e-9)
+    assert estimate.describe_rank().startswith("only c and b − δb are determined")
+    document = estimate.to_dict()
+    assert document["identifiable"] is False
+    assert document["parameters"]["b"]["value"] is None
+    assert document["combinations"] == {"b − δb": {"value": pytest.approx(-2.0), "std": combination.std}}
+    assert "not determined by these data" in estimate.summary()
+
+
+def test_columns_of_very_different_size_do_not_look_dependent():
+    rng = np.random.default_rng(3)
+    K = rng.normal(size=(20, 3)) * [1e-9, 1.0, 1e9]
+    estimate = least_squares(K, K @ [2e9, 3.0, 4e-9])
+    assert estimate.full_rank
+    np.testing.assert_allclose(estimate.values, [2e9, 3.0, 4e-9], rtol=1e-12)
+
+
+def test_a_zero_column_is_not_determined_and_the_rest_is():
+    estimate = least_squares([[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]], [2.0, 4.0, 6.0], names=["a", "nothing"])
+    assert estimate.undetermined == ("nothing",)
+    assert estimate.values[0] == pytest.approx(2.0)
+    assert estimate.combinations == ()
+    assert least_squares([[0.0]], [1.0], names=["a"]).describe_rank().startswith("nothing is determined")
+
+
+@given(st.integers(2, 5), st.integers(0, 2**32 - 1))
+def test_determined_combinations_keep_their_value_along_the_null_space(n, seed):
+    """Adding a null vector to the truth changes Y by nothing, so no reported value may change."""
+    rng = np.random.default_rng(seed)
+    K = rng.integers(-2, 3, size=(3 * n, n)).astype(float)
+    K[:, -1] = K[:, 0] * 2 - (K[:, 1] if n > 2 else 0)
+    truth = rng.normal(size=n)
+    null = np.zeros(n)
+    null[0], null[-1] = -2.0, 1.0
+    if n > 2:
+        null[1] = 1.0
+    one, two = least_squares(K, K @ truth), least_squares(K, K @ (truth + 7 * null))
+    np.testing.assert_allclose(one.values, two.values, atol=1e-8)
+    assert np.isnan(one.values[np.abs(null) > 0]).all()
+    for a in one.combinations:
+        assert a.coefficients @ null == pytest.approx(0, abs=1e-9)
+        assert a.value == pytest.approx(a.coefficients @ truth, abs=1e-8)
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say():
+    rng = np.random.default_rng(11)
+    K = rng.normal(size=(8, 3))
+    truth = np.array([1.0, -2.0, 0.5])
+    sigma = np.linspace(0.5, 2.0, 8)
+    inside = {"student": 0, "normal": 0}
+    repetitions = 2000
+    for _ in range(repetitions):
+        even = least_squares(K, K @ truth + rng.normal(size=8)).ci95[0]
+        stated = least_squares(K, K @ truth + sigma * rng.normal(size=8), sigma=sigma).ci95[0]
+        inside["student"] += even[0] <= truth[0] <= even[1]
+        inside["normal"] += stated[0] <= truth[0] <= stated[1]
+    for count in inside.values():
+        assert 0.935 <= count / repetitions <= 0.965
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"K": [1.0, 2.0], "Y": [1.0, 2.0]}, "K must be"),
+        ({"K": [[1.0], [2.0]], "Y": [1.0]}, "K must be"),
+        ({"K": np.zeros((0, 2)), "Y": np.zeros(0)}, "nothing to estimate"),
+        ({"K": [[np.nan]], "Y": [1.0]}, "finite"),
+        ({"K": [[1.0]], "Y": [np.inf]}, "finite"),
+        ({"K": [[1.0]], "Y": [1.0], "names": ["a", "b"]}, "different names"),
+        ({"K": [[1.0, 2.0]], "Y": [1.0], "names": ["a", "a"]}, "different names"),
+        ({"K": [[1.0]], "Y": [1.0], "sigma": 0.0}, "greater than zero"),
+        ({"K": [[1.0]], "Y": [1.0], "sigma": [1.0, 2.0]}, "one entry per row"),
+        ({"K": [[1.0]], "Y": [1.0], "sigma": np.eye(2)}, "covariance of Y"),
+        ({"K": [[1.0]], "Y": [1.0], "sigma": np.nan}, "finite"),
+        ({"K": [[1.0]], "Y": [1.0], "weights": [-1.0]}, "not negative"),
+        ({"K": [[1.0]], "Y": [1.0], "weights": [0.0]}, "not all zero"),
+        ({"K": [[1.0]], "Y": [1.0], "weights": [1.0], "sigma": [[1.0]]}, "not both"),
+    ],
+)
+def test_bad_input_is_refused_with_a_reason(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        least_squares(kwargs.pop("K"), kwargs.pop("Y"), **kwargs)
+
+
+def test_frame_and_correlation():
+    K, Y = straight_line()
+    estimate = least_squares(K, Y, names=["a", "b"])
+    frame = estimate.to_frame()
+    assert list(frame.columns) == ["parameter", "value", "std", "ci95_low", "ci95_high"]
+    np.testing.assert_allclose(frame["value"], estimate.values)
+    np.testing.assert_allclose(np.diag(estimate.correlation), 1.0)
+    x = K[:, 1]
+    assert estimate.correlation[0, 1] == pytest.approx(-x.mean() / np.sqrt((x**2).mean()), rel=1e-9)

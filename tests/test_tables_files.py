@@ -1,0 +1,355 @@
+"""What spreadsheets write: every dialect gives the same data, and everything else a message."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
+
+from rotorid.tables import InputError, TableWarning, read_job, read_rotor, read_trials
+from rotorid.tables.columns import Column, read_table
+from rotorid.tables.problems import Problems
+from rotorid.tables.units import SPEED, VIBRATION, one_of
+
+FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@pytest.fixture
+def weights(tmp_path):
+    return write_csv(tmp_path / "weights.csv", WEIGHTS)
+
+
+@pytest.fixture
+def plain(tmp_path, weights):
+    return read_trials(write_csv(tmp_path / "plain.csv", RUNS), weights)
+
+
+def assert_same(a, b):
+    assert (a.runs, a.sensors, a.planes, a.labels) == (b.runs, b.sensors, b.planes, b.labels)
+    for name in ("speeds", "readings", "weights"):
+        np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+
+
+COMMA = csv_text(RUNS)
+EUROPE = csv_text(RUNS, ";", comma=True)
+PADDED = "".join(line + ";;;\n" for line in EUROPE.splitlines())
+SPACED = EUROPE.replace(";7,2;", ";\u00a07,2\u00a0;").replace("speed_rpm", "speed_rpm\u00a0")
+DIALECTS = {
+    "utf-8 with BOM": COMMA.encode("utf-8-sig"),
+    "CRLF": COMMA.replace("\n", "\r\n").encode(),
+    "CR": COMMA.replace("\n", "\r").encode(),
+    "no newline at the end": COMMA.rstrip().encode(),
+    "semicolons": csv_text(RUNS, ";").encode(),
+    "semicolons, decimal comma": EUROPE.encode(),
+    "sep=;": ("sep=;\r\n" + EUROPE).encode(),
+    "sep=; with BOM": ("sep=;\r\n" + EUROPE).encode("utf-8-sig"),
+    "sep=,": ("sep=,\n" + COMMA).encode(),
+    "tabs": csv_text(RUNS, "\t").encode(),
+    "Unicode text": csv_text(RUNS, "\t").replace("\n", "\r\n").encode("utf-16"),
+    "UTF-16, big endian": ("\ufeff" + COMMA).encode("utf-16-be"),
+    "trailing columns": PADDED.encode(),
+    "NBSP": SPACED.encode(),
+    "blank lines": ("\n;;\n" + EUROPE.replace("\n", "\n\n") + ";;;;\n").encode(),
+    "comments": ("# made by hand; 5,5\n" + COMMA.replace("\n", "\n # and here\n")).encode(),
+    "comment that Excel quoted": ('"# made; by hand";;;;\n' + EUROPE).encode(),
+    "all quoted": "".join(
+        ",".join(f'"{cell}"' for cell in line.split(",")) + "\n" for line in COMMA.splitlines()
+    ).encode(),
+    "blanks around": COMMA.replace(",", " , ").encode(),
+    "a remark": "".join(
+        f"{line},{'note' if n == 0 else 'x'}\n" for n, line in enumerate(COMMA.splitlines())
+    ).encode(),
+}
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_every_dialect_gives_the_same_data(tmp_path, weights, plain, name):
+    path = tmp_path / "runs.csv"
+    path.write_bytes(DIALECTS[name])
+    assert_same(read_trials(path, weights), plain)
+
+
+def test_a_workbook_gives_the_same_data(tmp_path, weights, plain):
+    book = write_book(tmp_path / "job.xlsx", {"Runs": RUNS, "weights": WEIGHTS, "other": [["x"]]})
+    assert_same(read_trials(book, book), plain)
+    one = write_book(tmp_path / "one.xlsx", {"Tabelle1": [["# measured"], [None], *RUNS], "Tabelle2": []})
+    assert_same(read_trials(one, weights), plain)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "sensors"),
+    [
+        ("cp1251", ("Опора 1", "Опора 2")),
+        ("cp1252", ("Lager süd", "Lager Nord für °")),
+        ("cp1252", ("a°", "b")),
+    ],
+)
+def test_an_8_bit_encoding_is_recognised_and_named(tmp_path, weights, plain, encoding, sensors):
+    text = EUROPE.replace(";A;", f";{sensors[0]};").replace(";B;", f";{sensors[1]};")
+    path = tmp_path / "runs.csv"
+    path.write_bytes(text.encode(encoding))
+    with pytest.warns(TableWarning, match=rf"runs\.csv: not UTF-8, read as {encoding}"):
+        trials = read_trials(path, weights)
+    assert trials.sensors == sensors
+    assert_same(trials, dataclasses.replace(plain, sensors=sensors))
+
+
+BAD_FILES = {
+    "empty": (b"", "the file is empty"),
+    "blank": (b"\n \r\n\n", "the file is empty"),
+    "only a mark": (b"\xef\xbb\xbf", "the file is empty"),
+    "only comments": (b"# nothing\n;;;\n", "the file is empty"),
+    "binary": (bytes(range(256)), "this one is neither"),
+    "binary without NUL": (b"\x01\x02\x03\x04,\x05", "this one is binary"),
+    "utf-16 cut off": (b"\xff\xfea\x00b", "this one is neither"),
+    "renamed xlsx": (b"PK\x03\x04 and so on", "name it .xlsx"),
+    "renamed xls": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "old Excel workbook"),
+    "picture": (b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR", "this one is neither"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_files_that_are_no_tables(tmp_path, weights, name):
+    data, words = BAD_FILES[name]
+    path = tmp_path / "runs.csv"
+    path.write_bytes(data)
+    the_only(complaints(read_trials, path, weights), "runs.csv", None, None, None, words)
+
+
+def test_a_header_without_rows(tmp_path, weights):
+    path = write_csv(tmp_path / "runs.csv", RUNS[:1])
+    the_only(complaints(read_trials, path, weights), "runs.csv", 1, None, None, "rows below the header")
+
+
+def test_missing_files_and_folders(tmp_path, weights):
+    write_csv(tmp_path / "runs.csv", RUNS)
+    found = complaints(read_trials, tmp_path / "rusn.csv", weights)
+    the_only(found, "rusn.csv", None, None, None, "a file that exists (did you mean 'runs.csv'?)")
+    (tmp_path / "folder.csv").mkdir()
+    found = complaints(read_trials, tmp_path / "folder.csv", weights)
+    the_only(found, "folder.csv", None, None, None, "a file, not a folder")
+    found = complaints(read_trials, tmp_path / "none" / "runs.xlsx", weights)
+    the_only(found, "runs.xlsx", None, None, None, "a file that exists")
+    assert complaints(read_trials, "a\0b.csv", weights)
+
+
+def test_a_file_that_is_no_workbook(tmp_path, weights):
+    path = tmp_path / "runs.xlsx"
+    path.write_text(COMMA)
+    the_only(complaints(read_trials, path, weights), "runs.xlsx", None, None, None, "this is none")
+    path.write_bytes(b"PK\x03\x04 broken")
+    the_only(
+        complaints(read_trials, path, weights), "runs.xlsx", None, None, None, "an intact Excel workbook"
+    )
+
+
+def test_a_workbook_without_the_sheet(tmp_path, weights):
+    path = write_book(tmp_path / "runs.xlsx", {"one": RUNS, "two": RUNS})
+    found = complaints(read_trials, path, weights)
+    the_only(found, "runs.xlsx", None, None, None, "a sheet 'runs'; the sheets are one, two")
+
+
+@pytest.mark.parametrize(
+    ("value", "shown", "words"),
+    [
+        (DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        (True, "TRUE", "not a logical value"),
+        ("#DIV/0!", "#DIV/0!", "not an error of the spreadsheet"),
+        ("=1+1", "=1+1", "open and save the file in Excel"),
+        ("2.5 um", "2.5 um", "unit in the header"),
+        ("2,5", "2,5", "text, with a comma"),
+        ("", "", "a number"),
+        (None, "", "a number"),
+    ],
+)
+def test_cells_of_a_workbook_that_are_no_numbers(tmp_path, weights, value, shown, words):
+    path = write_book(tmp_path / "runs.xlsx", {"runs": replaced(RUNS, 4, "amplitude_um_pp", value)})
+    found = the_only(complaints(read_trials, path, weights), "runs.xlsx", 4, "amplitude_um_pp", shown, words)
+    assert "sheet 'runs'" in found.file
+
+
+def test_a_number_written_as_text_in_a_workbook_is_read(tmp_path, weights, plain):
+    path = write_book(tmp_path / "runs.xlsx", {"runs": replaced(RUNS, 2, "amplitude_um_pp", "7.2")})
+    assert_same(read_trials(path, weights), plain)
+
+
+def test_decimal_commas_in_a_comma_separated_file_are_explained(tmp_path, weights):
+    path = tmp_path / "runs.csv"
+    path.write_text(COMMA.replace("7.2", "7,2"))
+    problems = complaints(read_trials, path, weights)
+    assert [(p.row, p.value) for p in problems if "need ; between" in p.expected] == [(2, "6 cells")]
+    path.write_text(COMMA.replace("7.2", '"7,2"'))
+    words = "in a comma-separated file a comma is not a decimal sign"
+    the_only(complaints(read_trials, path, weights), "runs.csv", 2, "amplitude_um_pp", "7,2", words)
+
+
+@pytest.mark.parametrize("written", ["1.234,5", "1 234,5", "1\u00a0234,5", "1'234,5", "1.234"])
+def test_thousands_separators_are_not_guessed(tmp_path, weights, written):
+    path = tmp_path / "runs.csv"
+    path.write_text(EUROPE.replace("13,5", written), encoding="utf-8")
+    problems = complaints(read_trials, path, weights)
+    assert [(p.row, p.column) for p in problems] == [(3, "amplitude_um_pp")]
+    assert "thousands" in problems[0].expected
+
+
+def test_rows_are_counted_as_a_spreadsheet_shows_them(tmp_path, weights):
+    bad = csv_text(replaced(RUNS, 3, "amplitude_um_pp", "x"))
+    path = tmp_path / "runs.csv"
+    for text, row in ((bad, 3), ("# a\n\n" + bad, 5), ("sep=,\n" + bad, 3), (bad.replace("\n", "\r\n"), 3)):
+        path.write_bytes(text.encode())
+        the_only(complaints(read_trials, path, weights), "runs.csv", row, "amplitude_um_pp", "x", "a number")
+
+
+def test_unclosed_quotes_and_line_breaks_in_cells(tmp_path, weights):
+    path = tmp_path / "runs.csv"
+    path.write_text(COMMA.replace("initial,1000,A", '"initial,1000,A'))
+    problems = complaints(read_trials, path, weights)
+    assert problems[0].row == 2
+    assert "quotes that are closed" in problems[0].expected
+
+
+def test_values_below_no_name(tmp_path, weights):
+    path = tmp_path / "runs.csv"
+    path.write_text(COMMA.replace("run,speed", "run,,speed").replace(",1000,", ",5,1000,"))
+    problems = complaints(read_trials, path, weights)
+    assert {p.row for p in problems} == {2, 3, 4, 5, 6, 7}
+    assert all("a name for column 2 in the header" in p.expected for p in problems)
+
+
+def test_wrong_sep_line(tmp_path, weights):
+    path = tmp_path / "runs.csv"
+    path.write_text("sep=|\n" + COMMA)
+    the_only(complaints(read_trials, path, weights), "runs.csv", 1, None, "sep=|", "sep=; or sep=,")
+
+
+@pytest.mark.parametrize("name", ["=SUM(A1)", "@home", "a\u200bb", "bell\u2028x"])
+def test_names_that_are_formulas_or_hide_characters(tmp_path, weights, name):
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "sensor", name))
+    assert [(p.row, p.column) for p in complaints(read_trials, path, weights)][:1] == [(2, "sensor")]
+
+
+NAMES = st.text(st.characters(codec="utf-8", categories=["L", "N"]), min_size=1, max_size=8)
+# The workbooks are written by openpyxl here, which keeps 16 digits.
+VALUES = st.floats(min_value=0, max_value=1e12, allow_subnormal=False).map(lambda v: float(f"{v:.15g}"))
+ROWS = st.lists(st.tuples(NAMES, VALUES, VALUES), min_size=1, max_size=5)
+COLUMNS = (Column("name"), Column("amplitude", one_of(VIBRATION)), Column("speed", one_of(SPEED)))
+
+
+@FEW
+@given(ROWS)
+def test_random_tables_in_all_dialects(tmp_path, rows):
+    table = [["name", "amplitude_mm", "speed_rad_s"], *map(list, rows)]
+    written = {
+        "a.csv": csv_text(table).encode(),
+        "b.csv": csv_text(table, ";", comma=True).replace("\n", ";;\r\n").encode("utf-8-sig"),
+        "c.csv": ("sep=;\n" + csv_text(table, ";")).encode(),
+        "d.txt": csv_text(table, "\t").encode("utf-16"),
+    }
+    for name, data in written.items():
+        (tmp_path / name).write_bytes(data)
+    write_book(tmp_path / "e.xlsx", {"table": table})
+    read = []
+    for name in (*written, "e.xlsx"):
+        problems = Problems()
+        result = read_table(tmp_path / name, "table", COLUMNS, problems)
+        problems.stop()
+        read.append(result)
+    for result in read:
+        assert result.texts("name") == read[0].texts("name")
+        np.testing.assert_array_equal(result.numbers("speed"), [row[2] for row in rows])
+        np.testing.assert_array_equal(result.numbers("amplitude"), [row[1] / 1000 for row in rows])
+
+
+GARBAGE = st.one_of(
+    st.binary(max_size=300),
+    st.text(max_size=200).map(lambda text: text.encode("utf-8", "surrogatepass")),
+    st.text(alphabet='ab1,;\t"\n\r#= \u00a0.-eé', max_size=200).map(lambda t: t.encode("cp1252", "replace")),
+    st.tuples(st.integers(0, len(COMMA) - 1), st.binary(min_size=1, max_size=3)).map(
+        lambda cut: COMMA.encode()[: cut[0]] + cut[1] + COMMA.encode()[cut[0] :]
+    ),
+)
+
+
+@settings(FEW, max_examples=300)
+@given(GARBAGE, st.sampled_from([".csv", ".xlsx"]))
+@example(b"PK\x03\x04", ".xlsx")
+@example(b'"', ".csv")
+@example(b"\xff\xfe", ".csv")
+def test_garbage_gives_input_errors_only(tmp_path, data, suffix):
+    runs, weights = tmp_path / f"garbage{suffix}", tmp_path / "weights.csv"
+    runs.write_bytes(data)
+    write_csv(weights, WEIGHTS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TableWarning)
+        try:
+            trials = read_trials(runs, weights)
+        except InputError as error:
+            trials, message = None, str(error)
+    if trials is None:
+        assert str(runs) in message or str(weights) in message
+    else:
+        # A byte that did no harm; nothing was made up.
+        assert np.isfinite(trials.readings).all()
+        assert trials.readings.size == 6
+
+
+@settings(FEW, max_examples=150)
+@given(st.data())
+def test_a_damaged_workbook_gives_input_errors_only(tmp_path, data):
+    whole, path = tmp_path / "whole.xlsx", tmp_path / "job.xlsx"
+    if not whole.exists():
+        write_book(whole, {"runs": RUNS, "weights": WEIGHTS})
+    content = bytearray(whole.read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(len(content) // 2, len(content)))])
+    try:
+        size = read_trials(path, path).readings.size
+    except InputError as error:
+        size = 6 if str(path) in str(error) else 0
+    assert size == 6
+
+
+KEYS = st.sampled_from(
+    (
+        "runs weights influence phase angles errors planes sensors amplitude_percent floor A 1 rotor check",
+        "shaft material model disc bearing station node name mass_kg stiffness_N_per_m table seal shear",
+    )
+).flatmap(lambda words: st.sampled_from(words.split()))
+SCALARS = st.one_of(
+    st.sampled_from(
+        ['"lag"', '"runs.csv"', '"shaft.csv"', '"A"', '""', "true", "nan", "-inf", "1979-05-27", "[]"]
+    ),
+    st.integers(-3, 10**400).map(str),
+    st.floats().map(repr),
+)
+
+
+@settings(FEW, max_examples=200)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["{}", "[{}]", "[[{}]]", "[planes.{}]", "[errors.{}]"]), KEYS, KEYS, SCALARS
+        ),
+        max_size=5,
+    )
+)
+def test_random_toml_gives_input_errors_only(tmp_path, lines):
+    text = ""
+    for head, name, key, value in lines:
+        text += f"{key} = {value}\n" if head == "{}" else f"{head.format(name)}\n{key} = {value}\n"
+    path = tmp_path / "any.toml"
+    path.write_text(text)
+    write_csv(tmp_path / "runs.csv", RUNS)
+    write_csv(tmp_path / "shaft.csv", [["length_m", "diameter_m"], [1, 0.1]])
+    for read in (read_job, read_rotor):
+        try:
+            ending = str(read(path).__class__.__name__)
+        except InputError as error:
+            ending = str(error)
+        assert ending in ("Job", "Rotor") or "expected" in ending
