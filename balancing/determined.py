@@ -23,16 +23,6 @@ def undetermined_columns(A: ComplexArray, names: Sequence[str]) -> list[int]:
     return [i for i, name in enumerate(names) if f"Re {name}" in lost or f"Im {name}" in lost]
 
 
-def gain(A: ComplexArray) -> ComplexArray:
-    """Matrix G (…, n, m) with least-squares solution x = G y of A x = y, A (…, m, n) of full column rank.
-
-    By SVD after column scaling, for many matrices at once; used to solve for all channels and to propagate
-    errors.
-    """
-    scale = np.linalg.norm(A, axis=-2, keepdims=True)
-    return np.asarray(np.linalg.pinv(A / scale, rcond=1e-14) / np.swapaxes(scale, -1, -2))
-
-
 def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray) -> None:
     """Refuse runs that do not determine the baseline and the effect of every plane.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.determined import check_runs, gain
+from balancing.determined import check_runs
 from balancing.errors import EQUAL, ErrorModel, Source, error_model, mean_covariance
 from balancing.labels import Labels
 from balancing.significance import check_consistency, check_effects, weak_trials
@@ -20,6 +20,7 @@ from balancing.trials import ReadingErrors, Trials, check_names, check_speeds
 
 if TYPE_CHECKING:
     import pandas as pd
+from rotorid.regression import gain
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

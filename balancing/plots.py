@@ -129,6 +129,7 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
         # a quiet reading and what is left of a loud one are both worth seeing
         linear = 10.0 ** np.floor(np.log10(max(float(new.min()), old.max() / 300)))
         ax.set_yscale("symlog", linthresh=linear)
+        ax.yaxis.set_major_formatter("{x:g}")
     ax.set_ylim(bottom=0)
     ax.margins(x=0.01)
     _name_bars(ax, c, x)

@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.determined import gain
+from rotorid.regression import gain
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

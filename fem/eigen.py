@@ -136,9 +136,9 @@ def _part(rotor: Rotor, A: Matrices, X: FloatArray) -> FloatArray:
 
 
 def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
-    """A sentence where rounding costs more than half of the 16 digits."""
+    """A sentence where fewer than six digits are sure."""
     worst = float(rounding.max(initial=0.0))
-    if worst < 1e-8:
+    if worst < 1e-6:
         return ()
     lost = int(np.ceil(np.log10(worst / np.finfo(float).eps)))
     return (

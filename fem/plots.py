@@ -206,7 +206,7 @@ def _attachments(rotor: Rotor, ax: Axes, scale: float) -> None:
             edgecolor="white",
             linewidth=0.8,
             zorder=4,
-            label=f"masses, {masses}",
+            label=f"{'mass' if len(heavy) == 1 else 'masses'}, {masses}",
         )
     for label, face, damped in (("support", _SUPPORT, False), ("damped support", COLORS[4], True)):
         nodes = [s.node - 1 for s in rotor.supports if (s.damping > 0) == damped]

@@ -112,7 +112,7 @@ def solve_banded(
 
     H = np.empty((speeds.size, rows.size, loads.shape[1]), dtype=complex)
     for k, omega in enumerate(speeds):
-        H[k] = deflection(float(omega))
+        H[k] = deflection(float(omega))[rows]
     suspects = {int(np.argmin(speeds)), int(np.argmax(speeds)), int(np.argmax(np.abs(H).max(axis=(1, 2))))}
     errors = {k: _sensitivity(A, loads, deflection(float(speeds[k]))) for k in suspects}
     worst = max(errors, key=errors.__getitem__)

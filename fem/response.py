@@ -131,8 +131,11 @@ class InfluenceCoefficients:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`."""
-        return {"rows": self.to_frame().to_dict("records"), "warnings": list(self.warnings)}
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`; the units stand once."""
+        keys = ("speed", "sensor", "plane", "influence", "phase")
+        units = {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"}
+        rows = self.to_frame().set_axis(list(keys), axis=1).to_dict("records")
+        return {"rows": rows, "units": units, "warnings": list(self.warnings)}
 
     def summary(self) -> str:
         """A table at one speed, or the range of sizes over many, as text."""

@@ -23,7 +23,16 @@ from rotorid.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_fac
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-__all__ = ["Combination", "Estimate", "coverage_factor", "least_squares", "stack", "stretch", "unstretch"]
+__all__ = [
+    "Combination",
+    "Estimate",
+    "coverage_factor",
+    "gain",
+    "least_squares",
+    "stack",
+    "stretch",
+    "unstretch",
+]
 
 RCOND = 1e-12
 """Singular values below RCOND times the largest count as zero (after column scaling)."""
@@ -200,6 +209,23 @@ def least_squares(
         row_space=row_space,
         solution_covariance=full_covariance,
     )
+
+
+def gain(A: ArrayLike) -> ComplexArray:
+    """Matrix G with the least-squares solution x = G y of A x = y, for many matrices at once.
+
+    Parameters
+    ----------
+    A
+        Of full column rank, (…, m, n); columns are scaled before its SVD.
+
+    Returns
+    -------
+    (…, n, m), complex.
+    """
+    K = np.asarray(A, dtype=complex)
+    scale = np.linalg.norm(K, axis=-2, keepdims=True)
+    return np.asarray(np.linalg.pinv(K / scale, rcond=1e-14) / np.swapaxes(scale, -1, -2))
 
 
 def _real_problem(

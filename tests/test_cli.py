@@ -115,7 +115,7 @@ def test_influence_of_the_model_is_symmetric_and_feeds_balance(cli, tmp_path):
     rows = document["rows"]
     assert len(rows) == 3 * 2 * 2
     W = {(r["speed"], r["sensor"], r["plane"]): r["influence"] for r in rows}
-    assert W[100.0, "7", "12"] == pytest.approx(W[100.0, "12", "7"], rel=1e-9)
+    assert W[100.0, 7, 12] == pytest.approx(W[100.0, 12, 7], rel=1e-9)
     readings = tmp_path / "runs.csv"
     readings.write_text(
         "run,speed_rad_s,sensor,amplitude_um,phase_deg\n"
@@ -239,3 +239,22 @@ def test_speeds_are_read_with_units_and_ranges():
     assert speeds("60,120rpm") == pytest.approx([2 * np.pi, 4 * np.pi])
     assert speeds("1:2:1Hz") == pytest.approx([2 * np.pi, 4 * np.pi])
     assert speeds("100:140:30") == [100.0, 130.0]
+
+
+def test_a_recognised_encoding_is_named_on_standard_error_only(cli, tmp_path, monkeypatch):
+    monkeypatch.setattr("warnings.filters", [])
+    text = (BK / "runs.csv").read_text(encoding="utf-8").replace("initial", "начало")
+    (tmp_path / "runs.csv").write_bytes(text.encode("cp1251"))
+    outcome = cli("balance", tmp_path / "runs.csv", BK / "weights.csv", "--json")
+    assert outcome.code == 0, outcome.err
+    assert outcome.err.startswith("rotorid: warning: ")
+    assert "cp1251" in outcome.err
+    assert outcome.json["rank"] == 2
+
+
+def test_provenance_lists_the_shaft_table_of_a_rotor_file(cli, tmp_path):
+    (tmp_path / "shaft.csv").write_bytes(ROTOR.read_bytes())
+    rotor = tmp_path / "rotor.toml"
+    rotor.write_text('shaft = "shaft.csv"\n', encoding="utf-8")
+    inputs = cli("critical", rotor, "--json").json["provenance"]["inputs"]
+    assert [i["file"] for i in inputs] == [str(rotor), str(tmp_path / "shaft.csv")]

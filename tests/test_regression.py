@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.regression import coverage_factor, least_squares, stack, stretch, unstretch
+from rotorid.regression import coverage_factor, gain, least_squares, stack, stretch, unstretch
 
 # NIST StRD, Longley: total employment; GNP deflator, GNP, unemployed, armed forces, population, year
 LONGLEY = """
@@ -279,3 +279,11 @@ def test_frame_and_correlation():
     np.testing.assert_allclose(np.diag(estimate.correlation), 1.0)
     x = K[:, 1]
     assert estimate.correlation[0, 1] == pytest.approx(-x.mean() / np.sqrt((x**2).mean()), rel=1e-9)
+
+
+def test_gain_is_the_least_squares_solution_of_every_matrix():
+    rng = np.random.default_rng(8)
+    A = rng.normal(size=(4, 7, 3)) * [1e-6, 1.0, 1e6] + 1j * rng.normal(size=(4, 7, 3))
+    y = rng.normal(size=7) + 1j * rng.normal(size=7)
+    for matrix, G in zip(A, gain(A), strict=True):
+        np.testing.assert_allclose(G @ y, unstretch(least_squares(matrix, y).values), rtol=1e-9)

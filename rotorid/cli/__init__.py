@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 
 import typer
 
@@ -46,13 +47,19 @@ def _rotorid(
 def main() -> None:
     """Run the command line; the exit status is 2 for bad input or usage, with one message, no traceback."""
     try:
-        app()
+        with warnings.catch_warnings():
+            warnings.showwarning = _warn  # type: ignore[assignment]
+            app()
     except (ValueError, OSError) as problem:
         # ValueError covers InputError (files) and everything the library refuses with one clear sentence
         if isinstance(problem, BrokenPipeError):
             sys.stderr.close()
             sys.exit(0)
         sys.exit(_complain(problem))
+
+
+def _warn(message: Warning | str, *_: object) -> None:
+    print(f"rotorid: warning: {message}", file=sys.stderr)
 
 
 def _complain(problem: Exception) -> int:

@@ -29,7 +29,7 @@ def critical(
     Example: rotorid critical sample_data/rotor23.csv -n 3 --plot modes.png
     """
     import fem
-    from rotorid.tables import read_rotor
+    from rotorid.tables import read_rotor, rotor_files
 
     check_targets(plot, output)
     modes = fem.critical_speeds(read_rotor(rotor), n)
@@ -38,7 +38,7 @@ def critical(
         modes.to_dict(),
         modes.summary,
         as_json=json,
-        files=[rotor],
+        files=rotor_files(rotor),
         options={"number": n},
         figure=(plot, picture(modes.plot)),
         table=(output, modes.to_frame),

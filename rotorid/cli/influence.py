@@ -38,7 +38,7 @@ def influence(
     Example: rotorid influence sample_data/rotor23.csv --planes 7,12 --sensors 2,22 --speeds 100,120
     """
     import fem
-    from rotorid.tables import influence_frame, read_rotor
+    from rotorid.tables import influence_frame, read_rotor, rotor_files
 
     check_targets(plot, output)
     result = fem.influence(
@@ -48,7 +48,7 @@ def influence(
         result.to_dict(),
         result.summary,
         as_json=json,
-        files=[rotor],
+        files=rotor_files(rotor),
         options={"planes": planes, "sensors": sensors, "speeds": speed},
         figure=(plot, picture(result.plot)),
         table=(output, lambda: influence_frame(result)),

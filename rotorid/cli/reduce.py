@@ -31,7 +31,7 @@ def reduce(
     Example: rotorid reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2
     """
     from rotorid.reduction import reduce as reduce_rotor
-    from rotorid.tables import read_rotor
+    from rotorid.tables import read_rotor, rotor_files
 
     check_targets(plot, output)
     result = reduce_rotor(read_rotor(rotor), numbers(nodes, "--nodes"), modes)
@@ -39,7 +39,7 @@ def reduce(
         result.to_dict(),
         result.summary,
         as_json=json,
-        files=[rotor],
+        files=rotor_files(rotor),
         options={"nodes": nodes, "modes": modes},
         figure=(plot, picture(result.plot)),
         table=(output, result.to_frame),
