@@ -1,4 +1,4 @@
-"""Start-up in a fresh process: what a person waits for before anything happens, against the project's limits."""
+"""Start-up in a fresh process: what a person waits for before anything happens."""
 
 import subprocess
 import sys
