@@ -4,6 +4,8 @@ VENV ?= .venv
 BENCH_VENV ?= .venv-bench
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
+# Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
+export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: demo test lint format bench build clean
 

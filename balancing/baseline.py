@@ -7,9 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from balancing.determined import UndeterminedError
 from balancing.errors import ErrorModel, error_model, mean_covariance, reading_covariance
 from balancing.influence import Influence
 from balancing.labels import Labels
+from balancing.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
 from balancing.trials import ReadingErrors, Trials
 from rotorid.regression import stretch
 
@@ -98,13 +100,62 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
     mean = mounted.mean(axis=0)
     readings = trials.mean[pick].mean(axis=0) - influence.W @ mean
     own = error_model(trials)
+    notes = trials.warnings + _disagreement(influence, trials, mounted, pick, own if own.errors else known)
     model = own if own.errors is not None else known
     if model.errors is None:
-        return Start(readings, None, model, model.warnings, trials.labels, None)
+        return Start(
+            readings,
+            None,
+            model,
+            notes + model.warnings,
+            trials.labels,
+            _mounted_last(influence, trials, mounted),
+        )
     variance = mean_covariance(trials, model.errors)[pick].mean(axis=0) / len(trials.runs)
     start = _with_coefficients(influence, readings, variance, mean, _joined(model, known))
-    last = (trials.runs[-1], influence.planes, mounted[-1]) if mounted[-1].any() else None
-    return start._replace(labels=trials.labels, mounted=last)
+    return start._replace(
+        labels=trials.labels,
+        mounted=_mounted_last(influence, trials, mounted),
+        warnings=notes + start.warnings,
+    )
+
+
+def _mounted_last(
+    influence: Influence, trials: Trials, mounted: ComplexArray
+) -> tuple[str, tuple[str, ...], ComplexArray] | None:
+    return (trials.runs[-1], influence.planes, mounted[-1]) if mounted[-1].any() else None
+
+
+def _disagreement(
+    influence: Influence,
+    trials: Trials,
+    mounted: ComplexArray,
+    pick: tuple[NDArray[np.intp], ...],
+    model: ErrorModel,
+) -> tuple[str, ...]:
+    """Runs that imply different vibrations of the bare rotor cannot be averaged without a word.
+
+    Raises
+    ------
+    UndeterminedError
+        Where no weights are known and the runs differ: one of them is a trial run.
+    """
+    bare = not mounted.any()
+    found = differences(trials, model, largest=bare)
+    if bare and found:
+        named = " and ".join(f"{d.first!r} and {d.second!r} (by {d.words})" for d in found)
+        raise UndeterminedError(
+            f"runs {named} differ although no weights are given for them: if they are trial runs, "
+            "give the weights table or keep only the baseline run"
+        )
+    implied = trials.mean[pick] - np.einsum("scp,rp->rsc", influence.W, mounted)
+    size = np.abs(implied - implied[0]).max() / (np.abs(implied).max() or 1.0)
+    if found or size <= NOTICEABLE_AMPLITUDE:
+        return describe(found)
+    return (
+        f"the runs imply vibrations of the bare rotor that differ by {100 * size:.2g} % of the largest one: "
+        "check the weights table and the stored coefficients",
+    )
 
 
 def _last_run(influence: Influence) -> tuple[str, tuple[str, ...], ComplexArray] | None:

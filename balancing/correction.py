@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.baseline import match_speeds, starting_point
-from balancing.determined import check_planes
+from balancing.determined import acting_alike, check_planes, check_resolution
 from balancing.errors import Source, reading_covariance
 from balancing.influence import Influence
 from balancing.labels import Labels
@@ -152,10 +152,11 @@ class Correction:
         return frame.astype({"mass_std": float, "angle_std_deg": float})
 
     def residuals_frame(self) -> pd.DataFrame:
-        """One row per speed and sensor: amplitude and phase before and after."""
+        """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
         import pandas as pd
 
-        return pd.DataFrame(self.to_dict()["residuals"]).drop(columns="after_covariance")
+        frame = pd.DataFrame(self.to_dict()["residuals"]).drop(columns="after_covariance")
+        return frame.astype({"after_phase_deg": float})
 
     def summary(self) -> str:
         """Text for an engineer, 80 columns: warnings, corrections with 95 %, vibration before and after."""
@@ -190,6 +191,8 @@ def correct(
     baseline: Trials | ArrayLike | None = None,
     planes: Sequence[str] | None = None,
     speeds: ArrayLike | None = None,
+    *,
+    refuse: bool = True,
 ) -> Correction:
     """Correction weights by least squares over all chosen sensors and speeds.
 
@@ -204,6 +207,9 @@ def correct(
         Names of the planes to use; default all. The others stay empty.
     speeds
         rad/s, to use; default all.
+    refuse
+        Whether to refuse planes that the measured coefficients tell apart only by their errors; else that is
+        a warning. Planes that act alike exactly are always refused.
 
     Returns
     -------
@@ -213,7 +219,9 @@ def correct(
     Raises
     ------
     UndeterminedError
-        Where the readings do not tell the planes apart; says which act alike.
+        Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
+        at 95 % (`balancing.resolution`); for coefficients from runs with unknown errors above a condition
+        number of 1000, which no instrument supports.
     ValueError
         For an unknown plane or speed, a missing or unfit baseline.
     """
@@ -224,6 +232,7 @@ def correct(
     W = influence.W[used][..., chosen].reshape(-1, len(chosen))
     Y = start.readings[used]
     check_planes(W, names)
+    unclear = check_resolution(influence, W, _of_planes(influence, used, chosen), names, refuse=refuse)
     estimate = least_squares(W, -Y.ravel(), names=names)
     D = unstretch(estimate.solution)
     after = Y + influence.W[used][..., chosen] @ D
@@ -254,7 +263,7 @@ def correct(
         labels=start.labels,
         warnings=(),
     )
-    warnings = influence.warnings + start.warnings + _cautions(result, W)
+    warnings = influence.warnings + start.warnings + unclear + _cautions(result, W, alike=not unclear)
     warnings += _left_out(influence, start.readings, chosen, used, D, start.labels)
     return _with_warnings(result, warnings)
 
@@ -264,6 +273,16 @@ def region_radius(dof: int | None) -> float:
     from scipy.special import chdtri, fdtri
 
     return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+
+def _of_planes(influence: Influence, used: list[int], chosen: list[int]) -> FloatArray | None:
+    """Covariance of the chosen coefficients of each reading, (N, 2P, 2P)."""
+    if influence.covariance is None:
+        return None
+    index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
+    return np.asarray(
+        influence.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
+    )
 
 
 def _plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
@@ -282,14 +301,12 @@ def _plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[i
     return [influence.planes.index(p) for p in planes]
 
 
-def _cautions(result: Correction, W: ComplexArray) -> tuple[str, ...]:
+def _cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, ...]:
     out = []
-    if result.condition_number > ILL_CONDITIONED:
-        # the planes that the weakest direction is made of
-        weakest = np.abs(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
-        alike = [p for p, share in zip(result.planes, weakest, strict=True) if share > 0.3]
+    if alike and result.condition_number > ILL_CONDITIONED:
+        planes = acting_alike(W)
         out.append(
-            f"planes {', '.join(map(repr, alike))} act nearly alike (condition number "
+            f"planes {', '.join(repr(result.planes[p]) for p in planes)} act nearly alike (condition number "
             f"{result.condition_number:.3g}): small errors of the readings become large weights; "
             "leave one out, or add sensors or speeds"
         )

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.resolution import HOPELESS, resolution
 from rotorid.regression import Estimate, least_squares
+
+if TYPE_CHECKING:
+    from balancing.influence import Influence
+
+FloatArray = NDArray[np.float64]
 
 ComplexArray = NDArray[np.complex128]
 
@@ -108,17 +115,91 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
         if not W[:, p].any():
             raise UndeterminedError(f"plane {plane!r} has no effect on any reading: leave it out")
     lost = undetermined_columns(W, list(planes))
-    if not lost:
-        return
+    if lost:
+        raise UndeterminedError(_alike(W, lost, planes) + _REMEDY)
+
+
+_REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
+
+
+def check_resolution(
+    influence: Influence,
+    W: ComplexArray,
+    covariance: FloatArray | None,
+    planes: Sequence[str],
+    *,
+    refuse: bool,
+) -> tuple[str, ...]:
+    """Refuse planes that the coefficients tell apart only by their errors.
+
+    Parameters
+    ----------
+    influence
+        Where the coefficients come from.
+    W
+        Those in question, stacked, shape (N, P), of full rank.
+    covariance
+        Of (Re W₁, Im W₁, …) of each reading, (N, 2P, 2P), or None.
+    planes
+        Names.
+    refuse
+        Or warn.
+
+    Returns
+    -------
+    The warning, if there is one.
+
+    Raises
+    ------
+    UndeterminedError
+        Naming the planes that act alike.
+    """
+    if len(planes) < 2:
+        return ()
+    if covariance is not None and covariance.any():
+        found = resolution(W, covariance)
+        if found.significant(len(W), influence.dof):
+            return ()
+        ratio = np.sqrt(found.chi_square / found.n)
+        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        alike = _large(found.direction)
+    elif covariance is None and influence.last_run is not None:
+        singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+        if singular[0] <= HOPELESS * singular[-1]:
+            return ()
+        condition = singular[0] / singular[-1]
+        within = f": no instrument supports a condition number of {condition:.2g}"
+        alike = acting_alike(W)
+    else:
+        return ()
+    words = _alike(W, alike, planes) + within + _REMEDY
+    if refuse:
+        raise refusal(words, influence.warnings)
+    return (words,)
+
+
+def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:
+    """The error, with the warnings that would be lost with the result, and that may tell the real cause."""
+    return UndeterminedError("\n".join((words, *(f"Warning: {w}" for w in warnings))))
+
+
+def acting_alike(W: ComplexArray) -> list[int]:
+    """The planes that the weakest combination of W (N, P) is made of."""
+    return _large(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
+
+
+def _large(direction: ComplexArray) -> list[int]:
+    share = np.abs(direction) / np.linalg.norm(direction)
+    # of two or more planes at least two
+    return [int(p) for p in np.flatnonzero(share >= min(0.3, float(np.sort(share)[-2])))]
+
+
+def _alike(W: ComplexArray, lost: list[int], planes: Sequence[str]) -> str:
     group = [planes[i] for i in lost]
     if len(lost) == 2:
         ratio = complex(np.vdot(W[:, lost[1]], W[:, lost[0]]) / np.vdot(W[:, lost[1]], W[:, lost[1]]))
-        words = (
+        return (
             f"planes {group[0]!r} and {group[1]!r} act alike at every sensor and speed "
             f"(a weight in {group[0]!r} does what {abs(ratio):.4g} times that weight does in {group[1]!r})"
         )
-    else:
-        words = f"planes {', '.join(map(repr, group))} act alike: the effect of each follows from the others"
-    raise UndeterminedError(
-        f"{words}; their weights are not determined: leave one out, or add sensors or speeds"
-    )
+    return f"planes {', '.join(map(repr, group))} act alike: the effect of each follows from the others"

@@ -91,6 +91,11 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
     return out
 
 
+def symmetric(covariance: FloatArray) -> FloatArray:
+    """Covariances (…, n, n) without the rounding that makes them differ from their transposes."""
+    return np.asarray((covariance + np.swapaxes(covariance, -1, -2)) / 2)
+
+
 def mean_covariance(trials: Trials, errors: ReadingErrors) -> FloatArray:
     """Covariance (R, S, C, 2, 2) of the means of repeated readings."""
     return reading_covariance(trials.mean, errors) / trials.repeats[..., None, None]

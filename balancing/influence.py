@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.determined import check_runs
-from balancing.errors import EQUAL, ErrorModel, Source, error_model, mean_covariance
+from balancing.determined import UndeterminedError, check_runs, refusal
+from balancing.errors import EQUAL, ErrorModel, Source, error_model, mean_covariance, symmetric
 from balancing.labels import Labels
+from balancing.repeatability import describe, differences
 from balancing.significance import check_consistency, check_effects, weak_trials
 from balancing.trials import ReadingErrors, Trials, check_names, check_speeds
 
@@ -149,11 +150,15 @@ def estimate_influence(trials: Trials) -> Influence:
     Runs over-determine the coefficients where R > P + 1. Rows are then weighted by the variance of their
     readings where it is known, else alike.
     """
-    check_runs(trials.runs, trials.planes, trials.weights)
     R, P = trials.weights.shape
     if P == 0:
-        raise ValueError("there are no planes: influence coefficients need runs with trial weights")
+        raise UndeterminedError(
+            "there are no planes: no run has a trial weight, so the effect of none is determined; "
+            "add runs with trial weights, or use stored influence coefficients"
+        )
+    check_runs(trials.runs, trials.planes, trials.weights)
     model = error_model(trials)
+    repeated = describe(differences(trials, model))
     A = np.column_stack((np.ones(R), trials.weights)).astype(complex)
     Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
     G = np.broadcast_to(gain(A), (*Y.shape[:2], P + 1, R))
@@ -165,8 +170,11 @@ def estimate_influence(trials: Trials) -> Influence:
     covariance = None
     if model.errors is not None:
         covariance = _channel_covariance(G, mean_covariance(trials, model.errors))
-    check_effects(trials, theta[..., 1:], covariance)
-    warnings = model.warnings + weak_trials(trials, theta[..., 1:])
+    try:
+        check_effects(trials, theta[..., 1:], covariance)
+    except UndeterminedError as error:
+        raise refusal(str(error), trials.warnings + repeated) from error
+    warnings = trials.warnings + repeated + model.warnings + weak_trials(trials, theta[..., 1:])
     if model.errors is not None and model.source == "stated" and R > P + 1:
         warnings += check_consistency(trials, A, theta, mean_covariance(trials, model.errors))
     return Influence(
@@ -205,7 +213,7 @@ def _channel_covariance(G: ComplexArray, covariance: FloatArray) -> FloatArray:
     B[..., 1, :, 0] = G.imag
     B = B.reshape(S, C, 2 * n, R, 2)
     left = np.einsum("scark,rsckl->scarl", B, covariance).reshape(S, C, 2 * n, 2 * R)
-    return np.asarray(left @ np.swapaxes(B.reshape(S, C, 2 * n, 2 * R), -1, -2))
+    return symmetric(left @ np.swapaxes(B.reshape(S, C, 2 * n, 2 * R), -1, -2))
 
 
 def _errors_from_residuals(

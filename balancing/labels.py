@@ -30,6 +30,8 @@ class Labels:
         Whether a positive phase leads or lags.
     angles
         Whether angles on the rotor count with or against the rotation.
+    speed_unit
+        In which the readings give the speed: "rpm", "rad_s" or "Hz".
     """
 
     vibration_unit: str = "m"
@@ -38,6 +40,7 @@ class Labels:
     weight_scale: float = 1.0
     phase: Literal["lead", "lag"] = "lead"
     angles: Literal["with rotation", "against rotation"] = "with rotation"
+    speed_unit: str = "rpm"
 
     def vibration(self, amplitude: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Amplitude in the job's unit and phase in degrees, 0 ≤ phase < 360, as the job counts it."""

@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from balancing.errors import symmetric
 from rotorid.regression import gain
 
 FloatArray = NDArray[np.float64]
@@ -59,13 +60,13 @@ def correction_covariance(
 ) -> FloatArray:
     """Covariance (2P, 2P) of the stretched D from that of each reading's (Y₀, W), (N, 2P + 2, 2P + 2)."""
     J = correction_jacobian(W, D, r)
-    return np.asarray(np.sum(J @ covariance @ np.swapaxes(J, 1, 2), axis=0))
+    return symmetric(np.sum(J @ covariance @ np.swapaxes(J, 1, 2), axis=0))
 
 
 def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray:
     """Covariance (N, 2, 2) of Y₀ + W D at given D, from that of each reading's (Y₀, W)."""
     B = np.concatenate([_block(np.asarray(z)) for z in (1.0, *D)], axis=1)
-    return np.asarray(B @ covariance @ B.T)
+    return symmetric(B @ covariance @ B.T)
 
 
 def _block(z: ComplexArray) -> FloatArray:

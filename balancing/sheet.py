@@ -17,6 +17,9 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 WIDTH = 80
+DUST = 1e-12
+"""Predicted amplitudes below this share of the largest one before are rounding."""
+
 _SOURCES = {
     "stated": "as stated in the job",
     "repeats": "from repeated readings",
@@ -30,6 +33,9 @@ def correction_dict(c: Correction) -> dict[str, Any]:
     mass, angle = c.labels.weight(c.weights)
     old, old_phase = c.labels.vibration(c.before)
     new, new_phase = c.labels.vibration(c.after)
+    # what an exact solution leaves is rounding, whose direction means nothing
+    new_phase = np.where(new > DUST * old.max(), new_phase, np.nan)
+    new = np.where(new > DUST * old.max(), new, 0.0)
     covariance = None if c.plane_covariance is None else c.labels.weight_covariance(c.plane_covariance)
     after_covariance = c.after_covariance
     if after_covariance is not None:
@@ -60,7 +66,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
                 "before": float(old[s, k]),
                 "before_phase_deg": float(old_phase[s, k]),
                 "after": float(new[s, k]),
-                "after_phase_deg": float(new_phase[s, k]),
+                "after_phase_deg": _number(new_phase[s, k]),
                 "after_covariance": None if after_covariance is None else after_covariance[s, k].tolist(),
             }
             for s, speed in enumerate(c.speeds)
@@ -95,7 +101,7 @@ def _corrections(c: Correction) -> str:
     rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
     mass_std, angle_std = c.mass_std, c.angle_std
     for p, plane in enumerate(c.planes):
-        row = [plane, figures(mass[p]), f"{_degrees(angle[p])}°"]
+        row = [plane, figures(mass[p]), _degrees(angle[p])]
         if factor and mass_std is not None and angle_std is not None:
             row.append(f"± {figures(factor * mass_std[p] * c.labels.weight_scale, 2)} {unit}")
             half = factor * np.degrees(angle_std[p])
@@ -116,7 +122,7 @@ def _add(c: Correction) -> str:
     unit = c.labels.weight_unit
     rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
     rows += [
-        [plane, figures(mass[p]), f"{_degrees(angle[p])}°", figures(more[p]), f"{_degrees(more_angle[p])}°"]
+        [plane, figures(mass[p]), _degrees(angle[p]), figures(more[p]), _degrees(more_angle[p])]
         for p, plane in enumerate(planes)
     ]
     head = _wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
@@ -136,9 +142,9 @@ def _vibration(c: Correction) -> str:
         rows[0].append("95 % within")
     for s, speed in enumerate(c.speeds):
         for k, sensor in enumerate(c.sensors):
-            row = [f"{_rpm(speed):.6g}", sensor, figures(old[s, k], 3), f"{old_phase[s, k]:.0f}°"]
+            row = [f"{_rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
             shown = _small(new[s, k], old.max())
-            row += [shown, "" if shown == "0" else f"{new_phase[s, k]:.0f}°"]
+            row += [shown, "" if shown == "0" else _degrees(new_phase[s, k], 0)]
             if bound is not None:
                 row.append(f"± {figures(bound[s, k], 2)}")
             rows.append(row)
@@ -232,9 +238,8 @@ def _small(value: float, scale: float) -> str:
     return "0" if value <= 1e-9 * scale else figures(value, 3)
 
 
-def _degrees(angle: float) -> str:
-    text = f"{angle:.1f}"
-    return "0.0" if text == "360.0" else text
+def _degrees(angle: float, places: int = 1) -> str:
+    return f"{round(angle, places) % 360:.{places}f}°"
 
 
 def _rpm(speed: float) -> float:

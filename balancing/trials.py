@@ -69,6 +69,8 @@ class Trials:
         Stated errors of a reading, or None.
     labels
         Units and conventions to print results in.
+    warnings
+        What the user should know about how the readings were understood.
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Trials:
     weights: ComplexArray
     errors: ReadingErrors | None = None
     labels: Labels = field(default_factory=Labels)
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("runs", "sensors", "planes"):

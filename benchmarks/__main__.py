@@ -7,7 +7,7 @@ import os
 import platform
 import sys
 
-BENCHMARKS = ("startup", "critical_speeds", "unbalance_response")
+BENCHMARKS = ("startup", "critical_speeds", "unbalance_response", "campbell")
 
 
 def main(names: list[str]) -> int:
@@ -37,7 +37,7 @@ def main(names: list[str]) -> int:
             print(
                 f"{row.task:56}{row.ours:16}{1e3 * row.our_seconds:9.3f}  {row.peer:29}"
                 f"{1e3 * row.peer_seconds:10.2f}{row.ratio:9.3g}{row.required_ratio:8.0f}"
-                f"{row.difference:12.1e}{verdict}",
+                f"{row.difference:12.1e}{verdict}{'  ' if row.note else ''}{row.note}",
                 flush=True,
             )
     return int(failed)

@@ -1,24 +1,29 @@
 """The reference rotor as a model of rotorid and of ROSS, with the same physics.
 
-Euler–Bernoulli beam with consistent mass, no shear, no rotary inertia, no gyroscopic effect; discs are
-point masses. ROSS has six unknowns per node (axial and torsional motion, too, uncoupled here) and both
-lateral planes; on isotropic supports its x-plane is the real part of rotorid's complex coordinate.
+Euler–Bernoulli beam with consistent mass, no shear; with `gyroscopic` also rotary inertia and gyroscopic
+effect of shaft and discs, without it discs are point masses. ROSS has six unknowns per node (axial and
+torsional motion, too, uncoupled here) and both lateral planes; on isotropic supports its x-plane is the real
+part of rotorid's complex coordinate.
 """
 
 from __future__ import annotations
 
 import contextlib
 import csv
+import importlib.util
 import os
 import sys
 import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import fem
 
-TABLE = Path(__file__).resolve().parents[1] / "sample_data" / "rotor23.csv"
+SIZES = {23: 1, 92: 4, 460: 20}  # elements, and how many each row of the table is cut into
+ROOT = Path(__file__).resolve().parents[1]
+TABLE, TESTS = ROOT / "sample_data" / "rotor23.csv", ROOT / "tests"
 
 
 @contextlib.contextmanager
@@ -46,25 +51,60 @@ with _silence():  # a dependency of ROSS complains at length that REFPROP is not
 ROSS = f"ROSS {ross.__version__}"
 
 
-def table() -> list[dict[str, float]]:
+def table(times: int = 1) -> list[dict[str, float]]:
+    """Rows of the reference rotor, each cut into `times` equal elements."""
     with TABLE.open(encoding="utf-8", newline="") as file:
-        return [{key: float(value or 0) for key, value in row.items()} for row in csv.DictReader(file)]
+        rows = [{key: float(value or 0) for key, value in row.items()} for row in csv.DictReader(file)]
+    cut = []
+    for row in rows:
+        row["length_m"] /= times
+        bare = row | {"mass_kg": 0.0, "support_stiffness_N_per_m": 0.0}
+        cut += [row, *[bare] * (times - 1)]
+    return cut
 
 
-def rotorid_rotor(rows: list[dict[str, float]], damping: float) -> fem.Rotor:
+@dataclass(frozen=True)
+class Bearing:
+    """What stands at both supports, besides the table's stiffness k in x: factors of k, and N·s/m."""
+
+    damping: float = 0.0
+    vertical: float = 1.0  # kyy / k
+    cross: float = 0.0  # kxy / k = −kyx / k
+    vertical_damping: float | None = None  # cyy, cxx by default
+
+
+ANISOTROPIC = Bearing(damping=2e4, vertical=0.6, cross=0.05, vertical_damping=3e4)
+
+
+def rotorid_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bool = False) -> fem.Rotor:
+    supports = []
+    for n, row in enumerate(rows, 1):
+        k, c = row["support_stiffness_N_per_m"], bearing.damping
+        if k and bearing.vertical == 1 and not bearing.cross:
+            supports.append(fem.Support(n, k, c))
+        elif k:
+            turn = bearing.cross * k
+            other = c if bearing.vertical_damping is None else bearing.vertical_damping
+            supports.append(fem.Support(n, ((k, turn), (-turn, bearing.vertical * k)), ((c, 0), (0, other))))
     return fem.Rotor(
         length=[row["length_m"] for row in rows],
         outer_diameter=[row["diameter_m"] for row in rows],
-        discs=[fem.Disc(n, row["mass_kg"]) for n, row in enumerate(rows, 1) if row["mass_kg"]],
-        supports=[
-            fem.Support(n, row["support_stiffness_N_per_m"], damping)
+        discs=[
+            fem.Disc(n, row["mass_kg"], *(inertias(row["mass_kg"]) if gyroscopic else ()))
             for n, row in enumerate(rows, 1)
-            if row["support_stiffness_N_per_m"]
+            if row["mass_kg"]
         ],
+        supports=supports,
+        model=fem.Model(rotary_inertia=gyroscopic, gyroscopic=gyroscopic),
     )
 
 
-def ross_rotor(rows: list[dict[str, float]], damping: float) -> Any:
+def inertias(mass: float) -> tuple[float, float]:
+    """Polar and diametral inertia of a thin disc of this mass, 0.4 m in diameter, kg·m²."""
+    return mass * 0.2**2 / 2, mass * 0.2**2 / 4
+
+
+def ross_rotor(rows: list[dict[str, float]], bearing: Bearing, gyroscopic: bool = False) -> Any:
     steel = ross.Material("steel", rho=fem.STEEL_DENSITY, E=fem.STEEL_MODULUS, Poisson=0.3)
     shaft = [
         ross.ShaftElement(
@@ -74,19 +114,38 @@ def ross_rotor(rows: list[dict[str, float]], damping: float) -> Any:
             material=steel,
             n=n,
             shear_effects=False,
-            rotary_inertia=False,
-            gyroscopic=False,
+            rotary_inertia=gyroscopic,
+            gyroscopic=gyroscopic,
         )
         for n, row in enumerate(rows)
     ]
-    discs = [
-        ross.DiskElement(n=n, m=row["mass_kg"], Id=0.0, Ip=0.0)
-        for n, row in enumerate(rows)
-        if row["mass_kg"]
-    ]
+    discs = []
+    for n, row in enumerate(rows):
+        if row["mass_kg"]:
+            polar, diametral = inertias(row["mass_kg"]) if gyroscopic else (0.0, 0.0)
+            discs.append(ross.DiskElement(n=n, m=row["mass_kg"], Id=diametral, Ip=polar))
     bearings = [
-        ross.BearingElement(n=n, kxx=row["support_stiffness_N_per_m"], cxx=damping)
-        for n, row in enumerate(rows)
-        if row["support_stiffness_N_per_m"]
+        ross.BearingElement(
+            n=n,
+            kxx=k,
+            kyy=bearing.vertical * k,
+            kxy=bearing.cross * k,
+            kyx=-bearing.cross * k,
+            cxx=bearing.damping,
+            cyy=bearing.vertical_damping,
+        )
+        for n, k in enumerate(row["support_stiffness_N_per_m"] for row in rows)
+        if k
     ]
     return ross.Rotor(shaft, discs, bearings)
+
+
+def judge() -> Any:
+    """The dense reference solution of the tests, for meshes where float64 loses digits in the peer."""
+    spec = importlib.util.spec_from_file_location("dense_rotor", TESTS / "dense_rotor.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["dense_rotor"] = module  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 T = TypeVar("T")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class Row:
     difference: float  # relative, between the two answers
     allowed: float
     required_ratio: float
+    note: str = ""
 
     @property
     def ratio(self) -> float:
@@ -54,6 +56,28 @@ def best_of(make: Callable[[], T], call: Callable[[T], object], repeat: int) -> 
         finally:
             gc.enable()
     return min(times)
+
+
+def once(make: Callable[[], T], call: Callable[[T], R]) -> tuple[float, R]:
+    """Duration of one call that takes seconds, s, and its answer."""
+    model = make()
+    start = time.perf_counter()
+    answer = call(model)
+    return time.perf_counter() - start, answer
+
+
+def scaling(task: str, seconds: dict[int, float], few: int, many: int) -> Row:
+    """Cost at `many` elements against that at `few`: no faster than linear, so the ratio is at least 1."""
+    return Row(
+        task=task,
+        ours=f"{many} elements",
+        our_seconds=seconds[many],
+        peer=f"{many / few:g} × {few} elements",
+        peer_seconds=many / few * seconds[few],
+        difference=0.0,
+        allowed=0.0,
+        required_ratio=1.0,
+    )
 
 
 def relative_difference(a: ArrayLike, b: ArrayLike) -> float:

@@ -9,24 +9,61 @@ Everything is in SI units, nodes are numbered from 1, a positive phase is a lead
 array([632.11])
 """
 
-from fem.modes import Modes, critical_speeds
+from fem.campbell import Campbell, campbell
+from fem.critical import critical_speeds
+from fem.mesh import MeshCheck, mesh_check, refined
+from fem.modes import Modes
+from fem.orbits import Orbits, orbits, probe, whirl_direction
+from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
-from fem.response import InfluenceCoefficients, Response, influence, unbalance_response
-from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Rotor, Support
-from fem.static import compliance
+from fem.response import influence, unbalance_response
+from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
+from fem.sensors import Sensor
+from fem.speedmap import Intersection, SpeedMap, speed_map
+from fem.stability import Stability, stability_threshold
+from fem.static import StaticDeflection, compliance, static_deflection
+from fem.vibration import BearingForces, InfluenceCoefficients, Response
+from fem.whirl import WhirlModes, whirl_modes
 
 __all__ = [
     "STEEL_DENSITY",
     "STEEL_MODULUS",
+    "STEEL_POISSON",
+    "BearingForces",
+    "Campbell",
     "Disc",
     "InfluenceCoefficients",
+    "Intersection",
+    "MeshCheck",
+    "Model",
     "Modes",
+    "Orbits",
+    "Peak",
+    "Peaks",
+    "Pedestal",
     "Response",
     "Rotor",
+    "Sensor",
+    "SpeedMap",
+    "Stability",
+    "StaticDeflection",
     "Support",
+    "WhirlModes",
+    "campbell",
     "compliance",
     "critical_speeds",
     "draw_rotor",
+    "find_peaks",
     "influence",
+    "mesh_check",
+    "orbits",
+    "probe",
+    "refined",
+    "required_margin",
+    "speed_map",
+    "stability_threshold",
+    "static_deflection",
     "unbalance_response",
+    "whirl_direction",
+    "whirl_modes",
 ]

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fem.matrices import WIDTH, Matrices, dense, multiply, rounding_error, strain_energy
+from fem.matrices import Matrices, dense, multiply, rounding_error
+from fem.pencil import NO_MASS, Pencil, one_plane, orthonormal_rigid
 from fem.rotor import FloatArray, Rotor
+
+Array = NDArray[Any]
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 _BLOCK = 4
 _CONVERGED = 1e-10
 _TOO_FINE = 1e-2
-_NO_MASS = (
-    "the rotor can move as a rigid body without moving any mass: give the shaft a density, or add supports"
+_UNSTABLE = (
+    "the rotor on its supports is statically unstable, or its stiffness is lost in float64: a support has "
+    "negative stiffness; check its sign and size"
 )
 
 
@@ -25,9 +31,12 @@ class Spectrum:
     Attributes
     ----------
     squares
-        λ = ω², rad²/s², ascending, shape (m,); exactly 0 for rigid-body modes.
+        λ = ω², rad²/s², those nearest to zero (beyond the shift) in ascending order, shape (m,); exactly 0
+        for rigid-body modes, negative where a mode has negative mass.
     vectors
-        Deflections and slopes, scaled to φᵀ M φ = 1 kg, shape (2 N, m).
+        All unknowns, scaled to |φᵀ M φ| = 1 kg, shape (size, m).
+    signs
+        The sign of φᵀ M φ, shape (m,).
     shift
         σ ≥ 0 of the matrix K + σ M that was factored; 0 for a supported rotor.
     factor
@@ -38,100 +47,139 @@ class Spectrum:
     """
 
     squares: FloatArray
-    vectors: FloatArray
+    vectors: Array
+    signs: FloatArray
     shift: float
-    factor: FloatArray
+    factor: Array
     rounding: FloatArray
 
 
-def finite_modes(A: Matrices) -> int:
+def finite_modes(A: Matrices | Pencil) -> int:
     """Number of modes with finite frequency: unknowns that move mass."""
-    return int(np.count_nonzero(A.mass[WIDTH]))
+    return int(np.count_nonzero(A.mass[-1]))
 
 
-def factor(rotor: Rotor, A: Matrices) -> tuple[float, FloatArray]:
+def factor(pencil: Pencil) -> tuple[float, Array]:
     """Shift σ and Cholesky factor of K + σ M; σ = 0 if the supports hold the rotor firmly.
 
     Raises
     ------
     ValueError
-        If the matrix is singular all the same.
+        If the matrix is singular, or not positive, all the same.
     """
-    from scipy.linalg.lapack import dpbtrf
-
-    shift = _shift(rotor, A)
-    U, info = dpbtrf(A.stiffness + shift * A.mass if shift else A.stiffness)
-    if info != 0:
-        if shift:
-            raise ValueError(_NO_MASS)
+    shift = _shift(pencil)
+    K = pencil.stiffness
+    U, info = _cholesky(K + shift * pencil.mass if shift else K)
+    if info != 0 and shift and not pencil.definite and not pencil.rigid.shape[1]:
+        shift = 0.0
+        U, info = _cholesky(K)
+    if info == 0:
+        return shift, U
+    if shift and pencil.definite:
+        raise ValueError(NO_MASS)
+    if shift:
         raise ValueError(
-            f"the stiffness matrix of {rotor.n_elements} elements is singular in float64: elements are too "
-            "short beside the rest of the rotor; join neighbouring elements, 50 to 200 are ample for a rotor"
+            "the rotor is free, or almost, and its polar inertia exceeds its diametral inertia: its modes "
+            "under rotation cannot be found this way; hold it by soft supports at two nodes"
         )
-    return shift, U
+    if any(np.less(support.stiffness, 0).any() for support in pencil.rotor.supports):
+        raise ValueError(_UNSTABLE)
+    raise ValueError(
+        f"the stiffness matrix of {pencil.rotor.n_elements} elements is singular in float64: elements are "
+        "too short beside the rest of the rotor; join neighbouring elements, 50 to 200 are ample for a rotor"
+    )
 
 
-def _shift(rotor: Rotor, A: Matrices) -> float:
+def _cholesky(band: Array) -> tuple[Array, int]:
+    from scipy.linalg import lapack
+
+    pbtrf = lapack.zpbtrf if np.iscomplexobj(band) else lapack.dpbtrf
+    U, info = pbtrf(band)
+    return U, int(info)
+
+
+def _shift(pencil: Pencil) -> float:
     """About the square of the first bending frequency where springs are 1000 times softer, else 0."""
+    rotor = pencil.rotor
     mass, span = rotor.total_mass, float(rotor.length.sum())
     if mass == 0:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
+    shift = rigid_scale(rotor)
+    held = not pencil.rigid.shape[1] and pencil.springs >= 1e-3 * shift * mass
+    # Tilting springs hold like springs at the ends.
+    tilting = sum(support.tilting_stiffness for support in rotor.supports) / span**2
+    return 0.0 if held or (not pencil.rigid.shape[1] and tilting >= 1e-3 * shift * mass) else shift
+
+
+def rigid_scale(rotor: Rotor) -> float:
+    """About the square of the first bending frequency of the free rotor, rad²/s²."""
+    span = float(rotor.length.sum())
     bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / span
-    shift = 500.0 * bending / (mass * span**3)
-    springs = sum(support.stiffness for support in rotor.supports)
-    return shift if A.rigid or springs < 1e-3 * shift * mass else 0.0
+    return 500.0 * bending / (max(rotor.total_mass, np.finfo(float).tiny) * span**3)
 
 
-def lowest_modes(rotor: Rotor, A: Matrices, m: int) -> Spectrum:
-    """Lowest m modes; m must not exceed the number of finite modes.
+def lowest_modes(
+    rotor: Rotor, A: Matrices, m: int, pencil: Pencil | None = None, tolerance: float = _CONVERGED
+) -> Spectrum:
+    """Lowest m modes of a pencil, by default of one plane at rest; m must not exceed the finite modes.
 
     Small models are solved at once, larger ones in a block Krylov space of (K + σ M)⁻¹ M. Either way the
-    squares of the frequencies are then recomputed as quotients of energies (`strain_energy`), so that
-    errors of the vectors count only by their square and fine meshes keep their digits.
+    squares of the frequencies are then recomputed as quotients of energies, so that errors of the vectors
+    count only by their square and fine meshes keep their digits. The `tolerance` is that of the vectors.
 
     Raises
     ------
     ValueError
         If the mesh is so fine that float64 carries fewer than about two digits of a shape.
     """
-    shift, U = factor(rotor, A)
+    pencil = one_plane(rotor, A) if pencil is None else pencil
+    shift, U = factor(pencil)
     X = None
-    if A.size > DENSE and 4 * m < A.size:
-        X = _krylov(rotor, A, U, m)
+    if pencil.size > DENSE and 4 * m < pencil.size:
+        X = _krylov(pencil, U, m, tolerance)
     if X is None:
-        X = _dense(A, shift, m)
-    X = X / np.sqrt(np.einsum("ij,ij->j", X, multiply(A.mass, X)))
-    if A.rigid:
-        rigid = _rigid_modes(rotor, A)[:, :m]
-        X[:, : rigid.shape[1]] = rigid
-    elif shift and m > 1:
-        X[:, :2] = _part(rotor, A, X[:, :2])
-    squares = strain_energy(rotor, X)
-    squares[: A.rigid] = 0.0
-    order = np.argsort(squares, kind="stable")
-    squares, X = squares[order], X[:, order]
-    rounding = rounding_error(A.stiffness + shift * A.mass if shift else A.stiffness, X)
-    if shift and not A.rigid:
+        X = _dense(pencil, shift, m)
+    free = pencil.rigid.shape[1]
+    MX = multiply(pencil.mass, X)
+    inertia = np.einsum("ij,ij->j", X.conj(), MX).real
+    X = np.divide(X, np.sqrt(np.abs(inertia)), order="F")
+    signs = np.sign(inertia)
+    if free:
+        motions, its = orthonormal_rigid(pencil)
+        X[:, :free], signs[:free] = motions[:, :m], its[:m]
+    elif shift and m > 1 and (signs[:2] > 0).all() and pencil.waves.shape[0] == 1:
+        X[:, :2] = _part(pencil, X[:, :2])
+    energy = pencil.energy(X)
+    energy[:free] = 0.0
+    if (energy < 0).any():
+        raise ValueError(_UNSTABLE)
+    squares = signs * energy
+    order = np.argsort(np.abs(squares + shift), kind="stable")
+    squares, X, signs = squares[order], X[:, order], signs[order]
+    K = pencil.stiffness + shift * pencil.mass if shift else pencil.stiffness
+    rounding = rounding_error(K, X, np.abs(squares + shift))
+    if shift and not free:
         # What the chord slopes of the elements cannot resolve beside the energy of very soft springs.
         stiffness = 4 * rotor.youngs_modulus * rotor.second_moment / rotor.length**3
-        noise = np.finfo(float).eps ** 2 * stiffness.sum() * np.max(X[0::2] ** 2, axis=0)
-        rounding = np.maximum(rounding, np.sqrt(noise / np.maximum(squares, np.finfo(float).tiny)))
+        largest = np.max(np.abs(X[pencil.waves.ravel()]) ** 2, axis=0)
+        noise = np.finfo(float).eps ** 2 * stiffness.sum() * largest
+        rounding = np.maximum(rounding, np.sqrt(noise / np.maximum(np.abs(squares), np.finfo(float).tiny)))
     if m and rounding.max() > _TOO_FINE:
         raise ValueError(
             f"the mesh of {rotor.n_elements} elements is too fine for float64: rounding alone may change "
             f"mode {int(np.argmax(rounding)) + 1} by {100 * rounding.max():.2g} %; join neighbouring "
             "elements, 50 to 200 are ample for a rotor"
         )
-    return Spectrum(squares, X, shift, U, rounding)
+    return Spectrum(squares, X, signs, shift, U, rounding)
 
 
-def _part(rotor: Rotor, A: Matrices, X: FloatArray) -> FloatArray:
+def _part(pencil: Pencil, X: FloatArray) -> FloatArray:
     """Two modes on very soft springs, which the shifted matrix cannot tell apart."""
     from scipy.linalg import eigh
 
-    one, other = strain_energy(rotor, X)
-    both = (strain_energy(rotor, X[:, :1] + X[:, 1:]) - strain_energy(rotor, X[:, :1] - X[:, 1:]))[0] / 4
-    _, Q = eigh(np.array([[one, both], [both, other]]), X.T @ multiply(A.mass, X))
+    one, other = pencil.energy(X)
+    both = (pencil.energy(X[:, :1] + X[:, 1:]) - pencil.energy(X[:, :1] - X[:, 1:]))[0] / 4
+    _, Q = eigh(np.array([[one, both], [both, other]]), X.T @ multiply(pencil.mass, X))
     return np.asarray(X @ Q)
 
 
@@ -147,61 +195,69 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     )
 
 
-def _dense(A: Matrices, shift: float, m: int) -> FloatArray:
+def _dense(pencil: Pencil, shift: float, m: int) -> Array:
     from scipy.linalg import eigh
 
-    K = dense(A.stiffness + shift * A.mass if shift else A.stiffness)
-    M = dense(A.mass)
-    if 4 * m > A.size:
+    K = dense(pencil.stiffness + shift * pencil.mass if shift else pencil.stiffness)
+    M = dense(pencil.mass)
+    if not pencil.definite:
+        mu, X = eigh(M, K, check_finite=False)
+        return np.asarray(X[:, np.argsort(-np.abs(mu), kind="stable")[:m]])
+    if 4 * m > pencil.size:
         _, X = eigh(M, K, driver="gvd", check_finite=False)
         return np.asarray(X[:, : -m - 1 : -1])
-    _, X = eigh(M, K, subset_by_index=[A.size - m, A.size - 1], check_finite=False)
+    _, X = eigh(M, K, subset_by_index=[pencil.size - m, pencil.size - 1], check_finite=False)
     return np.asarray(X[:, ::-1])
 
 
-def _krylov(rotor: Rotor, A: Matrices, U: FloatArray, m: int) -> FloatArray | None:
-    """Ritz vectors of U⁻ᵀ M U⁻¹ in a block Krylov space; None if it does not converge."""
-    from scipy.linalg.lapack import dsyevd, dtbtrs
+def _krylov(pencil: Pencil, U: Array, m: int, tolerance: float) -> Array | None:
+    """Ritz vectors of U⁻ᴴ M U⁻¹ in a block Krylov space; None if it does not converge."""
+    from scipy.linalg import lapack
 
+    real = not np.iscomplexobj(U)
+    tbtrs, adjoint = (lapack.dtbtrs, "T") if real else (lapack.ztbtrs, "C")
     # A block rather than a single vector finds modes of equal frequency, too. The loads are waves along
     # the rotor, with a little of everything so that no mode is orthogonal to all of them.
-    block = _BLOCK
-    s = rotor.positions / rotor.positions[-1]
-    start = np.zeros((A.size, block))
-    start[0::2] = np.cos(np.pi * np.outer(s, np.arange(block)))
-    start[0::2] += 0.1 * np.sin(np.outer(np.arange(1.0, s.size + 1) ** 2, np.arange(1.0, block + 1)))
-    V, _ = np.linalg.qr(dtbtrs(U, multiply(A.mass, start), trans="T")[0])
-    basis, image = np.empty((A.size, 0)), np.empty((A.size, 0))
+    planes, n_nodes = pencil.waves.shape
+    block = _BLOCK * planes
+    s = pencil.rotor.positions / pencil.rotor.positions[-1]
+    waves = np.cos(np.pi * np.outer(np.arange(_BLOCK), s))
+    waves += 0.1 * np.sin(np.outer(np.arange(1.0, _BLOCK + 1), np.arange(1.0, n_nodes + 1) ** 2))
+    start = np.zeros((block, pencil.size), U.dtype).T
+    for plane, unknowns in enumerate(pencil.waves):
+        start[unknowns, plane * _BLOCK : (plane + 1) * _BLOCK] = waves.T
+    V, _ = _orthonormal(tbtrs(U, multiply(pencil.mass, start), trans=adjoint)[0])
+    most = min(pencil.size, 10 * m + 60) // block * block
+    basis = np.empty((pencil.size, most), U.dtype, order="F")
+    T = np.zeros((most, most), U.dtype)  # the operator in this basis, block tridiagonal
     last = np.inf
-    while basis.shape[1] + block <= min(A.size, 10 * m + 60):
-        Z = dtbtrs(U, multiply(A.mass, dtbtrs(U, V)[0]), trans="T")[0]
-        basis, image = np.hstack((basis, V)), np.hstack((image, Z))
-        if basis.shape[1] >= m + block:
-            S = basis.T @ image
-            mu, Q, _ = dsyevd((S + S.T) / 2)
-            mu, Q = mu[: -m - 1 : -1], Q[:, : -m - 1 : -1]
-            residual = float((np.linalg.norm(image @ Q - (basis @ Q) * mu, axis=0) / mu).max())
-            # On fine meshes rounding stops the residual before the tolerance does.
-            if residual < _CONVERGED or (residual < 1e-5 and residual > last / 3):
-                return np.asarray(dtbtrs(U, basis @ Q)[0])
-            last = residual
-        for _ in range(2):
-            Z = Z - basis @ (basis.T @ Z)
-        V, _ = np.linalg.qr(Z)
+    for k in range(block, most + 1, block):
+        basis[:, k - block : k] = V
+        Z = tbtrs(U, multiply(pencil.mass, tbtrs(U, V)[0]), trans=adjoint)[0]
+        known = basis[:, :k]
+        dual = known.T if real else known.conj().T
+        T[:k, k - block : k] = dual @ Z
+        Z -= known @ T[:k, k - block : k]
+        Z -= known @ (dual @ Z)
+        V, beta = _orthonormal(Z)
+        if k < 2 * (m + block) and k + block <= most:
+            continue
+        mu, Q = np.linalg.eigh(T[:k, :k], "U")
+        order = np.argsort(-np.abs(mu), kind="stable")[:m]
+        mu, Q = mu[order], Q[:, order]
+        # What the operator adds outside the basis: its last block alone.
+        residual = float((np.linalg.norm(beta @ Q[-block:], axis=0) / np.abs(mu)).max())
+        # On fine meshes rounding stops the residual before the tolerance does.
+        if residual < tolerance or (residual < 1e-5 and residual > last / 3):
+            return np.asarray(tbtrs(U, np.asfortranarray(known @ Q))[0])
+        last = residual
     return None
 
 
-def _rigid_modes(rotor: Rotor, A: Matrices) -> FloatArray:
-    """Rigid-body motions: translation and rotation about the centre of mass, or about the one support."""
-    ones = np.tile([1.0, 0.0], rotor.n_nodes)
-    arm = np.empty(A.size)
-    held = [support.node for support in rotor.supports if support.stiffness > 0]
-    arm[0::2], arm[1::2] = rotor.positions, 1.0
-    M_ones = multiply(A.mass, ones[:, None])[:, 0]
-    centre = rotor.positions[held[0] - 1] if held else float(M_ones @ arm) / float(M_ones @ ones)
-    arm[0::2] -= centre
-    X = np.column_stack([arm] if held else [ones, arm])
-    inertia = np.einsum("ij,ij->j", X, multiply(A.mass, X))
-    if inertia.min() <= 1e-14 * rotor.total_mass * np.max(X[0::2] ** 2):
-        raise ValueError(_NO_MASS)
-    return np.asarray(X / np.sqrt(inertia))
+def _orthonormal(Z: Array) -> tuple[Array, Array]:
+    """QR factors, the vectors in LAPACK's order of memory."""
+    from scipy.linalg import lapack
+
+    geqrf, orgqr = (lapack.zgeqrf, lapack.zungqr) if np.iscomplexobj(Z) else (lapack.dgeqrf, lapack.dorgqr)
+    packed, tau, _, _ = geqrf(Z)
+    return np.asarray(orgqr(packed, tau)[0]), np.triu(packed[: Z.shape[1]])

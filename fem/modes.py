@@ -1,4 +1,4 @@
-"""Critical speeds and mode shapes."""
+"""Critical speeds and mode shapes: the result; they are found in `fem.critical`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.eigen import fine_mesh_warning, finite_modes, lowest_modes
-from fem.matrices import assemble, ignored_inertia
-from fem.rotor import RPM, FloatArray, Rotor, whole
+from fem.rotor import RPM, FloatArray, Rotor
+from fem.supports import ComplexArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,15 +22,23 @@ class Modes:
     Attributes
     ----------
     frequencies
-        Critical speeds, which are the natural frequencies as long as the model has no gyroscopic effect,
-        rad/s, ascending, shape (n,); 0 for a rigid-body motion.
+        Critical speeds: where the frequency of free whirl equals the speed of rotation, rad/s, ascending,
+        shape (n,); 0 for a rigid-body motion.
     shapes
         Lateral deflection of each node in each mode, shape (N, n), scaled to 1 at the first node, or to
-        the largest value 1 where the first node is a node of the mode.
+        the largest value 1 where the first node is a node of the mode. On supports that differ in x and y
+        this is the deflection in the direction (x or y) in which the rotor moves more.
     slopes
-        dw/dx of these shapes at the nodes, 1/m per unit of deflection in m, shape (N, n).
+        Slopes of these shapes at the nodes, 1/m per unit of deflection in m, shape (N, n); with shear, the
+        tilt of the cross-section.
     rotor
         The rotor.
+    direction
+        Of each mode: "forward" (with the rotation), "backward", or "mixed" where the orbits of different
+        nodes turn in different directions or are straight lines. On rotationally symmetric supports
+        only forward critical speeds are listed: unbalance does not excite the others.
+    x, y
+        Complex amplitudes of both lateral directions, shape (N, n), in the scale of `shapes`.
     warnings
         What the reader must know.
     """
@@ -40,6 +47,9 @@ class Modes:
     shapes: FloatArray
     slopes: FloatArray
     rotor: Rotor
+    direction: tuple[str, ...]
+    x: ComplexArray
+    y: ComplexArray
     warnings: tuple[str, ...] = ()
 
     @property
@@ -59,6 +69,7 @@ class Modes:
             "critical_speeds_rpm": self.rpm.tolist(),
             "positions_m": self.positions.tolist(),
             "mode_shapes": self.shapes.T.tolist(),
+            "direction": list(self.direction),
             "warnings": list(self.warnings),
         }
 
@@ -75,6 +86,8 @@ class Modes:
         lines = ["mode     rad/s         rpm          Hz"]
         for k, omega in enumerate(self.frequencies, start=1):
             note = "  rigid body" if omega == 0 else ""
+            if self.direction[k - 1] != "forward":
+                note += f"  {self.direction[k - 1]}"
             lines.append(
                 f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{omega / (2 * np.pi):12.4f}{note}",
             )
@@ -85,58 +98,3 @@ class Modes:
         from fem.plots import draw_modes
 
         return draw_modes(self, ax)
-
-
-def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
-    """Compute the n lowest critical speeds and mode shapes of the undamped rotor.
-
-    Support damping and moments of inertia of discs play no part in this model; the latter is said in
-    `warnings`. Reference: [S] task 9.1.
-
-    Parameters
-    ----------
-    rotor
-        The rotor; without enough supports its rigid-body motions come first, with frequency 0.
-    n
-        How many, from 1.
-
-    Returns
-    -------
-    Modes
-        Frequencies in rad/s and shapes.
-
-    Raises
-    ------
-    ValueError
-        If the model has fewer than n modes, nothing that moves has mass, or the mesh is too fine for
-        float64.
-    """
-    n = whole(n, "the number of critical speeds")
-    A = assemble(rotor)
-    available = finite_modes(A)
-    if not 1 <= n <= available:
-        raise ValueError(
-            f"{n} critical speeds cannot be found: the model has 1 to {available}; "
-            "choose n in this range, or divide the shaft into more elements"
-        )
-    spectrum = lowest_modes(rotor, A, n)
-    warnings = ignored_inertia(rotor) + fine_mesh_warning(rotor, spectrum.rounding)
-    rigid = int(np.count_nonzero(spectrum.squares == 0))
-    if rigid:
-        motions = "motion" if rigid == 1 else "motions"
-        warnings += (
-            f"the supports leave {rigid} rigid-body {motions} of the rotor free; "
-            f"{'it comes' if rigid == 1 else 'they come'} first, with critical speed 0",
-        )
-    frequencies = np.sqrt(np.maximum(spectrum.squares, 0.0))
-    scale = _scale(spectrum.vectors[0::2])
-    shapes, slopes = spectrum.vectors[0::2] / scale, spectrum.vectors[1::2] / scale
-    for array in (frequencies, shapes, slopes):
-        array.flags.writeable = False
-    return Modes(frequencies, shapes, slopes, rotor, warnings)
-
-
-def _scale(shapes: FloatArray) -> FloatArray:
-    """First entry of each column, or its largest where the first is zero, shape (n,)."""
-    largest = shapes[np.argmax(np.abs(shapes), axis=0), np.arange(shapes.shape[1])]
-    return np.asarray(np.where(np.abs(shapes[0]) > 1e-6 * np.abs(largest), shapes[0], largest))

@@ -1,9 +1,10 @@
-"""Response to rotating forces of a rotor on damped isotropic supports, per unit of force.
+"""Response to forces that rotate with the rotor, per unit of force.
 
-The equation in the complex coordinate is (K + i ω C − ω² M) Z = F, with C at few nodes. The fast way
-takes the receptance of the conservative rotor from its lowest modes, adds the static contribution of all
-others as a power series in ω², and brings in each damper as a change of rank one (Sherman–Morrison). A
-bound on what the series leaves out decides how long it must be.
+The fast way takes the receptance of the conservative rotor on reference springs (`fem.pencil`) from its
+lowest modes, adds the static contribution of all others as a power series in ω², and brings in what the
+supports do besides as a change of low rank: one per supported node, two where forward and backward whirl
+are coupled. A bound on what the series leaves out decides how long it must be. The exact
+way is `fem.banded`; it takes over where the fast one loses digits.
 """
 
 from __future__ import annotations
@@ -13,31 +14,47 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.eigen import DENSE, Spectrum, finite_modes, lowest_modes
-from fem.matrices import WIDTH, Matrices, general, multiply
+from fem.banded import solve_banded
+from fem.dynamic import Supported, supported
+from fem.eigen import DENSE, Spectrum, finite_modes, lowest_modes, rigid_scale
+from fem.matrices import Matrices, multiply
+from fem.pencil import Array, Pencil, one_plane
 from fem.rotor import FloatArray, Rotor
-
-ComplexArray = NDArray[np.complex128]
+from fem.supports import ComplexArray
 
 TOLERANCE = 1e-10  # of the series, relative to the response
 NEAR = 1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits
+PIVOT = 1e-4  # of the low-rank change, relative: below, four digits are lost
 _TERMS = 12
-_CHUNK = 64  # speeds at a time, to stay in the processor's cache
+_CHUNK = 128  # speeds at a time, to stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
 class _Series:
     """Σ over modes and powers of the conservative receptance between rows and columns."""
 
-    modal: FloatArray  # (rows·columns, m)
+    factors: FloatArray  # (rows·columns, m + p): modes with the sign of their mass, then powers
     squares: FloatArray  # (m,)
-    powers: list[FloatArray]  # each (rows·columns,), factor of (ω² + shift)**j
     shift: float
+    shape: tuple[int, int]
+
+    def at(self, squared: Array, skip: NDArray[np.bool_]) -> Array:
+        """Receptance where ω² is given, shape (rows, columns, S); finite nonsense where `skip` is true."""
+        m, n = self.squares.size, self.factors.shape[1]
+        terms = np.empty((n, squared.size), dtype=squared.dtype)
+        gap = np.subtract(self.squares[:, None], squared, out=terms[:m])
+        gap[:, skip] = 1.0
+        np.divide(1.0, gap, out=gap)
+        if n > m:
+            terms[m] = 1.0
+            for j in range(m + 1, n):
+                np.multiply(terms[j - 1], squared + self.shift, out=terms[j])
+        return np.asarray((self.factors @ terms).reshape(*self.shape, -1))
 
 
 def receptance(
     rotor: Rotor, A: Matrices, rows: NDArray[np.intp], loads: FloatArray, speeds: FloatArray, exact: bool
-) -> tuple[ComplexArray, tuple[str, ...], FloatArray]:
+) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...], FloatArray]:
     """Deflections at unknowns `rows` under real load vectors rotating at each speed.
 
     Parameters
@@ -47,7 +64,7 @@ def receptance(
     rows
         Unknowns from 0, shape (a,).
     loads
-        Shape (2 N, b).
+        Shape (size, b).
     speeds
         rad/s, shape (S,).
     exact
@@ -55,8 +72,9 @@ def receptance(
 
     Returns
     -------
-    H
-        Deflection per unit of load, shape (S, a, b).
+    F, b
+        Forward and backward amplitude per unit of load, z = F e^{iωt} + b̄ e^{−iωt}, shape (S, a, b); b is
+        None on rotationally symmetric supports.
     warnings
         Said where damping is so light that rounding of the banded equations shows.
     rounding
@@ -65,163 +83,172 @@ def receptance(
     Raises
     ------
     ValueError
-        At a critical speed that no damping limits.
+        At a critical speed that no damping limits, or outside a bearing table.
     """
+    at = supported(rotor, speeds)
+    reference = _reference(rotor, at)
+    feet = np.array([A.deflection(node) for node in reference], dtype=np.intp)
+    change = _change(at, reference)
+    moving = np.flatnonzero(np.abs(change).max(axis=(0, 2, 3), initial=0.0) > 0)
+    feet, change = feet[moving], change[:, moving]
     top = float(speeds.max())
-    spectrum = _modes_for(rotor, A, top)
+
+    forward_pencil = one_plane(rotor, A, 1, reference)
+    spectrum = _modes_for(forward_pencil, top)
     near = _near(spectrum, speeds)
-    _check_limited(A, spectrum, speeds, near)
-    series = None if exact else _series(A, spectrum, rows, loads, top)
-    if series is None:
-        return *solve_banded(A, rows, loads, speeds), spectrum.rounding
-    H = np.empty((speeds.size, rows.size, loads.shape[1]), dtype=complex)
+    columns = np.hstack((loads, _units(A, feet)))
+    forward = None if exact else _series(forward_pencil, spectrum, np.concatenate((rows, feet)), columns, top)
+    backward = None
+    beta = 0.0
+    if at.planes == 2 and forward is not None and feet.size:
+        material = _uniform(rotor)
+        if material is None:
+            forward = None
+        else:
+            beta = material
+            behind = forward_pencil if not rotor.model.gyroscopic else one_plane(rotor, A, -1, reference)
+            others = spectrum if behind is forward_pencil else _modes_for(behind, top)
+            near |= _near(others, speeds)
+            backward = _series(behind, others, np.concatenate((rows, feet)), _units(A, feet), top)
+            forward = None if backward is None else forward
+    if forward is None:
+        return *solve_banded(rotor, A, at, rows, loads, speeds), spectrum.rounding
+
+    a = rows.size
+    # Speeds last: what one formula writes for many speeds stands together.
+    F = np.moveaxis(np.empty((a, loads.shape[1], speeds.size), dtype=complex), 2, 0)
+    b = (
+        np.moveaxis(np.zeros((a, loads.shape[1], speeds.size), dtype=complex), 2, 0)
+        if at.planes == 2
+        else None
+    )
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        H[part] = _evaluate(series, A, rows.size, loads.shape[1], speeds[part], near[part])
+        omega, skip = speeds[part], near[part]
+        if backward is None or b is None:
+            F[part], lost = _one_plane(forward, a, feet.size, change[part, :, 0, 0], omega, skip)
+        else:
+            F[part], b[part], lost = _two_planes(
+                forward, backward, a, change[part], beta, _spring(reference, moving), omega, skip
+            )
+        near[part] |= lost
     if not near.any():
-        return H, (), spectrum.rounding
-    H[near], warnings = solve_banded(A, rows, loads, speeds[near])
-    return H, warnings, spectrum.rounding
+        return F, b, (), spectrum.rounding
+    few = Supported(at.nodes, at.stiffness[near], at.reference, at.planes)
+    F[near], behind_near, warnings = solve_banded(rotor, A, few, rows, loads, speeds[near])
+    if b is not None and behind_near is not None:
+        b[near] = behind_near
+    return F, b, warnings, spectrum.rounding
 
 
-def solve_banded(
-    A: Matrices, rows: NDArray[np.intp], loads: FloatArray, speeds: FloatArray
-) -> tuple[ComplexArray, tuple[str, ...]]:
-    """Receptance, shape (S, a, b), by the LU factors of the banded complex matrix at each speed.
-
-    Also a warning where rounding the entries of K changes the result by more than 1e-6 of itself; it is
-    looked for at the slowest and fastest speed and at the largest response.
-
-    Raises
-    ------
-    ValueError
-        If the matrix is singular at one of the speeds.
-    """
-    from scipy.linalg.lapack import zgbsv
-
-    K, M = general(A.stiffness), general(A.mass)
-    rhs = np.asfortranarray(loads, dtype=complex)
-
-    def deflection(omega: float) -> ComplexArray:
-        band = np.asfortranarray(K - omega * omega * M, dtype=complex)
-        band[2 * WIDTH, A.damped] += 1j * omega * A.damping
-        _, _, X, info = zgbsv(WIDTH, WIDTH, band, rhs, overwrite_ab=True)
-        if info != 0 or not np.isfinite(X).all():
-            raise _unlimited(omega, omega)
-        return np.asarray(X)
-
-    H = np.empty((speeds.size, rows.size, loads.shape[1]), dtype=complex)
-    for k, omega in enumerate(speeds):
-        H[k] = deflection(float(omega))[rows]
-    suspects = {int(np.argmin(speeds)), int(np.argmax(speeds)), int(np.argmax(np.abs(H).max(axis=(1, 2))))}
-    errors = {k: _sensitivity(A, loads, deflection(float(speeds[k]))) for k in suspects}
-    worst = max(errors, key=errors.__getitem__)
-    if errors[worst] < 1e-6:
-        return H, ()
-    text = (
-        f"near {speeds[worst]:.6g} rad/s rounding may change the response by {errors[worst]:.0e} of itself: "
-        "hardly any damping limits it, or the mesh is too fine, or the speed is very low"
-    )
-    return H, (text,)
+def _reference(rotor: Rotor, at: Supported) -> dict[int, float]:
+    """Springs {node: N/m} of the conservative rotor; a gyroscopic one must be held."""
+    springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
+    if not rotor.model.gyroscopic:
+        return springs
+    # M − G may be negative in a rigid motion, so that no shift makes K + σ M positive.
+    hold = rigid_scale(rotor) * rotor.total_mass
+    if sum(k > 1e-3 * hold for k in springs.values()) < 2:
+        for node in (1, rotor.n_nodes):
+            springs[node] = springs.get(node, 0.0) + hold
+    return springs
 
 
-def _sensitivity(A: Matrices, loads: FloatArray, X: ComplexArray) -> float:
-    """What rounding the entries of K may change, relative to the deflection at the load."""
-    size = np.abs(X)
-    change = np.finfo(float).eps * np.einsum("ij,ij->j", size, multiply(np.abs(A.stiffness), size))
-    at_load = np.abs(np.einsum("ij,ij->j", loads, X))
-    floor = 1e-6 * size.max(axis=0) * np.abs(loads).max(axis=0)  # where a load meets an antiresonance
-    return float(np.max(change / np.maximum(np.maximum(at_load, floor), np.finfo(float).tiny)))
+def _change(at: Supported, reference: dict[int, float]) -> ComplexArray:
+    """What the supports do besides the reference springs, shape (S, s, 2, 2)."""
+    change = np.zeros((at.stiffness.shape[0], len(reference), 2, 2), dtype=complex)
+    change[:, : len(at.nodes)] = at.stiffness
+    springs = np.array(list(reference.values()))
+    for i in (0, 1):
+        change[:, :, i, i] -= springs
+    return change
 
 
-def _modes_for(rotor: Rotor, A: Matrices, top: float) -> Spectrum:
+def _spring(reference: dict[int, float], moving: NDArray[np.intp]) -> FloatArray:
+    return np.array(list(reference.values()))[moving]
+
+
+def _units(A: Matrices, unknowns: NDArray[np.intp]) -> FloatArray:
+    unit = np.zeros((A.size, unknowns.size))
+    unit[unknowns, np.arange(unknowns.size)] = 1.0
+    return unit
+
+
+def _uniform(rotor: Rotor) -> float | None:
+    """The material damping if it is the same everywhere, so that B = β K; else None."""
+    beta = rotor.material_damping
+    if not beta.any():
+        return 0.0
+    tilting = any(support.tilting_stiffness for support in rotor.supports)
+    return None if tilting or (beta != beta[0]).any() else float(beta[0])
+
+
+def _modes_for(pencil: Pencil, top: float) -> Spectrum:
     """All modes of a small model, else those up to three times the highest speed."""
-    available = finite_modes(A)
-    if A.size <= DENSE:
-        return lowest_modes(rotor, A, available)
+    rotor, A, available = pencil.rotor, pencil.matrices, finite_modes(pencil)
+    if pencil.size <= DENSE:
+        return lowest_modes(rotor, A, available, pencil)
     # Weyl's count of the modes of a beam below a frequency, with the discs' mass spread evenly.
     span = float(rotor.length.sum())
     bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / span
     wave_number = (rotor.total_mass / span * (3 * top) ** 2 / bending) ** 0.25
     m = min(available, int(wave_number * span / np.pi) + 4)
     while True:
-        spectrum = lowest_modes(rotor, A, m)
-        if m == available or spectrum.squares[-1] > 9 * top * top:
+        spectrum = lowest_modes(rotor, A, m, pencil)
+        if m == available or abs(spectrum.squares[-1]) > 9 * top * top:
             return spectrum
         m = min(available, 2 * m)
 
 
 def _near(spectrum: Spectrum, speeds: FloatArray) -> NDArray[np.bool_]:
     squared = speeds * speeds
-    margin = NEAR * (spectrum.squares + spectrum.shift)
+    margin = NEAR * (np.abs(spectrum.squares) + spectrum.shift)
     within = (spectrum.squares + margin >= squared.min()) & (spectrum.squares - margin <= squared.max())
     gap = np.abs(spectrum.squares[within, None] - squared)
     return np.asarray((gap <= margin[within, None]).any(axis=0))
 
 
-def _check_limited(A: Matrices, spectrum: Spectrum, speeds: FloatArray, near: NDArray[np.bool_]) -> None:
-    """Refuse speeds where nothing limits the response."""
-    if not near.any():
-        return
-    omega = speeds[near]
-    squares = spectrum.squares[:, None]
-    modal_damping = (spectrum.vectors[A.damped] ** 2).T @ A.damping
-    stiffness = np.abs(squares - omega * omega + 1j * omega * modal_damping[:, None])
-    limit = stiffness / (squares + spectrum.shift)
-    if (limit <= NEAR).any():
-        mode, k = np.unravel_index(int(np.argmin(limit)), limit.shape)
-        raise _unlimited(float(omega[k]), float(np.sqrt(spectrum.squares[mode])))
-
-
-def _unlimited(omega: float, critical: float) -> ValueError:
-    return ValueError(
-        f"at {omega:.10g} rad/s the undamped rotor stands exactly at its critical speed "
-        f"{critical:.10g} rad/s, where the amplitude has no limit; give a support damping or choose "
-        "another speed"
-    )
-
-
 def _series(
-    A: Matrices, spectrum: Spectrum, rows: NDArray[np.intp], loads: FloatArray, top: float
+    pencil: Pencil, spectrum: Spectrum, rows: NDArray[np.intp], columns: FloatArray, top: float
 ) -> _Series | None:
     """Modes and static corrections; None where the series does not reach its tolerance."""
     from scipy.linalg.lapack import dpbtrs
 
-    # Dampers are rows and columns, too.
-    rows = np.concatenate((rows, A.damped))
-    unit = np.zeros((A.size, A.damped.size))
-    unit[A.damped, np.arange(A.damped.size)] = 1.0
-    columns = np.hstack((loads, unit))
-    V, shifted = spectrum.vectors, spectrum.squares + spectrum.shift
-    participation = V.T @ columns
+    V, shifted, squares = spectrum.vectors, spectrum.squares + spectrum.shift, spectrum.squares
+    participation = spectrum.signs[:, None] * (V.T @ columns)
     modal = (V[rows][:, None, :] * participation.T[None, :, :]).reshape(-1, shifted.size)
     powers: list[FloatArray] = []
-    if shifted.size == A.size:
-        return _Series(modal, spectrum.squares, powers, spectrum.shift)
+
+    def series() -> _Series:
+        factors = np.column_stack((modal, *powers))
+        return _Series(factors, squares, spectrum.shift, (rows.size, columns.shape[1]))
+
+    if shifted.size == pencil.size:
+        return series()
 
     R = dpbtrs(spectrum.factor, columns)[0]
     total = np.maximum(np.einsum("ij,ij->j", columns, R), np.finfo(float).tiny)
     # Without the modes; twice, as the frequencies are more accurate than the factor's own.
-    MV = multiply(A.mass, V)
+    MV = multiply(pencil.mass, V) * spectrum.signs
     R = R - V @ (participation / shifted[:, None])
     R -= V @ (MV.T @ R)
     powers.append(R[rows].reshape(-1))
-    if shifted.size == finite_modes(A):
-        return _Series(modal, spectrum.squares, powers, spectrum.shift)
+    if shifted.size == finite_modes(pencil):
+        return series()
     # At the loads, what is left after j terms is below x**j / (1 − x) of the static remainder
     # (Cauchy–Schwarz); the tolerance leaves room for sensors where the remainder is larger.
     remainder = float((np.abs(np.einsum("ij,ij->j", columns, R)) / total).max())
-    ratio = (top * top + spectrum.shift) / shifted[-1]
+    ratio = (top * top + spectrum.shift) / abs(shifted[-1])
     if ratio >= 0.5:
         return None
-    flexible = shifted[min(A.rigid, shifted.size - 1)]
+    flexible = abs(shifted[min(pencil.rigid.shape[1], shifted.size - 1)])
     wanted = TOLERANCE * min(1.0, flexible / (top * top + spectrum.shift))
     error = remainder / (1 - ratio)
     for _ in range(_TERMS):
         error *= ratio
         if error <= wanted:
-            return _Series(modal, spectrum.squares, powers, spectrum.shift)
-        load = multiply(A.mass, R)
+            return series()
+        load = multiply(pencil.mass, R)
         load -= MV @ (V.T @ load)  # rounding must not bring the modes back
         R = dpbtrs(spectrum.factor, load)[0]
         R -= V @ (MV.T @ R)
@@ -229,20 +256,75 @@ def _series(
     return None
 
 
-def _evaluate(
-    series: _Series, A: Matrices, a: int, b: int, speeds: FloatArray, skip: NDArray[np.bool_]
-) -> ComplexArray:
-    """Receptance with dampers at each speed, shape (S, a, b); finite nonsense where `skip` is true."""
-    squared = speeds * speeds
-    gap = series.squares[:, None] - squared
-    gap[:, skip] = 1.0
-    conservative = (series.modal @ (1.0 / gap)).reshape(a + A.damped.size, b + A.damped.size, -1)
-    for j, power in enumerate(series.powers):
-        conservative += power.reshape(*conservative.shape[:2], 1) * (squared + series.shift) ** j
-    H: ComplexArray = conservative.astype(complex)
-    for k, damping in enumerate(A.damping):
-        D = 1j * damping * speeds
-        row = H[a + k] / (1.0 + D * H[a + k, b + k])
-        H -= H[:, b + k, None] * (D * row)
-        H[a + k] = row
-    return np.moveaxis(H[:a, :b], 2, 0)
+def _one_plane(
+    series: _Series, a: int, s: int, change: ComplexArray, speeds: FloatArray, skip: NDArray[np.bool_]
+) -> tuple[ComplexArray, NDArray[np.bool_]]:
+    """Forward amplitudes, shape (S, a, b), and speeds where digits are lost: Sherman–Morrison per support."""
+    b = series.shape[1] - s
+    H: Array = series.at(speeds * speeds, skip)
+    lost = np.zeros(speeds.size, dtype=bool)
+    for k in reversed(range(s)):  # the last row and column are not needed again
+        D = change[:, k]
+        DH = D * H[a + k, b + k]
+        pivot = 1.0 + DH
+        lost |= np.abs(pivot) < PIVOT * np.maximum(1.0, np.abs(DH))
+        pivot[lost] = 1.0
+        step = H[: a + k, b + k, None] * (H[a + k, : b + k] * (D / pivot))
+        H = np.subtract(H[: a + k, : b + k], step, out=step)
+    return np.moveaxis(H, 2, 0), lost
+
+
+def _two_planes(
+    forward: _Series,
+    backward: _Series,
+    a: int,
+    change: ComplexArray,
+    beta: float,
+    springs: FloatArray,
+    speeds: FloatArray,
+    skip: NDArray[np.bool_],
+) -> tuple[ComplexArray, ComplexArray, NDArray[np.bool_]]:
+    """Forward and backward amplitudes, shape (S, a, b), and speeds where digits are lost.
+
+    The amplitudes q at the supports obey (1 + H D) q = H f with D coupling forward and backward; the
+    forces D q then act on each of the two.
+    """
+    s = change.shape[1]
+    b = forward.shape[1] - s
+    H = forward.at(speeds * speeds, skip)
+    D = np.moveaxis(change, 0, -1)  # (s, 2, 2, S)
+    if beta:
+        # K (1 + 2 i ω β) − ω² (M + G): the same pencil at a complex frequency.
+        stiffer = 1.0 + 2j * beta * speeds
+        J = backward.at(speeds * speeds / stiffer, skip) / stiffer
+        D = D.copy()
+        D[:, 1, 1] -= springs[:, None] * (stiffer - 1.0)
+    else:
+        J = backward.at(speeds * speeds, skip)
+    # Unknowns: forward at all supports, then backward at all.
+    E = np.zeros((2 * s, 2 * s + b, speeds.size), dtype=complex)
+    for q in (0, 1):
+        E[:s, q * s : (q + 1) * s] = H[a:, b:] * D[None, :, 0, q]
+        E[s:, q * s : (q + 1) * s] = J[a:] * D[None, :, 1, q]
+    size = np.abs(E[:, : 2 * s]).max(axis=1)
+    E[:s, 2 * s :] = H[a:, :b]
+    index = np.arange(2 * s)
+    E[index, index] += 1.0
+    lost = np.zeros(speeds.size, dtype=bool)
+    for k in index:
+        pivot = E[k, k].copy()
+        lost |= np.abs(pivot) < PIVOT * np.maximum(1.0, size[k])
+        pivot[lost] = 1.0
+        E[k, k + 1 :] /= pivot
+        factors = E[:, k].copy()
+        factors[k] = 0.0
+        E[:, k + 1 :] -= factors[:, None] * E[k, k + 1 :]
+    q_forward, q_backward = E[:s, 2 * s :], E[s:, 2 * s :]
+    p_forward = D[:, None, 0, 0] * q_forward + D[:, None, 0, 1] * q_backward
+    p_backward = D[:, None, 1, 0] * q_forward + D[:, None, 1, 1] * q_backward
+    F = H[:a, :b].astype(complex)
+    B = np.zeros_like(F)
+    for k in range(s):
+        F -= H[:a, b + k, None] * p_forward[k]
+        B -= J[:a, k, None] * p_backward[k]
+    return np.moveaxis(F, 2, 0), np.moveaxis(B, 2, 0), lost

@@ -3,81 +3,49 @@
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from fem.checks import whole
+from fem.disc import STEEL_DENSITY, Disc
+from fem.supports import FloatArray, Pedestal, Support
+
+__all__ = ["RPM", "STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
+__all__ += ["Disc", "FloatArray", "Model", "Pedestal", "Rotor", "Support", "whole"]
 
 STEEL_MODULUS = 2.1e11
-STEEL_DENSITY = 7800.0
+STEEL_POISSON = 0.3
 RPM = 60 / math.tau  # of 1 rad/s
 
 
 @dataclass(frozen=True)
-class Disc:
-    """A rigid disc, or a concentrated mass, at a node.
+class Model:
+    """What the beam elements take into account besides bending and mass.
 
     Attributes
     ----------
-    node
-        Node number, from 1.
-    mass
-        kg.
-    polar_inertia, diametral_inertia
-        About the shaft axis and about a diameter, kg·m².
-    name
-        For messages and drawings.
-
-    Raises
-    ------
-    ValueError
-        If the node is no whole number from 1 up, or the mass or an inertia is negative or not finite.
+    shear
+        Shear deformation (Timoshenko), with Cowper's coefficient.
+    rotary_inertia
+        Inertia of tilting cross-sections, and the diametral inertia of discs.
+    gyroscopic
+        Gyroscopic moments of shaft and discs (polar inertia).
     """
 
-    node: int
-    mass: float
-    polar_inertia: float = 0.0
-    diametral_inertia: float = 0.0
-    name: str = ""
+    shear: bool = False
+    rotary_inertia: bool = False
+    gyroscopic: bool = False
 
     def __post_init__(self) -> None:
-        _check_attachment(self, "mass", "polar_inertia", "diametral_inertia")
-
-
-@dataclass(frozen=True)
-class Support:
-    """An isotropic bearing between a node and the ground.
-
-    Attributes
-    ----------
-    node
-        Node number, from 1.
-    stiffness
-        N/m.
-    damping
-        Viscous, N·s/m.
-    name
-        For messages and drawings.
-
-    Raises
-    ------
-    ValueError
-        If the node is no whole number from 1 up, or stiffness or damping is negative or not finite.
-    """
-
-    node: int
-    stiffness: float
-    damping: float = 0.0
-    name: str = ""
-
-    def __post_init__(self) -> None:
-        _check_attachment(self, "stiffness", "damping")
+        for item in fields(self):
+            if not isinstance(getattr(self, item.name), bool):
+                raise ValueError(
+                    f"model: {item.name} must be True or False, not {getattr(self, item.name)!r}"
+                )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +65,14 @@ class Rotor:
         What is attached to nodes; several may share a node.
     stations
         Names of nodes, `{name: node}`.
+    poisson_ratio
+        Of each element, shape (n,); shear alone depends on it.
+    material_damping
+        Viscous damping of each element's material per its stiffness, s, shape (n,): the stress grows by
+        this many times its rate of change in the turning shaft. It damps whirl below, and drives it above,
+        the speed of the whirl.
+    model
+        What the elements take into account.
 
     Raises
     ------
@@ -112,6 +88,9 @@ class Rotor:
     discs: Sequence[Disc] = ()
     supports: Sequence[Support] = ()
     stations: Mapping[str, int] = field(default_factory=dict)
+    poisson_ratio: FloatArray = field(default_factory=lambda: np.array(STEEL_POISSON))
+    material_damping: FloatArray = field(default_factory=lambda: np.array(0.0))
+    model: Model = Model()
 
     def __post_init__(self) -> None:
         for name, value in zip(_PER_ELEMENT, _broadcast(self), strict=True):
@@ -119,6 +98,8 @@ class Rotor:
         object.__setattr__(self, "discs", _attached(self.discs, Disc, "disc", self.n_nodes))
         object.__setattr__(self, "supports", _attached(self.supports, Support, "support", self.n_nodes))
         object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
+        if not isinstance(self.model, Model):
+            raise ValueError(f"model must be a Model, not {self.model!r}")
 
     __hash__ = None  # type: ignore[assignment]  # compared by value, and arrays have no hash
 
@@ -126,8 +107,8 @@ class Rotor:
         if not isinstance(other, Rotor):
             return NotImplemented
         return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in _PER_ELEMENT) and (
-            (self.discs, self.supports, dict(self.stations))
-            == (other.discs, other.supports, dict(other.stations))
+            (self.discs, self.supports, dict(self.stations), self.model)
+            == (other.discs, other.supports, dict(other.stations), other.model)
         )
 
     def __repr__(self) -> str:
@@ -138,8 +119,8 @@ class Rotor:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A mapping proxy can be neither pickled nor deep-copied: rebuild from plain data.
-        values = [getattr(self, item.name) for item in fields(self)]
-        return type(self), (*values[:-1], dict(self.stations))
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return type(self), tuple((values | {"stations": dict(self.stations)}).values())
 
     def node(self, name_or_number: str | int) -> int:
         """Number of a node, given as the name of a station or as a number, from 1.
@@ -187,7 +168,34 @@ class Rotor:
     @property
     def second_moment(self) -> FloatArray:
         """Second moment of area of each element about a diameter, m⁴, shape (n,)."""
-        return np.asarray(math.pi / 64 * (self.outer_diameter**4 - self.inner_diameter**4))
+        outer, inner = self.outer_diameter**2, self.inner_diameter**2
+        return np.asarray(math.pi / 64 * (outer - inner) * (outer + inner))
+
+    @property
+    def shear_modulus(self) -> FloatArray:
+        """G = E / (2 (1 + ν)) of each element, Pa, shape (n,)."""
+        return np.asarray(self.youngs_modulus / (2 * (1 + self.poisson_ratio)))
+
+    @property
+    def shear_coefficient(self) -> FloatArray:
+        """Cowper's κ of each element, a circle or a circular ring, shape (n,).
+
+        κ = 6 (1 + ν)(1 + m²)² / ((7 + 6 ν)(1 + m²)² + (20 + 12 ν) m²), m = inner by outer diameter
+        (G. R. Cowper, J. Appl. Mech. 33 (1966) 335).
+        """
+        nu, m2 = self.poisson_ratio, (self.inner_diameter / self.outer_diameter) ** 2
+        ring = (1 + m2) ** 2
+        return np.asarray(6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * m2))
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether every support is rotationally symmetric, so that one complex coordinate is enough."""
+        return all(support.symmetric for support in self.supports)
+
+    @property
+    def constant(self) -> bool:
+        """Whether no support depends on speed."""
+        return all(support.constant for support in self.supports)
 
     @property
     def total_mass(self) -> float:
@@ -197,35 +205,16 @@ class Rotor:
 
 
 _T = TypeVar("_T", Disc, Support)
-_PER_ELEMENT = ("length", "outer_diameter", "inner_diameter", "youngs_modulus", "density")
-
-
-def whole(value: object, what: str) -> int:
-    """A whole number as a plain int; raise ValueError naming `what` for anything else."""
-    try:
-        if isinstance(value, (bool, np.bool_)):
-            raise TypeError
-        return operator.index(value)  # type: ignore[arg-type]
-    except TypeError:
-        raise ValueError(f"{what} must be a whole number, not {value!r}") from None
-
-
-def _check_attachment(item: Disc | Support, *quantities: str) -> None:
-    """Check a disc or support on its own and make its numbers plain."""
-    what = type(item).__name__.lower() + (f" {item.name!r}" if item.name else "")
-    number = whole(item.node, f"the node of {what}")
-    if number < 1:
-        raise ValueError(f"{what}: node {number} does not exist, nodes are numbered from 1")
-    object.__setattr__(item, "node", number)
-    for name in quantities:
-        value = getattr(item, name)
-        try:
-            value = float(value)
-        except (TypeError, ValueError):
-            raise ValueError(f"{what} at node {number}: {name} must be a number, not {value!r}") from None
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError(f"{what} at node {number}: {name} must be finite and not negative, not {value}")
-        object.__setattr__(item, name, value)
+_PER_ELEMENT = (
+    "length",
+    "outer_diameter",
+    "inner_diameter",
+    "youngs_modulus",
+    "density",
+    "poisson_ratio",
+    "material_damping",
+)
+_MAY_BE_ZERO = ("inner_diameter", "density", "material_damping")
 
 
 def _broadcast(rotor: Rotor) -> list[FloatArray]:
@@ -243,11 +232,14 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
     for name, array in zip(_PER_ELEMENT, arrays, strict=True):
         if len(array) not in (1, n) or not len(array):
             raise ValueError(f"{name} has {len(array)} values for {n} elements; give one value, or {n}")
-        positive = name not in ("inner_diameter", "density")
-        wrong = ~np.isfinite(array) | (array <= 0 if positive else array < 0)
+        if name == "poisson_ratio":
+            wrong, limit = ~((array > -1) & (array <= 0.5)), "above -1, at most 0.5"
+        elif name in _MAY_BE_ZERO:
+            wrong, limit = ~(np.isfinite(array) & (array >= 0)), "not negative"
+        else:
+            wrong, limit = ~(np.isfinite(array) & (array > 0)), "greater than zero"
         if wrong.any():
             i = int(np.argmax(wrong))
-            limit = "greater than zero" if positive else "not negative"
             raise ValueError(f"element {i + 1}: {name} must be finite and {limit}, not {array[i]}")
     # Copies: the caller's arrays stay his, ours stay read-only.
     arrays = [np.broadcast_to(array, (n,)).copy() for array in arrays]

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from rotorid.tables import read_job as read_job
     from rotorid.tables import read_rotor as read_rotor
     from rotorid.tables import read_trials as read_trials
+    from rotorid.tables import read_unbalance as read_unbalance
     from rotorid.tables import write_influence as write_influence
+    from rotorid.tables import write_rotor as write_rotor
 
 __version__ = "0.1.0"
 
@@ -49,7 +51,9 @@ _HOME = {
     "read_rotor": "tables",
     "read_trials": "tables",
     "read_influence": "tables",
+    "read_unbalance": "tables",
     "write_influence": "tables",
+    "write_rotor": "tables",
     "read_job": "tables",
     "Job": "tables",
     "InputError": "tables",

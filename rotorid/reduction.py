@@ -262,29 +262,38 @@ class Reduction:
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per mass and mode: node, position, mass, frequencies, error, MAC."""
+        """First a row per mass (`table` is "masses"), then a row per mode ("modes").
+
+        Masses have node, position and mass; modes have number, frequencies, error and MAC. Cells of the other
+        kind are blank.
+        """
         import pandas as pd
 
-        return pd.DataFrame(
+        n = len(self.nodes)
+        masses = pd.DataFrame(
+            {"node": self.nodes, "position_m": self.positions, "mass_kg": self.masses.solution}
+        )
+        modes = pd.DataFrame(
             {
-                "node": self.nodes,
-                "position_m": self.positions,
-                "mass_kg": self.masses.solution,
-                "mode": np.arange(1, len(self.nodes) + 1),
+                "mode": np.arange(1, n + 1),
                 "frequency_rad_s": self.frequencies,
                 "rotor_frequency_rad_s": self.rotor_frequencies,
                 "relative_error": self.relative_error,
                 "mac": self.mac,
             }
         )
+        modes.index += n
+        frame = pd.concat((masses, modes), axis=1).astype({"node": "Int64", "mode": "Int64"})
+        frame.insert(0, "table", ["masses"] * n + ["modes"] * n)
+        return frame
 
     def summary(self) -> str:
         """Text for an engineer."""
         std = self.masses.std
-        lines = [f"warning: {w}" for w in self.warnings]
+        lines = [f"Warning: {w}" for w in self.warnings]
         lines.append(f"{len(self.nodes)} equivalent masses from the first {self.modes} mode(s), formula (50)")
         for i, node in enumerate(self.nodes):
-            spread = "" if std is None else f" ± {std[i]:.2g}"
+            spread = "" if std is None else f" ± {_plain(std[i])}"
             mass = self.masses.solution[i]
             lines.append(f"  node {node:>3}  at {self.positions[i]:7.3f} m   {mass:10.3f} kg{spread}")
         total = self.masses.solution.sum()
@@ -400,6 +409,14 @@ def _like(shapes: FloatArray, reference: FloatArray) -> FloatArray:
 
 def _speed(omega: float) -> str:
     return f"{omega:9.4f} rad/s {omega * RAD_S_TO_RPM:7.1f}/min"
+
+
+def _plain(value: float) -> str:
+    """Two significant digits, never as a power of ten."""
+    if value == 0 or not np.isfinite(value):
+        return f"{value:g}"
+    places = 1 - int(np.floor(np.log10(abs(value))))
+    return f"{round(value, places):.{max(places, 0)}f}"
 
 
 def _floats(values: FloatArray) -> list[float | None]:

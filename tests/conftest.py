@@ -1,12 +1,16 @@
 """Shared by all tests: the command line run in this process."""
 
 import json
+import os
 import sys
 from dataclasses import dataclass
 
 import pytest
 
-import rotorid.cli
+# Small matrices gain nothing from threads, and lose a hundredfold where cores are busy; before NumPy loads.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import rotorid.cli  # noqa: E402
 
 
 @dataclass

@@ -88,3 +88,54 @@ def rotors(draw, elements=(2, 20), damped=True):
             for node in supported
         ],
     )
+
+
+@st.composite
+def machines(draw, elements=(2, 24), kinds=("symmetric", "anisotropic"), tables=True, pedestals=True):
+    """Rotors with everything: any model, discs with inertia, cross-coupled and tabulated damped bearings."""
+    n = draw(st.integers(*elements))
+    kind = draw(st.sampled_from(kinds))
+    model = fem.Model(draw(st.booleans()), draw(st.booleans()), draw(st.booleans()))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+
+    def matrix(size):
+        if kind == "symmetric":
+            cross = size * rng.uniform(-0.2, 0.2)
+            return ((size, cross), (-cross, size))
+        return (
+            (size, size * rng.uniform(-0.3, 0.3)),
+            (size * rng.uniform(-0.3, 0.3), size * rng.uniform(0.4, 2)),
+        )
+
+    def pedestal():
+        if not pedestals or rng.random() < 0.6:
+            return None
+        k, c = 10 ** rng.uniform(7, 9), 10 ** rng.uniform(3, 4)
+        if kind == "symmetric":
+            return fem.Pedestal(rng.uniform(0, 50), k, c)
+        return fem.Pedestal(rng.uniform(0, 50), (k, k * rng.uniform(0.3, 1)), (c, c * rng.uniform(0, 1)))
+
+    supports = []
+    for node in rng.choice(np.arange(1, n + 2), size=min(n + 1, int(rng.integers(2, 4))), replace=False):
+        k, c = 10 ** rng.uniform(6, 8.5), 10 ** rng.uniform(3, 4.5)
+        speeds = ()
+        stiffness, damping = matrix(k), matrix(c)
+        if tables and rng.random() < 0.4:
+            speeds = (0.0, 500.0, 1500.0, 6000.0)
+            stiffness = [matrix(k * rng.uniform(0.5, 2)) for _ in speeds]
+            damping = [matrix(c * rng.uniform(0.5, 2)) for _ in speeds]
+        supports.append(fem.Support(int(node), stiffness, damping, speeds=speeds, pedestal=pedestal()))
+    outer = rng.uniform(0.04, 0.12, n)
+    return fem.Rotor(
+        rng.uniform(0.05, 0.25, n),
+        outer,
+        np.where(rng.random(n) < 0.3, outer * rng.uniform(0.2, 0.8, n), 0.0),
+        poisson_ratio=rng.uniform(0.2, 0.35, n),
+        material_damping=draw(st.sampled_from([0.0, 2e-6])),
+        discs=[
+            fem.Disc.from_geometry(int(node), rng.uniform(0.02, 0.1), rng.uniform(0.15, 0.4))
+            for node in rng.integers(1, n + 2, rng.integers(0, 4))
+        ],
+        supports=supports,
+        model=model,
+    )

@@ -67,7 +67,10 @@ def complaints(function, *arguments, **options):
         warnings.simplefilter("ignore", TableWarning)
         with pytest.raises(InputError) as caught:
             function(*arguments, **options)
-    assert str(caught.value) == "\n".join(str(problem) for problem in caught.value.problems)
+    lines = str(caught.value).splitlines()
+    if len(caught.value.problems) <= 3:
+        assert lines == [str(problem) for problem in caught.value.problems]
+    assert len(lines) <= 21
     return caught.value.problems
 
 

@@ -158,7 +158,7 @@ def test_pictures_and_tables_are_written_and_named(cli, tmp_path, command):
         (("critical", ROTOR, "--plot", "no/such/folder/modes.png"), "does not exist"),
         (("critical", ROTOR, "-n", "0"), "-n"),
         (("critical", ROTOR, "-n", "1000"), "1000"),
-        (("reduce", ROTOR, "--nodes", "7,x"), "node numbers with commas"),
+        (("reduce", ROTOR, "--nodes", "7,x"), "no station is called 'x'"),
         (("reduce", ROTOR, "--nodes", "7,12,99"), "node 99 does not exist"),
         (("influence", ROTOR, "--planes", "99", "--sensors", "1", "--speeds", "100"), "99"),
         (("influence", ROTOR, "--planes", "7", "--sensors", "1", "--speeds", "a:b"), "not a range"),
@@ -207,7 +207,7 @@ def test_demo_writes_the_job_and_says_where_the_pictures_are(cli, tmp_path):
 
 def test_help_has_an_example_for_every_command(cli):
     listing = cli("--help").out
-    for command in ("demo", "critical", "influence", "balance", "reduce"):
+    for command in ("demo", "critical", "campbell", "response", "influence", "balance", "reduce"):
         assert command in listing
         assert "Example: rotorid " + command in cli(command, "--help").out
     assert cli("--version").out == "rotorid 0.1.0\n"
@@ -247,7 +247,7 @@ def test_a_recognised_encoding_is_named_on_standard_error_only(cli, tmp_path, mo
     (tmp_path / "runs.csv").write_bytes(text.encode("cp1251"))
     outcome = cli("balance", tmp_path / "runs.csv", BK / "weights.csv", "--json")
     assert outcome.code == 0, outcome.err
-    assert outcome.err.startswith("rotorid: warning: ")
+    assert outcome.err.startswith("rotorid: Warning: ")
     assert "cp1251" in outcome.err
     assert outcome.json["rank"] == 2
 

@@ -141,7 +141,14 @@ def test_document_frame_and_text(rotor):
         "rotor_frequencies_rad_s", "relative_error", "mac", "condition_number", "warnings",
     } <= set(document)  # fmt: skip
     np.testing.assert_allclose(document["positions_m"], np.array([0.655, 1.34, 2.105]) + 0.318, atol=1e-9)
-    np.testing.assert_allclose(reduction.to_frame()["mass_kg"], document["masses_kg"])
+    frame = reduction.to_frame()
+    masses, modes = (frame[frame["table"] == name] for name in ("masses", "modes"))
+    np.testing.assert_allclose(masses["mass_kg"].astype(float), document["masses_kg"])
+    assert masses["node"].tolist() == document["nodes"]
+    assert modes["mode"].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(modes["frequency_rad_s"].astype(float), document["natural_frequencies_rad_s"])
+    assert modes[["node", "position_m", "mass_kg"]].isna().all(axis=None)
+    assert masses[["mode", "frequency_rad_s", "mac"]].isna().all(axis=None)
     text = reduction.summary()
     assert "134.203 kg" in text
     assert max(map(len, text.splitlines())) <= 110

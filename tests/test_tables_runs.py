@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
+from balancing import UndeterminedError, estimate_influence
 from balancing.trials import ReadingErrors
 from rotorid.tables import StatedErrors, read_trials
 
@@ -312,8 +313,17 @@ def test_the_same_weight_twice(bad):
     the_only(bad(weights=[*WEIGHTS, WEIGHTS[1]]), "weights.csv", 4, "run", "trial 1", "(row 2 says the same)")
 
 
-def test_no_weights(bad):
-    the_only(bad(weights=WEIGHTS[:1]), "weights.csv", 1, None, None, "rows below the header")
+def test_a_weights_table_without_rows_says_that_nothing_was_mounted(read):
+    trials = read(weights=WEIGHTS[:1])
+    assert (trials.planes, trials.weights.shape) == ((), (3, 0))
+    with pytest.raises(UndeterminedError, match="no run has a trial weight, so the effect of none is"):
+        estimate_influence(trials)
+
+
+def test_an_empty_weights_table_is_a_problem(tmp_path):
+    (tmp_path / "weights.csv").write_text("")
+    found = complaints(read_trials, write_csv(tmp_path / "runs.csv", RUNS), tmp_path / "weights.csv")
+    the_only(found, "weights.csv", None, None, None, "the file is empty")
 
 
 def test_weights_are_checked_even_if_the_runs_cannot_be_read(bad):

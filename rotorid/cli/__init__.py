@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import sys
 import warnings
 
 import typer
 
-from rotorid.cli import balance, critical, demo, influence, reduce
+from rotorid.cli import balance, campbell, critical, demo, influence, reduce, response
 
 app = typer.Typer(
     name="rotorid",
@@ -18,6 +20,8 @@ app = typer.Typer(
 )
 app.command("demo")(demo.demo)
 app.command("critical")(critical.critical)
+app.command("campbell")(campbell.campbell)
+app.command("response")(response.response)
 app.command("influence")(influence.influence)
 app.command("balance")(balance.balance)
 app.command("reduce")(reduce.reduce)
@@ -46,25 +50,43 @@ def _rotorid(
 
 def main() -> None:
     """Run the command line; the exit status is 2 for bad input or usage, with one message, no traceback."""
+    if sys.stdout is None:  # the caller closed it: a result that nobody can read is no success
+        sys.exit(_complain(OSError("standard output is closed: there is nowhere to print the result")))
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn  # type: ignore[assignment]
-            app()
+            try:
+                app()
+            finally:
+                sys.stdout.flush()
     except (ValueError, OSError) as problem:
         # ValueError covers InputError (files) and everything the library refuses with one clear sentence
         if isinstance(problem, BrokenPipeError):
-            sys.stderr.close()
+            _forget_output()
             sys.exit(0)
+        if isinstance(problem, OSError) and not problem.filename:
+            _forget_output()
         sys.exit(_complain(problem))
 
 
+def _forget_output() -> None:
+    """Let the interpreter flush what is left of standard output into nothing, without a complaint."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _warn(message: Warning | str, *_: object) -> None:
-    print(f"rotorid: warning: {message}", file=sys.stderr)
+    print(f"rotorid: Warning: {_safe(str(message))}", file=sys.stderr)
 
 
 def _complain(problem: Exception) -> int:
     text = str(problem)
     if isinstance(problem, OSError) and problem.strerror:
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
-    print(f"rotorid: {text}", file=sys.stderr)
+    print(f"rotorid: {_safe(text)}", file=sys.stderr)
     return 2
+
+
+def _safe(text: str) -> str:
+    """Text without control characters: names of files may hold any."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in text)

@@ -7,7 +7,16 @@ from typing import Annotated, TypedDict
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names, speeds
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    check_inputs,
+    check_targets,
+    emit,
+    names,
+    speeds,
+)
 
 
 class Overrides(TypedDict):
@@ -54,7 +63,10 @@ def balance(
     speed: Annotated[
         str | None,
         typer.Option(
-            "--speeds", metavar="LIST", help="Use these speeds only, 1000,1500rpm.", show_default=False
+            "--speeds",
+            metavar="LIST",
+            help="Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.",
+            show_default=False,
         ),
     ] = None,
     save_influence: Annotated[
@@ -73,10 +85,12 @@ def balance(
     """
     from balancing import correct, estimate_influence
     from balancing.plots import overview
-    from rotorid.tables import job_from_files, read_job, write_influence
+    from rotorid.tables import job_from_files, read_job
+    from rotorid.tables.influence import influence_bytes
 
-    check_targets(plot, output)
-    check_targets(None, save_influence)
+    check_targets(plot, output, save_influence)
+    targets = [path for path in (plot, output, save_influence) if path is not None]
+    check_inputs(targets, [*files, *([influence] if influence is not None else [])])
     settings: Overrides = {
         "phase": phase,
         "angles": angles,
@@ -90,10 +104,8 @@ def balance(
         coefficients,
         baseline=job.trials if job.influence is not None else None,
         planes=names(planes),
-        speeds=None if speed is None else speeds(speed),
+        speeds=None if speed is None else speeds(speed, job.trials.labels.speed_unit),
     )
-    if save_influence is not None:
-        write_influence(save_influence, coefficients)
     emit(
         result.to_dict(),
         result.summary,
@@ -107,4 +119,7 @@ def balance(
         },
         figure=(plot, lambda: overview(result)),
         table=(output, result.to_frame),
+        more=None
+        if save_influence is None
+        else (save_influence, lambda: influence_bytes(save_influence, coefficients)),
     )

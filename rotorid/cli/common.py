@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,6 +34,10 @@ RotorArgument = Annotated[
         metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml).", show_default=False
     ),
 ]
+OperatingOption = Annotated[
+    str | None,
+    typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
+]
 
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
@@ -54,9 +58,11 @@ def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str
     }
 
 
-def check_targets(plot: Path | None, output: Path | None) -> None:
-    """Refuse a file that could not be written, before any work is done."""
-    for path, endings in ((plot, PICTURES), (output, TABLES)):
+def check_targets(plot: Path | None, output: Path | None, *more: Path | None) -> None:
+    """Refuse files that could not be written, before any work is done; `more` are tables, too."""
+    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more)]
+    asked: list[Path] = []
+    for path, endings in targets:
         if path is None:
             continue
         if path.suffix.lower() not in endings:
@@ -65,6 +71,30 @@ def check_targets(plot: Path | None, output: Path | None) -> None:
             )
         if not path.parent.is_dir():
             raise ValueError(f"{path}: the folder {path.parent} does not exist")
+        if path.is_dir():
+            raise ValueError(f"{path}: cannot be written, it is a folder")
+        if not os.access(path if path.exists() else path.parent, os.W_OK):
+            raise ValueError(f"{path}: cannot be written, permission denied")
+        twin = next((other for other in asked if _same_file(path, other)), None)
+        if twin is not None:
+            raise ValueError(f"{path}: two results cannot go into one file; give each its own name")
+        asked.append(path)
+
+
+def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write a result over a file that was read for it."""
+    sources = list(inputs)
+    for path in targets:
+        if any(_same_file(path, source) for source in sources):
+            raise ValueError(
+                f"{path}: this is an input of the command, which must not be overwritten; choose another name"
+            )
+
+
+def _same_file(a: Path, b: Path) -> bool:
+    if a.exists() and b.exists():
+        return a.samefile(b)
+    return a.resolve() == b.resolve()
 
 
 def emit(
@@ -76,36 +106,36 @@ def emit(
     options: Mapping[str, object],
     figure: tuple[Path | None, Callable[[], Figure]] | None = None,
     table: tuple[Path | None, Callable[[], pd.DataFrame]] | None = None,
+    more: tuple[Path | None, Callable[[], bytes]] | None = None,
 ) -> None:
-    """Print a result as text or JSON, with its picture and table, each file written whole or not at all."""
-    record = provenance(files, options)
-    if figure and figure[0]:
-        save_figure(figure[1](), figure[0])
-    if table and table[0]:
-        from rotorid.tables import write_table
+    """Print a result as text or JSON; write its picture, its table and `more`, all of them or none."""
+    from rotorid.tables.writing import table_bytes, write_files
 
-        write_table(table[0], table[1]())
+    check_inputs([t[0] for t in (figure, table, more) if t and t[0]], files)
+    record = provenance(files, options)
+    written: dict[Path, bytes] = {}
+    if figure and figure[0]:
+        written[figure[0]] = figure_bytes(figure[1](), figure[0])
+    if table and table[0]:
+        written[table[0]] = table_bytes(table[0], table[1]())
+    if more and more[0]:
+        written[more[0]] = more[1]()
+    write_files(written)
     if as_json:
         typer.echo(
             json.dumps({**document, "provenance": record}, ensure_ascii=False, allow_nan=False, indent=1)
         )
         return
     typer.echo(text())
-    for target in (figure, table):
-        if target and target[0]:
-            typer.echo(f"written: {target[0]}")
+    for path in written:
+        typer.echo(f"written: {path}")
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure, whole or not at all."""
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=path.suffix)
-    os.close(handle)
-    try:
-        figure.savefig(name, dpi=150)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+def figure_bytes(figure: Figure, path: Path) -> bytes:
+    """A figure in the format that the name of its file asks for."""
+    stream = io.BytesIO()
+    figure.savefig(stream, dpi=150, format=path.suffix.lower().lstrip("."))
+    return stream.getvalue()
 
 
 def picture(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Callable[[], Figure]:
@@ -121,12 +151,36 @@ def picture(draw: Callable[[Axes], object], width: float = 9.0, height: float = 
     return build
 
 
-def numbers(text: str, what: str) -> list[int]:
-    """Read "7,12,18" as node numbers."""
+def nodes(text: str, what: str) -> list[str | int]:
+    """Read "7,12,impeller 3" as node numbers and names of stations."""
+    parts = [part.strip() for part in text.split(",")]
+    if not all(parts):
+        raise ValueError(
+            f"{what} takes nodes or names of stations with commas, such as 7,12,18; got {text!r}"
+        )
+    return [int(part) if part.isdecimal() else part for part in parts]
+
+
+def sensors(text: str) -> list[str | int | tuple[str | int, float]]:
+    """Read "2,22:45,probe DE:-30" as nodes with angles in degrees from x, with the rotation; 0 without."""
+    found: list[str | int | tuple[str | int, float]] = []
+    for part in text.split(","):
+        head, colon, tail = part.rpartition(":")
+        angle = _angle(tail) if colon else None
+        (node,) = nodes(part if angle is None else head, "--sensors")
+        found.append(node if angle is None else (node, angle))
+    return found
+
+
+def _angle(text: str) -> float | None:
+    """Degrees; None for what is no number, which belongs to the name of a station."""
     try:
-        return [int(part) for part in text.split(",")]
+        angle = float(text)
     except ValueError:
-        raise ValueError(f"{what} takes node numbers with commas, such as 7,12,18; got {text!r}") from None
+        return None
+    if not -360 <= angle <= 360:
+        raise ValueError(f"--sensors: {text} is no angle from -360 to 360 degrees")
+    return angle
 
 
 def names(text: str | None) -> list[str] | None:
@@ -134,30 +188,60 @@ def names(text: str | None) -> list[str] | None:
     return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
 
 
-_SPEED_UNITS = {"rad_s": 1.0, "rpm": 3.141592653589793 / 30.0, "Hz": 2.0 * 3.141592653589793}
+_SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": 3.141592653589793 / 30.0, "Hz": 2.0 * 3.141592653589793}
 
 
-def speeds(text: str) -> list[float]:
-    """Read speeds: "100:700:50" (first:last:step) or "100,200", rad/s, or with a unit, "1000:6000:50rpm".
+def band(text: str | None) -> tuple[float, float] | None:
+    """Read "9000:10500rpm" as the lowest and highest operating speed in rad/s; None stays None."""
+    if text is None:
+        return None
+    body, factor = _unit(text)
+    try:
+        low, high = (float(part) for part in body.split(":"))
+    except ValueError:
+        low = high = -1.0
+    if not 0 <= low < high < 1e9:
+        raise ValueError(
+            f"--operating {text!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
+        )
+    return low * factor, high * factor
 
-    The last speed of a range is included where the steps meet it.
+
+def _unit(text: str) -> tuple[str, float]:
+    """A text without the unit of speed at its end, and the unit in rad/s."""
+    body = text.strip()
+    for unit, scale in _SPEED_UNITS.items():
+        if body.endswith(unit):
+            return body[: -len(unit)].strip(), scale
+    return body, 1.0
+
+
+def speeds(text: str, unit: str = "rad_s") -> list[float]:
+    """Read speeds, rad/s: "100:700:50" (first:last:step) or "100,200", "1000:6000:50rpm", "20Hz,1500rpm".
+
+    A unit at the end holds for all; or each speed has its own. Without any it is `unit`. The last speed of a
+    range is included where the steps meet it.
     """
     import numpy as np
 
-    body, factor = text.strip(), 1.0
-    for unit, scale in _SPEED_UNITS.items():
-        if body.endswith(unit):
-            body, factor = body[: -len(unit)].strip(), scale
-    example = (
-        "use FIRST:LAST:STEP or a list with commas, in rad/s, or with rpm or Hz at the end (1000:6000:50rpm)"
-    )
-    try:
-        values = [float(v) for v in body.split(":")] if ":" in body else [float(v) for v in body.split(",")]
-    except ValueError:
-        raise ValueError(f"--speeds {text!r} is not a range: {example}") from None
-    if ":" in body:
-        if len(values) != 3 or not np.isfinite(values).all():
-            raise ValueError(f"--speeds {text!r} is not a range: {example}")
+    sign = ":" if ":" in text else ","
+    parts = [_speed(part) for part in text.split(sign)]
+    usual = unit.replace("rad_s", "rad/s")
+    others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual)
+    example = f"use FIRST:LAST:STEP or a list with commas, in {usual}, or with {others} at the end"
+    if any(part is None for part in parts) or (sign == ":" and len(parts) != 3):
+        raise ValueError(f"--speeds {text!r} is not a range: {example}")
+    pairs = [part for part in parts if part is not None]
+    own = [name for _, name in pairs]
+    if any(own[:-1]) and not all(own):
+        raise ValueError(f"--speeds {text!r}: give the unit at every speed, or once at the end")
+    if sign == ":" and len(set(own[:-1]) | {own[-1]} - {""}) > 1 and any(own[:-1]):
+        raise ValueError(f"--speeds {text!r}: a range has one unit")
+    values = [value for value, _ in pairs]
+    factors = [_SPEED_UNITS[name or own[-1] or unit] for name in own]
+    if not np.isfinite(values).all():
+        raise ValueError(f"--speeds {text!r}: speeds must be finite and not negative")
+    if sign == ":":
         first, last, step = values
         if step <= 0 or last < first:
             raise ValueError(
@@ -166,6 +250,17 @@ def speeds(text: str) -> list[float]:
         if (last - first) / step > 1e6:
             raise ValueError(f"--speeds {text!r} has more than a million speeds")
         values = list(first + step * np.arange(int(np.floor((last - first) / step * (1 + 1e-12) + 1e-9)) + 1))
-    if not np.isfinite(values).all() or min(values) < 0:
+        factors = [factors[0]] * len(values)
+    if min(values) < 0:
         raise ValueError(f"--speeds {text!r}: speeds must be finite and not negative")
-    return [float(v) * factor for v in values]
+    return [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+
+
+def _speed(text: str) -> tuple[float, str] | None:
+    """A number and its unit (empty: none), or None."""
+    body = text.strip()
+    unit = next((name for name in _SPEED_UNITS if body.endswith(name)), "")
+    try:
+        return float(body.removesuffix(unit).strip()), unit
+    except ValueError:
+        return None

@@ -2,44 +2,97 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import dataclasses
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rotorid.cli.common import (
     JsonOption,
+    OperatingOption,
     OutputOption,
     PlotOption,
     RotorArgument,
+    band,
     check_targets,
     emit,
     picture,
 )
+from rotorid.cli.progress import busy
+
+if TYPE_CHECKING:
+    from fem import Rotor, SpeedMap
 
 
 def critical(
     rotor: RotorArgument,
     n: Annotated[int, typer.Option("-n", "--number", min=1, help="How many.")] = 3,
+    mesh_check: Annotated[
+        bool, typer.Option("--mesh-check", help="Estimate by refinement how far off the mesh makes each.")
+    ] = False,
+    speed_map: Annotated[
+        bool,
+        typer.Option("--map", help="Critical speeds over the stiffness of the bearings; --plot draws it."),
+    ] = False,
+    operating: OperatingOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
 ) -> None:
-    """Critical speeds and mode shapes of a rotor.
+    """Critical speeds with their whirl directions, and mode shapes.
 
     Example: rotorid critical sample_data/rotor23.csv -n 3 --plot modes.png
+
+    Example: rotorid critical sample_data/compressor/rotor.toml -n 4 --map --plot map.png
     """
     import fem
+    from fem.plots import draw_speed_map
     from rotorid.tables import read_rotor, rotor_files
 
     check_targets(plot, output)
-    modes = fem.critical_speeds(read_rotor(rotor), n)
+    service = band(operating)
+    model = read_rotor(rotor)
+    with busy("critical speeds"):
+        modes = fem.critical_speeds(model, n)
+        mesh = fem.mesh_check(model, n) if mesh_check else None
+        chart = _map(model, n) if speed_map else None
+
+    document: dict[str, Any] = modes.to_dict()
+    if mesh is not None:
+        document["mesh_check"] = mesh.to_dict()
+    if chart is not None:
+        document["map"] = chart.to_dict()
+    parts = [part for part in (modes, mesh, chart) if part is not None]
+
+    def draw(ax: Any) -> object:  # noqa: ANN401
+        if chart is None:
+            return modes.plot(ax)
+        return draw_speed_map(chart.stiffness, chart.speeds, ax, supports=chart.own, operating=service)
 
     emit(
-        modes.to_dict(),
-        modes.summary,
+        document,
+        lambda: "\n\n".join(part.summary() for part in parts),
         as_json=json,
         files=rotor_files(rotor),
-        options={"number": n},
-        figure=(plot, picture(modes.plot)),
-        table=(output, modes.to_frame),
+        options={"number": n, "mesh_check": mesh_check, "map": speed_map, "operating": operating},
+        figure=(plot, picture(draw, 10.0, 6.0 if chart else 5.0)),
+        table=(output, modes.to_frame if chart is None else chart.to_frame),
     )
+
+
+def _map(model: Rotor, n: int) -> SpeedMap:
+    """The map of the bearings, two decades around the stiffness they have.
+
+    What a seal adds is not known when the stiffness of the bearings is chosen: seals are left out.
+    """
+    import numpy as np
+
+    import fem
+
+    bearings = [support for support in model.supports if support.kind == "bearing"]
+    own = np.concatenate(
+        [np.zeros(1), *(b.at(b.speeds or 0.0)[0][..., [0, 1], [0, 1]].ravel() for b in bearings)]
+    )
+    own = own[own > 0]
+    stiffness = np.geomspace(own.min() / 100, own.max() * 100, 49) if own.size else None
+    return fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)

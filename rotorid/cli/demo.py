@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, picture, provenance, save_figure
+from rotorid.cli.common import JsonOption, figure_bytes, picture, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,12 +34,14 @@ def demo(
     from rotorid.reduction import reduce
     from rotorid.samples import sample_data
     from rotorid.tables import read_job, read_rotor
+    from rotorid.tables.writing import write_files
 
     samples = sample_data()
-    (folder / JOB).mkdir(parents=True, exist_ok=True)
     job_files = [f for f in sorted((samples / JOB).iterdir()) if f.suffix in (".csv", ".toml", ".md")]
-    for source in (samples / ROTOR, *job_files):
-        shutil.copyfile(source, folder / source.relative_to(samples))
+    copies = {folder / f.relative_to(samples): f.read_bytes() for f in (samples / ROTOR, *job_files)}
+    _check_folder(folder, samples, copies)
+    (folder / JOB).mkdir(parents=True, exist_ok=True)
+    write_files({path: data for path, data in copies.items() if not path.exists()})
 
     rotor = read_rotor(folder / ROTOR)
     modes = fem.critical_speeds(rotor, 3)
@@ -52,8 +53,7 @@ def demo(
         "reduction.png": picture(small.plot),
         "balance.png": lambda: overview(correction),
     }
-    for name, build in pictures.items():
-        save_figure(build(), folder / name)
+    write_files({folder / name: figure_bytes(build(), folder / name) for name, build in pictures.items()})
 
     if json:
         import json as json_module
@@ -78,3 +78,21 @@ def demo(
         "Pictures:\n" + "\n".join(f"  {folder / name}" for name in pictures),
     ]
     typer.echo("\n\n".join(blocks))
+
+
+def _check_folder(folder: Path, samples: Path, copies: Mapping[Path, bytes]) -> None:
+    """Refuse a folder whose files the demo would overwrite."""
+    remedy = "choose another folder: rotorid demo DIR"
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: this is a file; {remedy}")
+    inside = folder.resolve()
+    if (
+        samples.resolve() in (inside, *inside.parents)
+        or (folder / JOB).resolve() == (samples / JOB).resolve()
+    ):
+        raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
+    changed = [str(p) for p, data in copies.items() if p.exists() and (p.is_dir() or p.read_bytes() != data)]
+    if changed:
+        raise ValueError(
+            f"{', '.join(changed)}: differs from the sample and would be overwritten; delete it, or {remedy}"
+        )

@@ -13,14 +13,14 @@ from rotorid.cli.common import (
     RotorArgument,
     check_targets,
     emit,
-    numbers,
     picture,
 )
+from rotorid.cli.common import nodes as parse_nodes
 
 
 def reduce(
     rotor: RotorArgument,
-    nodes: Annotated[str, typer.Option(help="Where the masses stand, such as 7,12,18.")],
+    nodes: Annotated[str, typer.Option(help="Where the masses stand: nodes or stations, 7,12,18.")],
     modes: Annotated[int, typer.Option(min=1, help="How many modes of the rotor the regression uses.")] = 2,
     json: JsonOption = False,
     plot: PlotOption = None,
@@ -34,7 +34,8 @@ def reduce(
     from rotorid.tables import read_rotor, rotor_files
 
     check_targets(plot, output)
-    result = reduce_rotor(read_rotor(rotor), numbers(nodes, "--nodes"), modes)
+    model = read_rotor(rotor)
+    result = reduce_rotor(model, [model.node(node) for node in parse_nodes(nodes, "--nodes")], modes)
     emit(
         result.to_dict(),
         result.summary,

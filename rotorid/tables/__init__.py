@@ -10,7 +10,9 @@ from rotorid.tables.job import Job, job_from_files, read_job
 from rotorid.tables.problems import InputError, Problem, TableWarning
 from rotorid.tables.rotor import read_rotor
 from rotorid.tables.rotorfile import rotor_files
+from rotorid.tables.rotorwriting import write_rotor
 from rotorid.tables.trials import read_trials
+from rotorid.tables.unbalance import read_unbalance
 from rotorid.tables.writing import write_table
 
 __all__ = [
@@ -26,7 +28,9 @@ __all__ = [
     "read_job",
     "read_rotor",
     "read_trials",
+    "read_unbalance",
     "rotor_files",
     "write_influence",
+    "write_rotor",
     "write_table",
 ]

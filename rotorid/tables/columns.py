@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorid.tables.grid import BadCell, Cell, Grid, make_grid, show
-from rotorid.tables.number import NotANumber, has_decimal_comma, parse_number
+from rotorid.tables.number import NotANumber, check_size, decimal_comma, parse_number
 from rotorid.tables.problems import Problems, listing, suggest
 from rotorid.tables.sheet import is_workbook, pick_sheet, read_workbook
 from rotorid.tables.textfile import decode, parse_text, read_bytes
@@ -126,7 +126,13 @@ class Table:
 
 
 def read_table(
-    path: str | Path, sheet: str, columns: Sequence[Column], problems: Problems, *, first: bool = False
+    path: str | Path,
+    sheet: str,
+    columns: Sequence[Column],
+    problems: Problems,
+    *,
+    first: bool = False,
+    may_be_empty: bool = False,
 ) -> Table | None:
     """Read a table from a text file or a workbook.
 
@@ -140,17 +146,21 @@ def read_table(
         What the table may contain; every other column is a problem.
     problems
         Collects the complaints.
+    may_be_empty
+        Whether a header without rows says something.
 
     Returns
     -------
     Table or None
         None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
     """
-    grid = read_grid(Path(path), sheet, problems, first=first)
+    grid = read_grid(Path(path), sheet, problems, first=first, may_be_empty=may_be_empty)
     return None if grid is None else make_table(grid, columns, problems)
 
 
-def read_grid(path: Path, sheet: str, problems: Problems, *, first: bool = False) -> Grid | None:
+def read_grid(
+    path: Path, sheet: str, problems: Problems, *, first: bool = False, may_be_empty: bool = False
+) -> Grid | None:
     """The cells of a text file or of a sheet."""
     if is_workbook(path):
         sheets = read_workbook(path, problems)
@@ -158,10 +168,10 @@ def read_grid(path: Path, sheet: str, problems: Problems, *, first: bool = False
         if chosen is None:
             return None
         title, rows = chosen
-        return make_grid(sheet_source(path, title), rows, "", problems)
+        return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
-    return None if text is None else parse_text(str(path), text, problems)
+    return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
 
 
 def sheet_source(path: Path, title: str) -> str:
@@ -171,15 +181,20 @@ def sheet_source(path: Path, title: str) -> str:
 
 def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
     """Give the columns of a grid their meaning; every complaint goes to `problems`."""
-    before = len(problems)
+    if not any(_column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
+        _complain_about_header(grid, columns, problems)
+        return None
     found = _match(grid, columns, problems)
-    if found or len(problems) != before + 1:
-        _complain_about_missing(grid, columns, found, problems)
-    comma = grid.separator == ";" and any(
-        isinstance(cells[index], str) and has_decimal_comma(str(cells[index]))
-        for index, column, _ in found.values()
-        if column.unit is not None
-        for _, cells in grid.rows
+    _complain_about_missing(grid, columns, found, problems)
+    comma = decimal_comma(
+        (
+            cell
+            for index, column, _ in found.values()
+            if column.unit is not None
+            for cell in (cells[index] for _, cells in grid.rows)
+            if isinstance(cell, str) and "," in cell
+        ),
+        grid.separator,
     )
     fields = {
         stem: _field(grid, index, column, unit, problems, comma=comma)
@@ -197,11 +212,6 @@ _Match = tuple[int, Column, Unit | None]
 def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[str, _Match]:
     """Which column of the grid is which; problems for unknown, repeated and wrongly named ones."""
     found: dict[str, _Match] = {}
-    if not any(_column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
-        expected = f"a header row with the names of columns, separated by , or ; or tabs: {_known(columns)}"
-        shown = (grid.separator or " ").join(grid.header)
-        problems.add(grid.source, grid.header_row, None, shown, expected)
-        return found
     for index, name in enumerate(grid.header):
         if not name or name.casefold().startswith(REMARKS):
             continue
@@ -226,6 +236,29 @@ def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[st
             continue
         found[column.stem] = (index, column, unit)
     return found
+
+
+def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
+    expected = f"a header row with the names of columns, separated by , or ; or tabs: {_known(columns)}"
+    shown = (grid.separator or " ").join(name for name in grid.header if name)
+    later = _header_below(grid, columns)
+    if later is not None:
+        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+        expected = (
+            f"the header in the first row, and it seems to be row {later}: "
+            "delete what stands above it, or begin those rows with #"
+        )
+    problems.add(grid.source, grid.header_row, None, shown, expected)
+
+
+def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
+    """The row that names most of the required columns, if it is not the first one."""
+    needed = {column.stem for column in columns if column.required}
+    for number, cells in grid.first_rows[1:]:
+        names = [_column_of(show(cell), columns) for cell in cells]
+        if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
+            return number
+    return None
 
 
 def _column_of(name: str, columns: Sequence[Column]) -> Column | None:
@@ -273,26 +306,31 @@ def _field(
     cells = tuple(row[index] for _, row in grid.rows)
     name = grid.header[index]
     numbers = np.full(len(cells), math.nan)
-    texts: list[str] = []
-    for place, (number, cell) in enumerate(zip((n for n, _ in grid.rows), cells, strict=True)):
-        text = ""
-        try:
-            if cell == "" and column.blank:
-                pass
-            elif isinstance(cell, BadCell):
-                raise NotANumber(cell.expected)
-            elif unit is None:
-                text = _name(show(cell))
-            else:
-                numbers[place] = _number(cell, unit, grid.separator, comma=comma)
-        except NotANumber as error:
-            problems.add(grid.source, number, name, show(cell), str(error))
-        texts.append(text)
+    texts = [""] * len(cells)
+    # most cells of a long table say what another one has said
+    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    for place, cell in enumerate(cells):
+        if cell not in known:
+            try:
+                if isinstance(cell, BadCell):
+                    raise NotANumber(cell.expected)
+                known[cell] = (
+                    _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
+                )
+            except NotANumber as error:
+                problems.add(grid.source, grid.rows[place][0], name, show(cell), str(error))
+                continue
+        value = known[cell]
+        if isinstance(value, str):
+            texts[place] = value
+        else:
+            numbers[place] = value
     return Field(name, unit, cells, numbers, tuple(texts))
 
 
 def _number(cell: str | float, unit: Unit, separator: str, *, comma: bool) -> float:
     written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
+    check_size(written)
     value = unit.to_si(written)
     if unit is _UNCLEAR:
         return math.nan
@@ -317,6 +355,6 @@ def must_be(
     """Complain about every number of a column that is not allowed (unreadable cells have been reported)."""
     if stem not in table:
         return
-    for index, good in enumerate(allowed):
-        if not good and not math.isnan(table.numbers(stem)[index]):
-            table.complain(problems, index, stem, expected)
+    bad = ~np.fromiter(allowed, dtype=bool, count=len(table)) & ~np.isnan(table.numbers(stem))
+    for index in np.flatnonzero(bad):
+        table.complain(problems, int(index), stem, expected)

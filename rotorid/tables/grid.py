@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from rotorid.tables.problems import Problems
 
+LOOKED_AT = 10
+"""A header that is not the first row stands among so many."""
+
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}
 
 
@@ -43,6 +46,8 @@ class Grid:
         Comment lines without `#`.
     complete
         False where a line could not be split into cells, so that nothing can be said about missing rows.
+    first_rows
+        The first rows as they stood, the header among them, to find a header that is not the first row.
     """
 
     source: str
@@ -52,10 +57,13 @@ class Grid:
     separator: str = ""
     comments: tuple[str, ...] = ()
     complete: bool = True
+    first_rows: tuple[Row, ...] = ()
 
 
 def clean(text: str) -> str:
     """Text without what spreadsheets leave around it: blanks of all kinds, byte-order marks."""
+    if text.isascii():
+        return text.strip()
     return unicodedata.normalize("NFC", text.translate(_SPACES).strip())
 
 
@@ -69,9 +77,24 @@ def show(cell: Cell) -> str:
 
 
 def make_grid(
-    source: str, rows: Iterable[Row], separator: str, problems: Problems, *, complete: bool = True
+    source: str,
+    rows: Iterable[Row],
+    separator: str,
+    problems: Problems,
+    *,
+    complete: bool = True,
+    may_be_empty: bool = False,
 ) -> Grid | None:
     """Find the header, drop comments, blank lines and empty trailing columns; complain about the rest.
+
+    Parameters
+    ----------
+    source, rows, separator, complete
+        As in `Grid`.
+    problems
+        Collects the complaints.
+    may_be_empty
+        Whether a header without rows says something (a weights table: nothing was mounted).
 
     Returns
     -------
@@ -81,10 +104,10 @@ def make_grid(
     comments: list[str] = []
     filled: list[Row] = []
     for number, cells in rows:
-        first = show(cells[0]) if cells else ""
-        if first.startswith("#") and not isinstance(cells[0], BadCell):
+        first = cells[0] if cells else ""
+        if isinstance(first, str) and first.startswith("#"):
             comments.append(_comment(cells, separator))
-        elif any(show(cell) for cell in cells):
+        elif not all(cell == "" for cell in cells):
             filled.append((number, cells))
     if not filled:
         if complete:
@@ -95,12 +118,13 @@ def make_grid(
     while header and not header[-1]:
         header.pop()
     body = [_fit(source, header, row, separator, problems) for row in filled[1:]]
-    if not body and complete:
-        problems.add(source, header_row, None, None, "rows below the header; there are none")
-    if not body:
+    if not body and not may_be_empty:
+        if complete:
+            problems.add(source, header_row, None, None, "rows below the header; there are none")
         return None
     _complain_about_nameless(source, header_row, header, body, problems)
-    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete)
+    top = tuple(filled[:LOOKED_AT])
+    return Grid(source, header_row, tuple(header), tuple(body), separator, tuple(comments), complete, top)
 
 
 def _comment(cells: tuple[Cell, ...], separator: str) -> str:
@@ -114,12 +138,20 @@ def _fit(source: str, header: list[str], row: Row, separator: str, problems: Pro
     """Bring a row to the header's width; a spreadsheet may leave blanks out at the end, or add some."""
     number, cells = row
     width = len(header)
+    if len(cells) == width:
+        return row
     if any(show(cell) for cell in cells[width:]):
         hint = "; numbers with a decimal comma need ; between the columns" if separator == "," else ""
         found = len(cells)
         while not show(cells[found - 1]):
             found -= 1
-        problems.add(source, number, None, f"{found} cells", f"{width} cells, as in the header{hint}")
+        problems.add(
+            source,
+            number,
+            None,
+            f"{found} cells",
+            f"{width} cell{'s' if width > 1 else ''}, as in the header{hint}",
+        )
     return number, (cells + ("",) * width)[:width]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.trials import Trials
+from fem.sensors import label
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, read_table
 from rotorid.tables.conventions import ANGLES, FULL_TURN, PHASES, Angles, Phase, as_angles, as_phase, polar
@@ -20,17 +21,34 @@ from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.runs import PHASE, SPEED
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.units import Unit, UnitError
-from rotorid.tables.writing import write_table
+from rotorid.tables.writing import table_bytes, write_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
-_CONVENTION = re.compile(r"(phase|angles)\s*[:=]\s*[\"']?(.*?)[\"']?")
+    from fem.sensors import SensorLike
+
+_CONVENTION = re.compile(r"(phase|angle)s?\b\s*([:=]|\bis\b|\bare\b)?\s*[\"']?(.*?)[\"']?\.?", re.IGNORECASE)
+_LIKELY = {
+    "phase": re.compile(r"\bphases?\b.*\b(lead|lag)|\b(lead|lag).*\bphases?\b", re.IGNORECASE),
+    "angles": re.compile(
+        r"\bangles?\b.*\b(with|against)\b|\b(against|with) (the )?rotation\b", re.IGNORECASE
+    ),
+}
+PHASE_MEANING = "phase_deg is the phase reading that a weight at angle 0 causes"
+_GAPS_NAMED = 100
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
 )
+
+
+class Stored(NamedTuple):
+    """Stored coefficients, and what their table itself says about its conventions (`phase`, `angles`)."""
+
+    influence: Influence
+    said: Mapping[str, str]
 
 
 class Coefficients(Protocol):
@@ -41,8 +59,8 @@ class Coefficients(Protocol):
         """rad/s, shape (S,)."""
 
     @property
-    def sensors(self) -> Sequence[str | int]:
-        """Names or nodes, length C."""
+    def sensors(self) -> Sequence[SensorLike]:
+        """Names or nodes, those of a rotor model with their angles, length C."""
 
     @property
     def planes(self) -> Sequence[str | int]:
@@ -102,15 +120,15 @@ def read_influence(
         With all problems of the file.
     """
     problems = Problems()
-    influence = load_influence(Path(path), phase, angles, problems)
+    stored = load_influence(Path(path), phase, angles, problems)
     problems.stop()
-    assert influence is not None
-    return influence
+    assert stored is not None
+    return stored.influence
 
 
 def load_influence(
     path: Path, phase: Phase | None, angles: Angles | None, problems: Problems
-) -> Influence | None:
+) -> Stored | None:
     """As `read_influence`, or None and problems."""
     before = len(problems)
     table = read_table(path, "influence", COLUMNS, problems)
@@ -125,11 +143,12 @@ def load_influence(
     sensors = tuple(dict.fromkeys(name for name in sensor if name))
     planes = tuple(dict.fromkeys(name for name in plane if name))
     speeds = sorted({float(value) for value in speed if value > 0})
+    at = [{value: k for k, value in enumerate(values)} for values in (speeds, sensors, planes)]
     seen: dict[tuple[int, int, int], int] = {}
     for i in range(len(table)):
         if not (sensor[i] and plane[i] and speed[i] > 0):
             continue
-        key = (speeds.index(float(speed[i])), sensors.index(sensor[i]), planes.index(plane[i]))
+        key = (at[0][float(speed[i])], at[1][sensor[i]], at[2][plane[i]])
         if key in seen:
             expected = (
                 f"one coefficient per speed, sensor and plane (row {table.rows[seen[key]]} has the same)"
@@ -138,10 +157,13 @@ def load_influence(
         seen.setdefault(key, i)
     if len(problems) > before:
         return None
-    for s, c, p in np.ndindex(len(speeds), len(sensors), len(planes)):
+    complete = len(seen) == len(speeds) * len(sensors) * len(planes)
+    for s, c, p in () if complete else np.ndindex(len(speeds), len(sensors), len(planes)):
+        if len(problems) > before + _GAPS_NAMED:
+            break
         if (s, c, p) not in seen:
-            at = show_speed(speeds[s], table.unit("speed"))
-            expected = f"a coefficient of sensor {sensors[c]!r} and plane {planes[p]!r} at {at}"
+            shown = show_speed(speeds[s], table.unit("speed"))
+            expected = f"a coefficient of sensor {sensors[c]!r} and plane {planes[p]!r} at {shown}"
             problems.add(table.source, None, "plane", None, expected)
     if len(problems) > before:
         return None
@@ -159,17 +181,25 @@ def load_influence(
         phase=phase or as_phase(said.get("phase", "lead")),
         angles=angles or as_angles(said.get("angles", "with rotation")),
     )
-    return Influence(speeds=np.array(speeds), sensors=sensors, planes=planes, W=W, labels=labels)
+    influence = Influence(speeds=np.array(speeds), sensors=sensors, planes=planes, W=W, labels=labels)
+    return Stored(influence, said)
 
 
 def _conventions(table: Table, problems: Problems) -> dict[str, str]:
-    """What comment lines of the table say about its conventions."""
+    """What comment lines of the table say about its conventions.
+
+    Capitals and the sign between do not matter; a comment that seems to state a convention in other words is
+    a problem, because passing over it would turn the weights round.
+    """
     said: dict[str, str] = {}
     for comment in table.comments:
         match = _CONVENTION.fullmatch(comment)
-        if match is None:
+        word, sign = (" ".join(match[3].casefold().split()), match[2]) if match else ("", None)
+        key = {"phase": "phase", "angle": "angles"}.get(match[1].casefold() if match else "", "")
+        likely = key if sign else next((k for k, words in _LIKELY.items() if words.search(comment)), "")
+        if comment == PHASE_MEANING or not (likely or word in (*PHASES, *ANGLES)):
             continue
-        key, word = match.groups()
+        key = key or likely
         allowed = PHASES if key == "phase" else ANGLES
         if word not in allowed or said.get(key, word) != word:
             expected = f"# {key} = {listing(allowed)}, once{did_you_mean(word, allowed)}"
@@ -203,7 +233,7 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
     return pd.DataFrame(
         {
             "speed_rad_s": np.repeat(np.asarray(coefficients.speeds, dtype=float), C * P),
-            "sensor": [str(name) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
+            "sensor": [str(label(name)) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
             "plane": [str(name) for _ in range(S * C) for name in coefficients.planes],
             f"influence_{above}per_{labels.weight_unit}": size.ravel(),
             "phase_deg": phase.ravel(),
@@ -225,13 +255,18 @@ def write_influence(path: str | Path, influence: Coefficients) -> None:
     InputError
         If the file cannot be written; nothing half written is left.
     """
+    write_bytes(Path(path), influence_bytes(path, influence))
+
+
+def influence_bytes(path: str | Path, influence: Coefficients) -> bytes:
+    """What `write_influence` writes."""
     labels = labels_of(influence)
     comments = (
         f"phase = {labels.phase}",
         f"angles = {labels.angles}",
-        "phase_deg is the phase reading that a weight at angle 0 causes",
+        PHASE_MEANING,
     )
-    write_table(path, influence_frame(influence, labels), comments=comments, sheet="influence")
+    return table_bytes(path, influence_frame(influence, labels), comments=comments, sheet="influence")
 
 
 def fit_to_readings(
@@ -280,11 +315,10 @@ def fit_to_readings(
             problems.add(source, None, "plane", None, expected + did_you_mean(plane, influence.planes))
     if len(problems):
         return None
-    labels = replace(
-        ours,
-        weight_unit=ours.weight_unit if trials.planes else theirs.weight_unit,
-        weight_scale=ours.weight_scale if trials.planes else theirs.weight_scale,
-    )
+    unit = units.weight(ours.weight_unit if trials.planes else theirs.weight_unit)
+    if not trials.planes and unit.name == "kg_m":
+        unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
+    labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
     return replace(
         influence,
         speeds=trials.speeds,

@@ -13,13 +13,15 @@ from rotorid.tables.conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
     PHASES,
+    Angles,
     Conventions,
+    Phase,
     StatedErrors,
     as_angles,
     as_phase,
 )
 from rotorid.tables.grid import Grid
-from rotorid.tables.influence import fit_to_readings, load_influence
+from rotorid.tables.influence import Stored, fit_to_readings, load_influence
 from rotorid.tables.jobbook import read_job_book
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.sheet import is_workbook
@@ -66,9 +68,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a job's settings say, before its tables are read."""
+    """What a job's settings say, before its tables are read; conventions that nobody states are None."""
 
-    conventions: Conventions
+    phase: Phase | None
+    angles: Angles | None
+    speed_tolerance_percent: float
     errors: StatedErrors | None
 
 
@@ -105,9 +109,10 @@ def read_job(
     problems = Problems()
     overrides = _Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
     if is_workbook(path):
-        book = read_job_book(path, problems)
-        problems.stop()
-        assert book is not None
+        book = read_job_book(path, {"planes": PLANES_LATER, "sensors": SENSORS_LATER}, problems)
+        if book is None:
+            problems.stop()
+            raise AssertionError
         top = Section(str(path), book.settings, problems, where=book.where)
         runs: Path | Grid | None = book.runs
         weights: Path | Grid | None = book.weights
@@ -130,10 +135,10 @@ def read_job(
     influence = _file(top, "influence", path)
     if weights is None and "weights" not in top and "influence" not in top:
         top.missing("weights", "a weights table, or an influence table of stored coefficients")
-    settings = _settings(top, overrides)
+    settings = _settings(top, overrides, problems)
     planes, sensors = _named(top, "planes", PLANES_LATER), _named(top, "sensors", SENSORS_LATER)
     top.finish()
-    if settings is None or runs is None:
+    if runs is None:
         problems.stop()
         raise AssertionError
     job = _assemble(path, runs, weights, influence, settings, problems)
@@ -186,8 +191,12 @@ def job_from_files(
     problems = Problems()
     paths = [Path(file) for file in files]
     overrides = _Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
-    conventions = Conventions(as_phase(phase or "lead"), as_angles(angles or "with rotation"))
-    settings = Settings(conventions, overrides.errors(None))
+    settings = Settings(
+        as_phase(phase) if phase else None,
+        as_angles(angles) if angles else None,
+        DEFAULT_TOLERANCE,
+        overrides.errors(None),
+    )
     stored = None if influence is None else Path(influence)
     job = _assemble(None, paths[0], paths[1] if len(paths) == 2 else None, stored, settings, problems)
     problems.stop()
@@ -222,30 +231,43 @@ class _Overrides:
 
 def _file(top: Section, key: str, job: Path) -> Path | None:
     name = top.text(key)
-    return None if name is None else job.parent / name
+    if name is None:
+        return None
+    if not name.isprintable():
+        expected = (
+            "the name of a file, without control characters: in double quotes TOML takes \\ for the "
+            "beginning of one; write / in its place, or put the name in single quotes"
+        )
+        top.complain(key, expected)
+        return None
+    return job.parent / name
 
 
-def _settings(top: Section, overrides: _Overrides) -> Settings | None:
-    phase = top.choice("phase", PHASES, "lead")
-    angles = top.choice("angles", ANGLES, "with rotation")
+def _settings(top: Section, overrides: _Overrides, problems: Problems) -> Settings:
+    phase = top.choice("phase", PHASES, "")
+    angles = top.choice("angles", ANGLES, "")
     tolerance = top.number("speed_tolerance_percent", DEFAULT_TOLERANCE, low=0.0, high=LARGEST_TOLERANCE)
-    errors = _errors(top)
+    errors = _errors(top, problems)
     top.later(*JOB_LATER)
-    conventions = Conventions(
-        as_phase(overrides.phase or phase),
-        as_angles(overrides.angles or angles),
+    phase, angles = overrides.phase or phase, overrides.angles or angles
+    return Settings(
+        as_phase(phase) if phase else None,
+        as_angles(angles) if angles else None,
         DEFAULT_TOLERANCE if tolerance is None else tolerance,
+        overrides.errors(errors),
     )
-    return Settings(conventions, overrides.errors(errors))
 
 
-def _errors(top: Section) -> StatedErrors | None:
+def _errors(top: Section, problems: Problems) -> StatedErrors | None:
     section = top.section("errors")
     if section is None:
         return None
+    before = len(problems)
     values = {key: section.number(key, low=0.0) for key in ("amplitude_percent", "phase_deg", "floor")}
     section.finish()
     given = {key: value for key, value in values.items() if value is not None}
+    if len(problems) > before:
+        return None
     if not any(given.values()):
         expected = (
             "an error above 0 (amplitude_percent, phase_deg or floor); leave [errors] out if it is unknown"
@@ -280,19 +302,48 @@ def _assemble(
     settings: Settings,
     problems: Problems,
 ) -> Job | None:
-    conventions = settings.conventions
+    found = None
+    if stored is not None:
+        found = load_influence(stored, settings.phase, settings.angles, problems)
+    conventions, notes = _conventions(settings, stored, found)
     trials = make_trials(runs, weights, conventions, settings.errors, problems)
     influence = None
-    if stored is not None:
-        influence = load_influence(stored, conventions.phase, conventions.angles, problems)
-        if influence is not None and trials is not None:
-            tolerance = conventions.speed_tolerance_percent
-            influence = fit_to_readings(influence, trials, tolerance, str(stored), problems)
-        if influence is not None and trials is not None and weights is None:
-            ours = influence.labels
-            labels = replace(trials.labels, weight_unit=ours.weight_unit, weight_scale=ours.weight_scale)
-            trials = replace(trials, labels=labels)
+    if found is not None and trials is not None:
+        tolerance = conventions.speed_tolerance_percent
+        influence = fit_to_readings(found.influence, trials, tolerance, str(stored), problems)
+    if influence is not None and trials is not None:
+        trials = replace(trials, labels=influence.labels)
     if trials is None or len(problems):
         return None
+    trials = replace(trials, warnings=notes + trials.warnings)
     read = (job, runs, weights, stored)
     return Job(trials, influence, conventions, tuple(file for file in read if isinstance(file, Path)))
+
+
+def _conventions(
+    settings: Settings, stored: Path | None, found: Stored | None
+) -> tuple[Conventions, tuple[str, ...]]:
+    """Conventions of the readings and weights: stated ones, else those of stored coefficients; and notes."""
+    said = {} if found is None else found.said
+    phase = settings.phase or as_phase(said.get("phase", "lead"))
+    angles = settings.angles or as_angles(said.get("angles", "with rotation"))
+    notes = []
+    adopted = [
+        words
+        for words, own, used, usual in (
+            (f"phase = {phase}", settings.phase, phase, "lead"),
+            (f"angles {angles}", settings.angles, angles, "with rotation"),
+        )
+        if own is None and used != usual
+    ]
+    if adopted:
+        notes.append(
+            f"nothing states the conventions of the readings: those of {stored} are used for them too, "
+            f"{' and '.join(adopted)}"
+        )
+    if settings.phase and said.get("phase", settings.phase) != settings.phase:
+        notes.append(
+            f"the readings are taken with phase = {settings.phase}, as stated, and the coefficients with "
+            f"phase = {said['phase']}, as {stored} says"
+        )
+    return Conventions(phase, angles, settings.speed_tolerance_percent), tuple(notes)

@@ -35,8 +35,18 @@ class JobBook:
     where: Mapping[str, tuple[str, int, str]]
 
 
-def read_job_book(path: Path, problems: Problems) -> JobBook | None:
-    """Read a job's workbook, or None and problems."""
+def read_job_book(path: Path, columns: Mapping[str, tuple[str, ...]], problems: Problems) -> JobBook | None:
+    """Read a job's workbook, or None and problems.
+
+    Parameters
+    ----------
+    path
+        The workbook.
+    columns
+        Further columns that the sheets planes and sensors may have.
+    problems
+        Collects the complaints.
+    """
     sheets = read_workbook(path, problems)
     if sheets is None:
         return None
@@ -44,9 +54,10 @@ def read_job_book(path: Path, problems: Problems) -> JobBook | None:
     grids: dict[str, Grid | None] = {}
     for name in SHEETS:
         title = find_sheet(sheets, name)
-        # Beside runs and weights a sheet that was only prepared may stay empty.
-        if title is not None and (name in SHEETS[:2] or _holds_rows(sheets[title])):
-            grids[name] = make_grid(sheet_source(path, title), sheets[title], "", problems)
+        # Beside runs and weights a sheet that was only prepared may stay empty, or hold its header alone.
+        if title is not None and (name in SHEETS[:2] or _holds_cells(sheets[title])):
+            source, rows = sheet_source(path, title), sheets[title]
+            grids[name] = make_grid(source, rows, "", problems, may_be_empty=name != "runs")
     settings: dict[str, Any] = {}
     where: dict[str, tuple[str, int, str]] = {}
     if grids.get("settings"):
@@ -54,6 +65,7 @@ def read_job_book(path: Path, problems: Problems) -> JobBook | None:
     for name, key in (("planes", "plane"), ("sensors", "sensor")):
         if grids.get(name):
             _read_named(grids[name], name, key, settings, where, problems)
+            _check_prepared(grids[name], (key, *columns.get(name, ())), problems)
     if "runs" not in grids:
         titles = listing((repr(title) for title in sheets), "and")
         problems.add(str(path), None, None, None, f"a sheet 'runs'; the sheets are {titles}")
@@ -61,8 +73,18 @@ def read_job_book(path: Path, problems: Problems) -> JobBook | None:
     return None if runs is None else JobBook(runs, grids.get("weights"), settings, where)
 
 
-def _holds_rows(rows: list[Row]) -> bool:
-    return sum(any(show(cell) for cell in cells) for _, cells in rows) > 1
+def _holds_cells(rows: list[Row]) -> bool:
+    return any(show(cell) for _, cells in rows for cell in cells)
+
+
+def _check_prepared(grid: Grid | None, known: tuple[str, ...], problems: Problems) -> None:
+    """Where there are no rows, whose settings would be checked, check the header itself."""
+    if grid is None or grid.rows or known[0] not in grid.header:
+        return
+    for name in grid.header:
+        if name and name not in known and not name.casefold().startswith(REMARKS):
+            expected = f"a known column{did_you_mean(name, known)}; known are {listing(known, 'and')}"
+            problems.add(grid.source, grid.header_row, name, name, expected)
 
 
 def _complain_about_sheets(path: Path, sheets: dict[str, list[Row]], problems: Problems) -> None:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
 _POINT = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[ ,.'’][0-9]{3})+(?:[.,][0-9]*)?")
 _WITH_UNIT = re.compile(r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]|[°%µμ]).*")
 _NOT_FINITE = {"nan", "inf", "infinity", "-nan", "ind", "1.#qnan", "1.#inf", "-1.#ind", "1.#ind", "-1.#inf"}
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes outside occur in no table of this project, but squares of them overflow."""
+
 _MISSING = {"na", "n/a", "#n/a", "null", "none", "-", "--", "?"}
 
 
@@ -20,6 +25,34 @@ class NotANumber(ValueError):
 def has_decimal_comma(text: str) -> bool:
     """Whether the text is a number written with a decimal comma."""
     return _COMMA.fullmatch(text) is not None
+
+
+def decimal_comma(cells: Iterable[str], separator: str) -> bool:
+    """Whether the numbers of a file have decimal commas.
+
+    Between semicolons a comma can be nothing else. Between tabs and in a sheet it may also separate
+    thousands: there at least one number must show that it does not (1,5 or 1500,000).
+    """
+    if separator == ",":
+        return False
+    return any(
+        has_decimal_comma(cell) and (separator == ";" or _MAYBE_THOUSANDS.fullmatch(cell) is None)
+        for cell in cells
+    )
+
+
+def check_size(value: float) -> None:
+    """Refuse a number that no instrument shows.
+
+    Raises
+    ------
+    NotANumber
+        For one that is not finite, or not zero and outside 1e-30 … 1e30.
+    """
+    if not math.isfinite(value):
+        raise NotANumber("a finite number")
+    if value and not SMALLEST <= abs(value) <= LARGEST:
+        raise NotANumber(f"0 or a number between {SMALLEST:g} and {LARGEST:g} in size")
 
 
 def parse_number(text: str, *, comma: bool = False, separator: str = "") -> float:
@@ -60,10 +93,14 @@ def _finite(text: str) -> float:
 
 
 def _why_no_comma(separator: str) -> str:
-    where = {",": "comma-separated", "\t": "tab-separated"}.get(separator)
-    if where is None:
-        return "a number; the cell holds text, with a comma"
-    return f"a number with a decimal point: in a {where} file a comma is not a decimal sign (separate by ;)"
+    if separator == ",":
+        return (
+            "a number with a decimal point: in a comma-separated file a comma is not a decimal sign "
+            "(separate by ;)"
+        )
+    if separator == "\t":
+        return "a number with a decimal point: this comma may separate thousands (or separate columns by ;)"
+    return "a number; the cell holds text, whose comma may separate thousands"
 
 
 def _reason(text: str) -> str:

@@ -7,6 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 LONGEST_VALUE = 60
+FEW = 3
+"""So many equal complaints about a column stand alone; more share a line."""
+MOST_LINES = 20
+"""Of one message; a whole column in a wrong format needs no more."""
+MOST_NAMES = 40
 
 
 @dataclass(frozen=True)
@@ -34,27 +39,24 @@ class Problem:
     expected: str
 
     def __str__(self) -> str:
-        place = [self.file]
-        if self.row is not None:
-            place.append(f"row {self.row}")
-        if self.column is not None:
-            place.append(f"{'key' if self.file.endswith('.toml') else 'column'} {self.column}")
-        found = "" if self.value is None else f"found {quote(self.value)}, "
-        return f"{', '.join(place)}: {found}expected {self.expected}"
+        rows = "" if self.row is None else f"row {self.row}"
+        return _line(self, rows, () if self.value is None else (quote(self.value),))
 
 
 class InputError(ValueError):
-    """A file that cannot be used; the message lists all its problems, one line each.
+    """A file that cannot be used; the message lists its problems.
+
+    Equal complaints about many rows of a column share a line, and a long list ends with a count.
 
     Attributes
     ----------
     problems
-        The `Problem`s, in the order of the message.
+        All the `Problem`s, in the order of the message.
     """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
-        super().__init__("\n".join(str(problem) for problem in self.problems))
+        super().__init__(_message(self.problems))
 
 
 class TableWarning(UserWarning):
@@ -74,6 +76,10 @@ class Problems:
     def __len__(self) -> int:
         return len(self._items)
 
+    def withdraw(self, file: str) -> None:
+        """Forget what was noted about a file: a better explanation follows."""
+        self._items = [problem for problem in self._items if problem.file != file]
+
     def of(self, file: str) -> list[Problem]:
         """Problems of one file so far."""
         return [problem for problem in self._items if problem.file == file]
@@ -83,8 +89,60 @@ class Problems:
         if not self._items:
             return
         files = list(dict.fromkeys(problem.file for problem in self._items))
+        place = {file: number for number, file in enumerate(files)}
         unique = dict.fromkeys(self._items)
-        raise InputError(sorted(unique, key=lambda problem: (files.index(problem.file), problem.row or 0)))
+        raise InputError(sorted(unique, key=lambda problem: (place[problem.file], problem.row or 0)))
+
+
+def _message(problems: tuple[Problem, ...]) -> str:
+    groups: dict[tuple[str, str | None, str], list[Problem]] = {}
+    for problem in problems:
+        groups.setdefault((problem.file, problem.column, problem.expected), []).append(problem)
+    lines: list[str] = []
+    told = 0
+    for group in groups.values():
+        if len(lines) >= MOST_LINES:
+            break
+        if len(group) <= FEW or any(problem.row is None for problem in group):
+            shown = group[: MOST_LINES - len(lines)]
+            lines += map(str, shown)
+            told += len(shown)
+            continue
+        values = tuple(dict.fromkeys(quote(p.value) for p in group if p.value is not None))
+        lines.append(_line(group[0], _ranges([p.row for p in group if p.row is not None]), values))
+        told += len(group)
+    if told < len(problems):
+        lines.append(f"and {len(problems) - told} more problems")
+    return "\n".join(lines)
+
+
+def _line(problem: Problem, rows: str, values: tuple[str, ...]) -> str:
+    place = [printable(problem.file), *([rows] if rows else [])]
+    if problem.column is not None:
+        what = "key" if problem.file.endswith(".toml") else "column"
+        place.append(f"{what} {printable(problem.column)}")
+    found = ""
+    if values:
+        found = f"found {', '.join(values[:FEW])}{' and so on' if len(values) > FEW else ''}, "
+    return f"{', '.join(place)}: {found}expected {problem.expected}"
+
+
+def _ranges(rows: list[int]) -> str:
+    """`rows 2–5, 8`, where there are many of them their number and the first few."""
+    spans: list[list[int]] = []
+    for row in sorted(set(rows)):
+        if spans and row == spans[-1][1] + 1:
+            spans[-1][1] = row
+        else:
+            spans.append([row, row])
+    words = [f"{a}" if a == b else f"{a}–{b}" for a, b in spans[: FEW + 1]]
+    more = f" and others ({len(rows)} in all)" if len(spans) > FEW + 1 else ""
+    return f"rows {', '.join(words)}{more}"
+
+
+def printable(text: str) -> str:
+    """Text for a message, with control characters written as escapes."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def quote(value: str) -> str:
@@ -105,7 +163,10 @@ def suggest(name: str, known: Iterable[str]) -> str | None:
     if longer is not None:
         return longer  # only the unit is missing
     close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
-    return folded[close[0]] if close else None
+    if close:
+        return folded[close[0]]
+    begun = [candidate for candidate in folded if len(name) > 2 and candidate.startswith(name.casefold())]
+    return folded[begun[0]] if len(begun) == 1 else None
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -115,8 +176,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def listing(names: Iterable[str], conjunction: str = "or") -> str:
-    """`a, b or c`."""
+    """`a, b or c`; of a great many only the first."""
     items = list(names)
+    if len(items) > MOST_NAMES:
+        items = [*items[: MOST_NAMES - 1], f"{len(items) - MOST_NAMES + 1} more"]
+        conjunction = "and"
     if len(items) < 2:
         return "".join(items)
     return f"{', '.join(items[:-1])} {conjunction} {items[-1]}"

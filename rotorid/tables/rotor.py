@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Rotor, Support
+from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
 from rotorid.tables import units
 from rotorid.tables.columns import Column, FloatArray, Table, must_be, read_table
-from rotorid.tables.problems import Problems
+from rotorid.tables.problems import Problems, TableWarning
 from rotorid.tables.units import one_of
 
 _LENGTH = one_of(units.LENGTH)
@@ -36,15 +37,29 @@ COLUMNS = (
     Column("support_damping", one_of(units.DAMPING), ("support_damping_N_s_per_m",), required=False),
     Column("youngs_modulus", one_of(units.MODULUS), ("youngs_modulus_Pa",), required=False, blank=True),
     Column("density", one_of(units.DENSITY), ("density_kg_per_m3",), required=False, blank=True),
+    Column("poisson_ratio", units.ratio, required=False, blank=True),
+    Column("material_damping", one_of(units.TIME), ("material_damping_s",), required=False, blank=True),
 )
+PLAIN = Model()
+USUAL = (
+    ("length", 0.0, 50.0, "m", "is this in mm?"),
+    ("diameter", 0.0, 10.0, "m", "is this in mm?"),
+    ("inner_diameter", 0.0, 10.0, "m", "is this in mm?"),
+    ("youngs_modulus", 1e9, 1e12, "Pa", "is this in another unit?"),
+    ("density", 100.0, 3e4, "kg/m³", "is this in another unit?"),
+)
+"""Stem, range and unit of what shafts are; outside a warning asks."""
+OF_ELEMENTS = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
 
 
 @dataclass(frozen=True)
 class Material:
-    """What a shaft is made of where its table does not say: Pa, kg/m³."""
+    """What a shaft is made of where its table does not say: Pa, kg/m³, 1, s."""
 
     youngs_modulus: float = STEEL_MODULUS
     density: float = STEEL_DENSITY
+    poisson_ratio: float = 0.3
+    material_damping: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +71,11 @@ class Shaft:
     inner_diameter: FloatArray
     youngs_modulus: FloatArray
     density: FloatArray
+    poisson_ratio: FloatArray
+    material_damping: FloatArray
     discs: tuple[Disc, ...]
     supports: tuple[Support, ...]
+    model: Model = PLAIN
 
 
 def read_rotor(path: str | Path) -> Rotor:
@@ -81,7 +99,7 @@ def read_rotor(path: str | Path) -> Rotor:
     Warns
     -----
     TableWarning
-        About a guessed encoding.
+        About a guessed encoding, and sizes that no shaft has.
     """
     from rotorid.tables.rotorfile import read_rotor_file
 
@@ -114,25 +132,50 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     if not elements.any():
         expected = "at least one row with a length above 0"
         problems.add(table.source, table.header_row, table.fields["length"].name, None, expected)
-    for stem in ("diameter", "inner_diameter", "youngs_modulus", "density"):
+    for stem in ("diameter", "inner_diameter", *OF_ELEMENTS):
         _complain_about_blanks(table, stem, elements, problems)
     diameter, inner = table.numbers("diameter"), table.numbers("inner_diameter", 0.0)
     must_be(table, "diameter", (diameter > 0) | ~elements, "a diameter above 0", problems)
     must_be(table, "inner_diameter", (inner >= 0) | ~elements, "a diameter of 0 or more", problems)
     fits = ~(inner >= diameter) | ~(diameter > 0) | ~elements
     must_be(table, "inner_diameter", fits, "less than the outer diameter", problems)
-    for stem in ("youngs_modulus", "density"):
-        must_be(table, stem, (table.numbers(stem) > 0) | ~elements, "a number above 0", problems)
+    modulus, density = table.numbers("youngs_modulus"), table.numbers("density")
+    must_be(table, "youngs_modulus", (modulus > 0) | ~elements, "a number above 0", problems)
+    must_be(table, "density", (density >= 0) | ~elements, "a number of 0 (no mass) or more", problems)
+    poisson, damping = table.numbers("poisson_ratio"), table.numbers("material_damping")
+    possible = (poisson > -1) & (poisson <= 0.5)
+    must_be(table, "poisson_ratio", possible | ~elements, "a number above -1, up to 0.5", problems)
+    must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
     for stem in ATTACHED:
         must_be(table, stem, table.numbers(stem) >= 0, "0 (nothing attached) or more", problems)
+    _warn_of_sizes(table, elements)
     return Shaft(
         length[elements],
         diameter[elements],
         inner[elements],
         table.numbers("youngs_modulus", material.youngs_modulus)[elements],
         table.numbers("density", material.density)[elements],
+        table.numbers("poisson_ratio", material.poisson_ratio)[elements],
+        table.numbers("material_damping", material.material_damping)[elements],
         *_attached(table),
     )
+
+
+def _warn_of_sizes(table: Table, elements: NDArray[np.bool_]) -> None:
+    """A millimetre taken for a metre gives a rotor that can be computed all the same."""
+    for stem, low, high, unit, question in USUAL:
+        if stem not in table:
+            continue
+        field, values = table.fields[stem], table.numbers(stem)
+        for row in np.flatnonzero(elements & (values > 0) & ((values < low) | (values > high)))[:1]:
+            others = int(np.sum(elements & (values > 0) & ((values < low) | (values > high)))) - 1
+            more = f" and {others} more row{'s' if others > 1 else ''}" if others else ""
+            warnings.warn(
+                f"{table.source}, row {table.rows[row]}{more}, column {field.name}: "
+                f"{table.shown(stem, int(row))} means {values[row]:.6g} {unit}; {question}",
+                TableWarning,
+                stacklevel=4,
+            )
 
 
 def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:
@@ -144,9 +187,12 @@ def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problem
             inner_diameter=shaft.inner_diameter,
             youngs_modulus=shaft.youngs_modulus,
             density=shaft.density,
+            poisson_ratio=shaft.poisson_ratio,
+            material_damping=shaft.material_damping,
             discs=shaft.discs,
             supports=shaft.supports,
             stations=stations,
+            model=shaft.model,
         )
     except ValueError as error:
         problems.add(source, None, None, None, f"a possible rotor: {error}")

@@ -1,27 +1,25 @@
-"""Rotor files (.toml): a shaft table with material, discs, bearings and stations."""
+"""Rotor files (.toml): a shaft table with material, model, discs, bearings, seals and stations."""
 
 from __future__ import annotations
 
 import dataclasses
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
-from fem.rotor import Disc, Rotor, Support
+from fem.rotor import Disc, Model, Rotor
+from rotorid.tables.bearing import bearing_tables, read_support
 from rotorid.tables.problems import Problems, did_you_mean
 from rotorid.tables.rotor import Material, build, read_shaft
 from rotorid.tables.tomlfile import Section, read_toml
 
 _TINY = sys.float_info.min
-_BEARING_LATER = (
-    *(f"{kind}{a}{b}" for kind in "kc" for a in "xy" for b in "xy"),
-    *(f"k{a}{b}_N_per_m" for a in "xy" for b in "xy"),
-    *(f"c{a}{b}_N_s_per_m" for a in "xy" for b in "xy"),
-    "table",
-)
+_GEOMETRY = ("width_m", "outer_diameter_m", "inner_diameter_m", "density_kg_per_m3")
+_INERTIA = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
 
 
 def read_rotor_file(path: Path, problems: Problems) -> Rotor:
-    """Read a rotor file; raises `InputError` with the problems of the file and of its shaft table."""
+    """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
     data = read_toml(path, problems)
     problems.stop()
     top = Section(str(path), data or {}, problems)
@@ -29,66 +27,83 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     if "shaft" not in top:
         top.missing("shaft", 'the file of the shaft, shaft = "shaft.csv"')
     material = _material(top.section("material"))
-    _model(top.section("model"))
-    discs, bearings, stations = top.sections("disc"), top.sections("bearing"), top.sections("station")
-    top.later("seal")
+    model = _model(top.section("model"))
+    discs, stations = top.sections("disc"), top.sections("station")
+    bearings, seals = top.sections("bearing"), top.sections("seal")
     top.finish()
     shaft = read_shaft(path.parent / shaft_name, material, problems) if shaft_name else None
     n_nodes = len(shaft.length) + 1 if shaft else sys.maxsize
     names = _stations(stations, n_nodes)
-    more_discs = [_disc(section, names, n_nodes) for section in discs]
-    more_supports = [_bearing(section, names, n_nodes) for section in bearings]
+
+    def node(section: Section) -> int | None:
+        return _node(section, names, n_nodes)
+
+    more_discs = [_disc(section, node, material) for section in discs]
+    more_supports = [
+        *(read_support(section, node, path.parent, "bearing", problems) for section in bearings),
+        *(read_support(section, node, path.parent, "seal", problems) for section in seals),
+    ]
     problems.stop()
     assert shaft is not None
     whole = dataclasses.replace(
         shaft,
         discs=(*shaft.discs, *(disc for disc in more_discs if disc)),
         supports=(*shaft.supports, *(support for support in more_supports if support)),
+        model=model,
     )
     return build(str(path), whole, names, problems)
 
 
 def rotor_files(path: str | Path) -> tuple[Path, ...]:
-    """The files that `read_rotor` reads, for provenance: a rotor file has a shaft table too."""
+    """The files that `read_rotor` reads, for provenance: a rotor file has tables too."""
     path = Path(path)
     if path.suffix.lower() != ".toml":
         return (path,)
-    shaft = (read_toml(path, Problems()) or {}).get("shaft")
-    return (path, path.parent / shaft) if isinstance(shaft, str) else (path,)
+    data = read_toml(path, Problems()) or {}
+    shaft = data.get("shaft")
+    tables = [shaft.strip()] if isinstance(shaft, str) else []
+    return (path, *(path.parent / table for table in [*tables, *bearing_tables(data)]))
 
 
 def _material(section: Section | None) -> Material:
-    if section is None:
-        return Material()
     default = Material()
-    modulus = section.number("youngs_modulus_Pa", low=_TINY)
-    density = section.number("density_kg_per_m3", low=_TINY)
-    section.number("poisson_ratio", low=-1.0, high=0.5)  # matters to the shear effect only
-    section.finish()
-    return Material(modulus or default.youngs_modulus, density or default.density)
-
-
-def _model(section: Section | None) -> None:
     if section is None:
-        return
-    for effect in ("shear", "rotary_inertia", "gyroscopic"):
-        if section.flag(effect):
-            section.complain(effect, "false: the effect is not supported by this version of rotorid")
+        return default
+    modulus = section.number("youngs_modulus_Pa", default.youngs_modulus, low=_TINY)
+    density = section.number("density_kg_per_m3", default.density, low=0.0)
+    poisson = section.number("poisson_ratio", default.poisson_ratio, low=-1.0 + 1e-9, high=0.5)
+    damping = section.number("material_damping_s", default.material_damping, low=0.0)
     section.finish()
+    return Material(
+        *(
+            getattr(default, field.name) if value is None else value
+            for field, value in zip(
+                dataclasses.fields(Material), (modulus, density, poisson, damping), strict=True
+            )
+        )
+    )
+
+
+def _model(section: Section | None) -> Model:
+    if section is None:
+        return Model()
+    flags = [section.flag(effect) for effect in ("shear", "rotary_inertia", "gyroscopic")]
+    section.finish()
+    return Model(*flags)
 
 
 def _stations(sections: list[Section], n_nodes: int) -> dict[str, int]:
     names: dict[str, int] = {}
     for section in sections:
-        name, node = section.text("name"), _node(section, {}, n_nodes)
-        if "name" not in section:
-            section.missing("name", "a name for the node")
+        name, node = section.name("name"), _node(section, {}, n_nodes)
+        if not name.strip():
+            section.complain("name", "a name for the node", value="name" in section)
         section.finish()
-        if name is not None and name in names:
+        if name in names:
             section.complain("name", "a name that no other station has")
-        elif name is not None and name.isdecimal():
+        elif name.strip().isdecimal():
             section.complain("name", "a name, not a number, which would read as a node")
-        elif name is not None and node is not None:
+        elif name.strip() and node is not None:
             names[name] = node
     return names
 
@@ -109,29 +124,34 @@ def _node(section: Section, names: dict[str, int], n_nodes: int) -> int | None:
     return None
 
 
-def _disc(section: Section, names: dict[str, int], n_nodes: int) -> Disc | None:
-    node = _node(section, names, n_nodes)
-    mass = section.number("mass_kg", low=0.0)
-    polar = section.number("polar_inertia_kg_m2", 0.0, low=0.0)
-    diametral = section.number("diametral_inertia_kg_m2", 0.0, low=0.0)
-    name = section.text("name")
-    if "mass_kg" not in section:
-        section.missing("mass_kg", "the mass of the disc")
+def _disc(section: Section, read_node: Callable[[Section], int | None], material: Material) -> Disc | None:
+    """Mass and inertias, or a geometry; its density is the material's unless it says another."""
+    node, name = read_node(section), section.name("name")
+    mass, polar, diametral = (section.number(key, low=0.0) for key in _INERTIA)
+    width, outer = (section.number(key, low=_TINY) for key in _GEOMETRY[:2])
+    inner, density = (section.number(key, low=0.0) for key in _GEOMETRY[2:])
     section.finish()
-    if node is None or mass is None:
+    by_geometry = [key for key in _GEOMETRY if key in section]
+    by_inertia = [key for key in _INERTIA if key in section]
+    if by_geometry and by_inertia:
+        section.complain(
+            by_inertia[0], f"either mass and moments of inertia or a geometry, which {by_geometry[0]} gives"
+        )
         return None
-    return Disc(node, mass, polar or 0.0, diametral or 0.0, name or "")
-
-
-def _bearing(section: Section, names: dict[str, int], n_nodes: int) -> Support | None:
-    node = _node(section, names, n_nodes)
-    stiffness = section.number("stiffness_N_per_m", low=0.0)
-    damping = section.number("damping_N_s_per_m", 0.0, low=0.0)
-    name = section.text("name")
-    section.later(*_BEARING_LATER)
-    if "stiffness_N_per_m" not in section and not any(key in section for key in _BEARING_LATER):
-        section.missing("stiffness_N_per_m", "the stiffness of the bearing")
-    section.finish()
-    if node is None or stiffness is None:
+    if not by_geometry:
+        if "mass_kg" not in section:
+            section.missing("mass_kg", "the mass of the disc (or its geometry: width_m, outer_diameter_m)")
+        if node is None or mass is None:
+            return None
+        return Disc(node, mass, polar or 0.0, diametral or 0.0, name)
+    for key in _GEOMETRY[:2]:
+        if key not in section:
+            section.missing(key, "the disc's width and outer diameter")
+    if node is None or width is None or outer is None:
         return None
-    return Support(node, stiffness, damping or 0.0, name or "")
+    density = material.density if density is None else density
+    try:
+        return Disc.from_geometry(node, width, outer, inner or 0.0, density, name=name)
+    except ValueError as error:
+        section.refuse(f"a possible disc: {error}")
+        return None

@@ -32,6 +32,10 @@ COLUMNS = (
 )
 
 
+_RUNS_NAMED, _SPEEDS_NAMED = 20, 10
+"""Of runs with gaps, and of speeds that one run lacks, so many are named."""
+
+
 @dataclass(frozen=True, eq=False)
 class Runs:
     """Readings of all runs; arrays as in `balancing.Trials`."""
@@ -43,6 +47,7 @@ class Runs:
     readings: ComplexArray
     unit: Unit
     speed_unit: Unit
+    warnings: tuple[str, ...] = ()
 
 
 def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Problems) -> Runs | None:
@@ -69,17 +74,23 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
     must_be(table, "phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
     run, sensor = table.texts("run"), table.texts("sensor")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
-    before = len(problems)
-    speeds, index = merge_speeds(table, usable, conventions.speed_tolerance_percent, problems)
+    start = len(problems)
+    speeds, index, merged = merge_speeds(table, usable, conventions.speed_tolerance_percent, problems)
     runs = tuple(dict.fromkeys(name for name in run if name))
     sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    run_at = {name: r for r, name in enumerate(runs)}
+    sensor_at = {name: c for c, name in enumerate(sensors)}
     cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
     for i in usable:
-        cells[runs.index(run[i]), index[i], sensors.index(sensor[i])].append(i)
-    if len(problems) == before:  # with unclear speeds all the rest would be noise
+        cells[run_at[run[i]], index[i], sensor_at[sensor[i]]].append(i)
+    if len(problems) == start:  # with unclear speeds all the rest would be noise
         _complain_about_repeats(table, list(cells.values()), problems)
-    if table.complete and len(usable) == len(table) and len(problems) == before:
+    if table.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions, problems)
+    unit, speed_unit = table.unit("amplitude"), table.unit("speed")
+    if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
+        nothing = np.empty((0, len(runs), len(speeds), len(sensors)), dtype=complex)
+        return Runs(table.source, runs, speeds, sensors, nothing, unit, speed_unit)
     values = polar(amplitude, phase, conventions.phase_sign)
     order = _repeat_order(table)
     most = max((len(rows) for rows in cells.values()), default=1)
@@ -87,14 +98,14 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
     for place, rows in cells.items():
         for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
             readings[(k, *place)] = values[row]
-    return Runs(table.source, runs, speeds, sensors, readings, table.unit("amplitude"), table.unit("speed"))
+    return Runs(table.source, runs, speeds, sensors, readings, unit, speed_unit, merged)
 
 
 def _repeat_order(table: Table) -> list[int]:
     if "repeat" not in table:
         return list(range(len(table)))
-    labels = list(dict.fromkeys(table.texts("repeat")))
-    return [labels.index(label) for label in table.texts("repeat")]
+    labels = {label: k for k, label in enumerate(dict.fromkeys(table.texts("repeat")))}
+    return [labels[label] for label in table.texts("repeat")]
 
 
 def _complain_about_repeats(table: Table, cells: list[list[int]], problems: Problems) -> None:
@@ -130,12 +141,23 @@ def _complain_about_gaps(
     problems: Problems,
 ) -> None:
     """Every run needs every sensor at every speed: influence coefficients compare runs."""
+    if len(present) == len(runs) * len(speeds) * len(sensors):
+        return
     unit = table.unit("speed")
-    for r, run in enumerate(runs):
-        at = [s for s in range(len(speeds)) if any((r, s, c) in present for c in range(len(sensors)))]
+    read: list[dict[int, set[int]]] = [defaultdict(set) for _ in runs]
+    for r, s, c in present:
+        read[r][s].add(c)
+    anywhere = {(s, c) for _, s, c in present}
+    wanting = [r for r in range(len(runs)) if sum(map(len, read[r].values())) < len(speeds) * len(sensors)]
+    for r in wanting[:_RUNS_NAMED]:
+        run, at = runs[r], sorted(read[r])
+        if len(speeds) - len(at) > _SPEEDS_NAMED:
+            expected = f"readings of run {run!r} at all {len(speeds)} speeds of the runs; it has {len(at)}"
+            problems.add(table.source, None, table.fields["speed"].name, None, expected)
+            continue
         for s, speed in enumerate(speeds):
             shown = show_speed(speed, unit)
-            if s not in at:
+            if s not in read[r]:
                 near = min(at, key=lambda k: abs(speeds[k] - speed))
                 hint = f"; its nearest speed is {show_speed(speeds[near], unit)}"
                 if same_speed(speed, speeds[near], 10.0):
@@ -144,11 +166,14 @@ def _complain_about_gaps(
                 problems.add(table.source, None, table.fields["speed"].name, None, expected)
                 continue
             for c, sensor in enumerate(sensors):
-                if (r, s, c) not in present:
+                if c not in read[r][s]:
                     expected = f"a reading of sensor {sensor!r} in run {run!r} at {shown}, as other runs have"
-                    if not any((other, s, c) in present for other in range(len(runs))):
+                    if (s, c) not in anywhere:
                         expected = (
                             f"a reading of sensor {sensor!r} in run {run!r} at {shown}: every run needs "
                             "every sensor at every speed"
                         )
                     problems.add(table.source, None, "sensor", None, expected)
+    if len(wanting) > _RUNS_NAMED:
+        expected = f"as many readings of {len(wanting) - _RUNS_NAMED} further runs"
+        problems.add(table.source, None, None, None, expected)

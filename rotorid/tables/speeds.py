@@ -13,6 +13,7 @@ from rotorid.tables.units import Unit
 
 FloatArray = NDArray[np.float64]
 ROUNDING = 1e-12
+_NAMED = 3
 
 
 def same_speed(a: float, b: float, tolerance_percent: float) -> bool:
@@ -22,7 +23,7 @@ def same_speed(a: float, b: float, tolerance_percent: float) -> bool:
 
 def merge_speeds(
     table: Table, usable: list[int], tolerance_percent: float, problems: Problems
-) -> tuple[FloatArray, dict[int, int]]:
+) -> tuple[FloatArray, dict[int, int], tuple[str, ...]]:
     """Merge the speeds of different runs that lie within the tolerance.
 
     A merged speed is the mean over its runs. Ambiguous cases are problems: two speeds of one run within the
@@ -41,8 +42,8 @@ def merge_speeds(
 
     Returns
     -------
-    speeds, index
-        rad/s, ascending; and, for each usable row, which of them it has.
+    speeds, index, words
+        rad/s, ascending; for each usable row, which of them it has; and which different speeds became one.
     """
     values = table.numbers("speed")
     runs = table.texts("run")
@@ -71,14 +72,36 @@ def merge_speeds(
             clear.discard(group)
     for g, members in enumerate(groups):
         if g in clear and not same_speed(members[0], members[-1], tolerance_percent):
-            chain = ", ".join(show_speed(speed, unit) for speed in members)
+            shown = [show_speed(speed, unit) for speed in members]
+            chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
             expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
             problems.add(table.source, None, name, None, expected)
-    merged = []
-    for g, members in enumerate(groups):
-        each = [speed for (group, _), first in of_run.items() if group == g for speed in first]
-        merged.append(members[0] if len(members) == 1 else float(np.mean(each)))
-    return np.array(merged), {row: place[float(values[row])] for row in usable}
+    each: list[list[float]] = [[] for _ in groups]
+    for (group, _), first in of_run.items():
+        each[group].extend(first)
+    merged = [
+        members[0] if len(members) == 1 else float(np.mean(of_group))
+        for members, of_group in zip(groups, each, strict=True)
+    ]
+    words = _merged_words(groups, merged, tolerance_percent, unit)
+    return np.array(merged), {row: place[float(values[row])] for row in usable}, words
+
+
+def _merged_words(
+    groups: list[list[float]], merged: list[float], tolerance_percent: float, unit: Unit
+) -> tuple[str, ...]:
+    alike = [
+        f"{', '.join(f'{speed * unit.scale:.6g}' for speed in members)} as {show_speed(mean, unit)}"
+        for members, mean in zip(groups, merged, strict=True)
+        if len(members) > 1
+    ]
+    if not alike:
+        return ()
+    more = f" and {len(alike) - _NAMED} more" if len(alike) > _NAMED else ""
+    return (
+        f"speeds of different runs within {tolerance_percent:g} % count as one: "
+        f"{'; '.join(alike[:_NAMED])}{more}",
+    )
 
 
 def show_speed(speed: float, unit: Unit) -> str:

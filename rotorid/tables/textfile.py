@@ -94,8 +94,8 @@ def _looks_cyrillic(data: bytes) -> bool:
     return votes > 0
 
 
-def parse_text(source: str, text: str, problems: Problems) -> Grid | None:
-    """Rows of cells of a text table, or None and problems."""
+def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool = False) -> Grid | None:
+    """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`."""
     lines = re.split(r"\r\n|\n|\r", text)
     separator = ""
     declared = _SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
@@ -115,6 +115,9 @@ def parse_text(source: str, text: str, problems: Problems) -> Grid | None:
         if stripped.startswith("#"):
             rows.append((number, (clean(stripped),)))
             continue
+        if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
+            rows.append((number, tuple(clean(cell) for cell in line.split(separator)) if line else ()))
+            continue
         try:
             cells = next(csv.reader([line], delimiter=separator, strict=True), [])
         except csv.Error as error:
@@ -123,7 +126,7 @@ def parse_text(source: str, text: str, problems: Problems) -> Grid | None:
             complete = False
             continue
         rows.append((number, tuple(clean(cell) for cell in cells)))
-    return make_grid(source, rows, separator, problems, complete=complete)
+    return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
 
 
 def _separator(lines: list[str]) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rotorid.tables.number import LARGEST
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.textfile import read_bytes
 
@@ -94,6 +95,8 @@ class Section:
             self.complain(key, "a number" if not isinstance(value, str) else "a number, without quotes")
         elif not _finite(value) or not low <= value <= high:
             self.complain(key, _range(low, high))
+        elif abs(value) > LARGEST:
+            self.complain(key, f"a number up to {LARGEST:g} in size")
         else:
             return float(value)
         return default
@@ -107,6 +110,13 @@ class Section:
             self.complain(key, "a text in quotes")
             return None
         return value.strip()
+
+    def name(self, key: str) -> str:
+        """A text exactly as it stands; empty if there is none."""
+        value = self.take(key)
+        if value is not None and not isinstance(value, str):
+            self.complain(key, "a text in quotes")
+        return value if isinstance(value, str) else ""
 
     def choice(self, key: str, allowed: tuple[str, ...], default: str) -> str:
         """One of several texts."""
@@ -159,6 +169,10 @@ class Section:
         """Note that a key is missing."""
         self.complain(key, expected, value=False)
 
+    def refuse(self, expected: str) -> None:
+        """Note a problem with these settings as a whole."""
+        self._problems.add(self.source, None, self._prefix.rstrip(".") or None, None, expected)
+
     def later(self, *keys: str) -> None:
         """Keys of the interface that this version cannot obey: it says so instead of passing over them."""
         self._later.extend(keys)
@@ -167,7 +181,7 @@ class Section:
                 self.complain(key, NOT_SUPPORTED)
 
     def finish(self) -> None:
-        """Complain about every key that was not taken."""
+        """Complain about every key that nobody took."""
         for key in self._data:
             if key not in self._known:
                 hint = did_you_mean(key, self._known)

@@ -85,6 +85,7 @@ def make_trials(
         weight_scale=mounted.unit.scale,
         phase=conventions.phase,
         angles=conventions.angles,
+        speed_unit=read.speed_unit.name,
     )
     return Trials(
         runs=read.runs,
@@ -95,4 +96,5 @@ def make_trials(
         weights=mounted.weights,
         errors=errors.in_si(labels) if isinstance(errors, StatedErrors) else errors,
         labels=labels,
+        warnings=read.warnings,
     )

@@ -78,6 +78,7 @@ STIFFNESS = _table("stiffness", {"N_per_m": (1.0, 1.0), "N_per_mm": (1e3, 1.0), 
 DAMPING = _table("damping", {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0)})
 MODULUS = _table("modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0)})
 DENSITY = _table("density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0)})
+TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3)})
 
 _PEAK = {
     **LENGTH,
@@ -108,6 +109,19 @@ def one_of(units: dict[str, Unit]) -> UnitReader:
         return unit
 
     return read
+
+
+def ratio(name: str) -> Unit:
+    """The unit of a plain number, which has none.
+
+    Raises
+    ------
+    UnitError
+        For any name at all.
+    """
+    if name:
+        raise UnitError(f"a column without a unit, not {name!r}")
+    return Unit("", "ratio")
 
 
 def vibration(name: str) -> Unit:

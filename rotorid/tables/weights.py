@@ -54,7 +54,7 @@ def read_weights(
     if isinstance(source, Grid):
         table = make_table(source, COLUMNS, problems)
     else:
-        table = read_table(source, "weights", COLUMNS, problems)
+        table = read_table(source, "weights", COLUMNS, problems, may_be_empty=True)
     if table is None:
         return None
     present = [stem for stem in ("mass", "unbalance") if stem in table]
@@ -81,10 +81,12 @@ def read_weights(
     run, plane = table.texts("run"), table.texts("plane")
     planes = tuple(dict.fromkeys(name for name in plane if name))
     values = polar(size, angle, conventions.angle_sign)
+    run_at = {name: r for r, name in enumerate(runs or ())}
+    plane_at = {name: p for p, name in enumerate(planes)}
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)
     seen: dict[tuple[str, str, complex], int] = {}
     for i in range(len(table)):
-        if runs is not None and run[i] and run[i] not in runs:
+        if runs is not None and run[i] and run[i] not in run_at:
             expected = (
                 f"a run of the runs table{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
             )
@@ -99,5 +101,5 @@ def read_weights(
             continue
         seen[key] = i
         if runs is not None:
-            total[runs.index(run[i]), planes.index(plane[i])] += values[i]
+            total[run_at[run[i]], plane_at[plane[i]]] += values[i]
     return Weights(planes, total, table.unit(what))

@@ -7,7 +7,7 @@ import io
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,32 +43,63 @@ def write_table(
     InputError
         If the file cannot be written.
     """
+    write_bytes(Path(path), table_bytes(path, frame, comments=comments, sheet=sheet))
+
+
+def table_bytes(
+    path: str | Path, frame: pd.DataFrame, *, comments: Sequence[str] = (), sheet: str = "table"
+) -> bytes:
+    """What `write_table` writes to a file of this name."""
     path = Path(path)
     kind = path.suffix.lower()
     names = [str(name) for name in frame.columns]
-    columns = [frame.iloc[:, index].tolist() for index in range(len(names))]
+    plain = frame.astype(object).where(frame.notna(), None)  # the blanks of all kinds of columns
+    columns = [plain.iloc[:, index].tolist() for index in range(len(names))]
     rows = [[_plain(value) for value in row] for row in zip(*columns, strict=True)]
     if kind == ".csv":
-        data = _csv(comments, names, rows)
-    elif kind == ".xlsx":
-        data = _xlsx(comments, names, rows, sheet)
-    else:
-        raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
-    write_bytes(path, data)
+        return csv_bytes(comments, names, rows)
+    if kind == ".xlsx":
+        return _xlsx(comments, names, rows, sheet)
+    raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file by way of a temporary one beside it, so that nobody ever sees half of it."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    write_files({path: data})
+
+
+def write_files(files: Mapping[Path, bytes]) -> None:
+    """Write several files that belong together: all are complete on disk before the first is replaced.
+
+    Parameters
+    ----------
+    files
+        What to write where, in the order in which old files are replaced.
+
+    Raises
+    ------
+    InputError
+        If one cannot be written; where that shows before the first is replaced, all stay as they were.
+    """
+    waiting = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
+    if not files:
+        return
+    path = next(iter(files))
     try:
-        with temporary.open("xb") as stream:
-            stream.write(data)
-        temporary.replace(path)
+        for path in files:
+            if path.is_dir():
+                raise IsADirectoryError(21, "it is a folder", str(path))
+        for path, data in files.items():
+            with waiting[path].open("xb") as stream:
+                stream.write(data)
+        for path, temporary in waiting.items():
+            temporary.replace(path)
     except OSError as error:
         expected = f"a file that can be written ({error.strerror or error})"
         raise InputError([Problem(str(path), None, None, None, expected)]) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        for temporary in waiting.values():
+            temporary.unlink(missing_ok=True)
 
 
 def _plain(value: object) -> Value:
@@ -82,7 +113,8 @@ def _plain(value: object) -> Value:
     return value if isinstance(value, (bool, int, float)) else str(value)
 
 
-def _csv(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
+def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
+    """A CSV file: comment lines, names of the columns, rows; numbers with all their digits."""
     stream = io.StringIO()
     for comment in comments:
         stream.write(f"# {_one_line(comment)}\n")

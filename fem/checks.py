@@ -1,0 +1,55 @@
+"""Checks of single numbers, shared by the parts of a rotor."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Protocol
+
+import numpy as np
+
+
+def whole(value: object, what: str) -> int:
+    """A whole number as a plain int; raise ValueError naming `what` for anything else."""
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise ValueError(f"{what} must be a whole number, not {value!r}") from None
+
+
+def number(value: object, what: str, *, signed: bool = False) -> float:
+    """A finite number as a plain float, not negative unless `signed`; else raise ValueError with `what`."""
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be a number, not {value!r}") from None
+    if not math.isfinite(result) or (result < 0 and not signed):
+        limit = "finite" if signed else "finite and not negative"
+        raise ValueError(f"{what} must be {limit}, not {result}")
+    return result + 0.0  # no negative zero
+
+
+class Attached(Protocol):
+    """Anything with a node and a name."""
+
+    @property
+    def node(self) -> int:
+        """Node number, from 1."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """For messages."""
+        ...
+
+
+def attachment(item: Attached) -> str:
+    """Check the node of something attached to a rotor; returns "disc 'wheel' at node 3" for messages."""
+    what = type(item).__name__.lower() + (f" {item.name!r}" if item.name else "")
+    node = whole(item.node, f"the node of {what}")
+    if node < 1:
+        raise ValueError(f"{what}: node {node} does not exist, nodes are numbered from 1")
+    object.__setattr__(item, "node", node)
+    return f"{what} at node {node}"

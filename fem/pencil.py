@@ -1,0 +1,271 @@
+"""The conservative rotor K φ = λ M φ, λ = ω², that critical speeds and receptances start from.
+
+At synchronous whirl the gyroscopic moment is an inertia: forward, z = Z e^{iωt}, the mass is M − G, backward
+M + G. Either is real and symmetric; M − G may be indefinite (thin discs), and then some forward modes have
+λ < 0: no critical speed. Forward and backward amplitudes are uncoupled on rotationally symmetric supports.
+On other supports x = F + b, y = −i (F − b), and a support matrix D of (x, y) acts on (F, b) as T⁻¹ D T with
+T = [[1, 1], [−i, i]]: Hermitian, if D is real and symmetric. Pedestals add unknowns of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.matrices import Matrices, multiply, shaft_energy
+from fem.rotor import FloatArray, Rotor, Support
+
+Array = NDArray[Any]  # real, or complex where supports are cross-coupled
+Whirl = Literal[-1, 0, 1]  # backward, without gyroscopic effect, forward
+
+NO_MASS = (
+    "the rotor can move as a rigid body without moving any mass: give the shaft a density, or add supports"
+)
+TO_XY = np.array([[1, 1], [-1j, 1j]])  # (x, y) from (F, b)
+FROM_XY = np.array([[0.5, 0.5j], [0.5, -0.5j]])
+
+
+@dataclass(frozen=True, eq=False)
+class Pencil:
+    """Bands of stiffness and mass, and what is known beyond them.
+
+    Attributes
+    ----------
+    rotor, matrices
+        What it describes.
+    stiffness, mass
+        Upper bands, shape (width + 1, size); Hermitian, the stiffness not negative.
+    energy
+        Twice the potential energy of each column, with few digits lost.
+    rigid
+        Motions that strain nothing, shape (size, r).
+    springs
+        Sum of what holds the rotor, N/m.
+    waves
+        Unknowns that are deflections, shape (planes, N): forward and backward.
+    tilts
+        Those that are slopes.
+    definite
+        Whether the mass is known to be positive semidefinite.
+    """
+
+    rotor: Rotor
+    matrices: Matrices
+    stiffness: Array
+    mass: Array
+    energy: Callable[[Array], FloatArray]
+    rigid: Array
+    springs: float
+    waves: NDArray[np.intp]
+    tilts: NDArray[np.intp]
+    definite: bool
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.stiffness.shape[1])
+
+
+def whirling_mass(A: Matrices, whirl: Whirl) -> FloatArray:
+    """M − G forward, M + G backward, M at rest."""
+    return A.mass - whirl * A.gyroscopic if whirl else A.mass
+
+
+def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, float] | None = None) -> Pencil:
+    """Pencil of one plane, on given springs {node: N/m}; by default on the stiffness of plain supports."""
+    K = A.stiffness
+    if springs is None:
+        springs = {}
+        for support in rotor.supports:
+            if support.plain:
+                springs[support.node] = springs.get(support.node, 0.0) + support.stiffness
+    else:
+        K = A.shaft.copy(order="K")
+        for node, k in springs.items():
+            K[A.width, A.deflection(node)] += k
+    held = {A.deflection(node): k for node, k in springs.items() if k}
+
+    def energy(X: Array) -> FloatArray:
+        total = shaft_energy(rotor, X)
+        for unknown, k in held.items():
+            total = total + k * X[unknown] ** 2
+        return np.asarray(total)
+
+    rigid = _rigid(rotor, A, [(node, np.ones(1)) for node, k in springs.items() if k], 1)[0]
+    M = whirling_mass(A, whirl)
+    definite = not whirl or not rotor.model.gyroscopic
+    return Pencil(
+        rotor,
+        A,
+        K,
+        M,
+        energy,
+        rigid,
+        sum(springs.values()),
+        A.deflections[None, :],
+        A.deflections[None, :] + 1,
+        definite,
+    )
+
+
+def static_stiffness(support: Support, speed: float) -> FloatArray:
+    """Symmetric part of a support's stiffness without its pedestal, N/m, shape (2, 2).
+
+    The antisymmetric part (kxy − kyx)/2 does work over an orbit, as damping does: it belongs to no
+    conservative rotor.
+    """
+    k = support.at(speed)[0]
+    return np.asarray((k + k.T) / 2)
+
+
+def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
+    """Pencil of the synchronous conservative rotor with all its supports as they are at a speed.
+
+    One plane, forward, where the supports are rotationally symmetric, else both. Unknowns of pedestals
+    stand beside those of their node.
+    """
+    if all(support.plain for support in rotor.supports):
+        return one_plane(rotor, A, 1)
+    planes = 1 if rotor.symmetric else 2
+    forms = [(s, static_stiffness(s, speed)) for s in rotor.supports]
+    forms = [(s, k) for s, k in forms if k.any()]
+    pedestals = [s for s, _ in forms if s.pedestal is not None]
+    if planes == 1 and not pedestals:
+        springs: dict[int, float] = {}
+        for s, k in forms:
+            springs[s.node] = springs.get(s.node, 0.0) + float(k[0, 0])
+        return one_plane(rotor, A, 1, springs)
+
+    skew = any(k[0, 1] or k[1, 0] for _, k in forms)
+    dtype = complex if skew and planes == 2 else float
+    # Where the unknown i of one plane, and those of the pedestals, stand.
+    place = np.arange(A.size)
+    for s in pedestals:
+        place[A.deflection(s.node) + 1 :] += 1
+    seats: list[int] = []
+    used: dict[int, int] = {}
+    for s in pedestals:
+        i = A.deflection(s.node)
+        used[i] = used.get(i, 0) + 1
+        seats.append(int(place[i]) + used[i])
+    size = planes * (A.size + len(pedestals))
+    span = int((place[A.width :] - place[: -A.width]).max()) if A.size > A.width else A.size - 1
+    width = planes * span + planes - 1
+    K, M = (np.zeros((width + 1, size), dtype=dtype) for _ in range(2))
+    whirls: tuple[Whirl, ...] = (1, -1)
+    for plane, whirl in enumerate(whirls[:planes]):
+        where = planes * place + plane
+        for band, source in ((K, A.shaft), (M, whirling_mass(A, whirl))):
+            for above in range(A.width + 1):
+                rows, columns = where[: A.size - above], where[above:]
+                band[width + rows - columns, columns] += source[A.width - above, above:]
+
+    springs_at: list[tuple[NDArray[np.intp], Array]] = []  # unknowns and Hermitian form of each spring
+    offsets = np.arange(planes)
+
+    def turned(k: FloatArray) -> Array:
+        """Form on (F, b), or on F alone."""
+        form = np.asarray(FROM_XY @ k @ TO_XY)[:planes, :planes]
+        return form.real if dtype is float else form
+
+    seat = iter(seats)
+    for s, k in forms:
+        node = planes * place[A.deflection(s.node)] + offsets
+        form = turned(k)
+        if s.pedestal is None:
+            springs_at.append((node, form))
+            continue
+        own = planes * next(seat) + offsets
+        both = np.concatenate((node, own))
+        springs_at.append((both, np.block([[form, -form], [-form, form]])))
+        stand = turned(np.diag(s.pedestal.xy("stiffness")))
+        springs_at.append((own, stand))
+        M[width, own] += s.pedestal.mass
+    for unknowns, form in springs_at:
+        for a, i in enumerate(unknowns):
+            for b, j in enumerate(unknowns):
+                if i <= j:
+                    K[width + i - j, j] += form[a, b]
+
+    def energy(X: Array) -> FloatArray:
+        total = np.zeros(X.shape[1])
+        for plane in range(planes):
+            Y = X[planes * place + plane]
+            total = total + shaft_energy(rotor, Y.real)
+            if dtype is complex:
+                total = total + shaft_energy(rotor, Y.imag)
+        for unknowns, form in springs_at:
+            Y = X[unknowns]
+            total = total + np.einsum("im,ij,jm->m", Y.conj(), form, Y).real
+        return np.asarray(total)
+
+    constraints = []
+    for s, k in forms:
+        values, directions = np.linalg.eigh(k)
+        constraints += [
+            (s.node, directions[:planes, i]) for i in (0, 1) if abs(values[i]) > 1e-12 * abs(values).max()
+        ]
+    if planes == 1:
+        constraints = [(s.node, np.array([1.0])) for s, _ in forms]
+    motions, free = _rigid(rotor, A, constraints, planes)
+    rigid = np.zeros((size, motions.shape[1]), dtype=dtype)
+    if planes == 1:
+        rigid[place] = motions
+    else:
+        x, y = free  # deflections of both planes
+        for plane, sign in ((0, 1), (1, -1)):
+            # A motion in y alone is as good with any phase; one of them makes (F, b) real.
+            rigid[planes * place + plane] = (x + sign * (1j if skew else 1) * y) / 2
+    total = sum(float(np.trace(k)) / 2 for _, k in forms)
+    at = A.deflections
+    waves, tilts = (np.array([planes * place[i] + plane for plane in range(planes)]) for i in (at, at + 1))
+    return Pencil(rotor, A, K, M, energy, rigid, total, waves, tilts, not rotor.model.gyroscopic)
+
+
+def _rigid(
+    rotor: Rotor, A: Matrices, constraints: list[tuple[int, FloatArray]], planes: int
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+    """Rigid motions that leave every (node, direction) in place, whatever the stiffness there.
+
+    Returns them stacked in one plane, shape (size, r), or apart in two, (size, r) each.
+    """
+    if constraints and planes == 1 and len({node for node, _ in constraints}) > 1:
+        none = np.zeros((A.size, 0))
+        return none, (none, none)
+    translation, tilt = np.zeros(A.size), np.zeros(A.size)
+    translation[A.deflections] = 1.0
+    span = float(rotor.positions[-1])
+    tilt[A.deflections], tilt[A.deflections + 1] = rotor.positions / span, 1.0 / span
+    rows = [np.kron(direction, [1.0, rotor.positions[node - 1] / span]) for node, direction in constraints]
+    if any(support.tilting_stiffness for support in rotor.supports):
+        rows += list(np.kron(np.eye(planes), [0.0, 1.0]))
+    basis = np.eye(2 * planes)
+    if rows:
+        _, s, V = np.linalg.svd(np.array(rows))
+        basis = V[int(np.count_nonzero(s > 1e-9 * s[0])) :].T
+    motions = np.column_stack((translation, tilt))
+    x = motions @ basis[:2]
+    if planes == 1:
+        return x, (x, np.zeros_like(x))
+    return x, (x, motions @ basis[2:])
+
+
+def orthonormal_rigid(pencil: Pencil) -> tuple[Array, FloatArray]:
+    """Rigid motions that are orthogonal in the mass, scaled to |rᵀ M r| = 1 kg, and the sign of each."""
+    R = np.array(pencil.rigid)
+    signs = np.ones(R.shape[1])
+    for k in range(R.shape[1]):
+        # The translation comes first, then what turns about the centre of mass.
+        for j in range(k):
+            R[:, k] -= R[:, j] * (signs[j] * (R[:, j].conj() @ multiply(pencil.mass, R[:, k : k + 1])[:, 0]))
+        inertia = float((R[:, k].conj() @ multiply(pencil.mass, R[:, k : k + 1])[:, 0]).real)
+        largest = float(np.max(np.abs(R[pencil.waves.ravel(), k]) ** 2))
+        if abs(inertia) <= 1e-14 * pencil.rotor.total_mass * largest:
+            raise ValueError(NO_MASS)
+        R[:, k] /= np.sqrt(abs(inertia))
+        signs[k] = np.sign(inertia)
+    return R, signs

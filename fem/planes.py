@@ -1,0 +1,228 @@
+"""The rotor in both planes: matrices of its equations of motion in any basis of the shaft.
+
+With single-plane matrices M, B, G, K of the shaft (see `fem.matrices`) and the speed Ω,
+
+    x:  M x'' + B x' + Ω G y' + K x + Ω B y + supports = 0
+    y:  M y'' + B y' − Ω G x' + K y − Ω B x + supports = 0
+
+Where every support is rotationally symmetric, z = x + i y takes half of the unknowns: M z'' + (B − i Ω G) z'
++ (K − i Ω B) z + supports = 0 with scalars k = kxx − i kxy and c = cxx − i cxy. A pedestal is one more
+unknown in each plane.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.matrices import Matrices, assemble, multiply
+from fem.rotor import FloatArray, Rotor
+from fem.strain import strains
+
+ComplexArray = NDArray[np.complex128]
+AnyArray = NDArray[Any]  # real where two planes are kept, complex where one complex coordinate is
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """A rotor as both planes see it.
+
+    Attributes
+    ----------
+    rotor, A
+        The rotor and its single-plane bands.
+    planes
+        2: unknowns x and y, real matrices; 1: the complex coordinate z, complex matrices.
+    rows
+        Unknown of the deflection at each support, from 0, shape (s,).
+    feet
+        Which supports stand on a pedestal, shape (f,).
+    foot_mass, foot_stiffness, foot_damping
+        Of the pedestals, shapes (f, planes).
+    tilting
+        (unknown of a slope, N·m/rad) for each support that holds the slope.
+    """
+
+    rotor: Rotor
+    A: Matrices
+    planes: int
+    rows: NDArray[np.intp]
+    feet: NDArray[np.intp]
+    foot_mass: FloatArray
+    foot_stiffness: FloatArray
+    foot_damping: FloatArray
+    tilting: tuple[tuple[int, float], ...]
+
+    def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """Stiffness and damping of all supports, each of shape (S, s, planes, planes).
+
+        Raises
+        ------
+        ValueError
+            Outside the table of a support.
+        """
+        p, shape = self.planes, (speeds.size, len(self.rotor.supports), self.planes, self.planes)
+        K, C = np.zeros(shape, dtype=self.dtype), np.zeros(shape, dtype=self.dtype)
+        for i, support in enumerate(self.rotor.supports):
+            k, c = support.at(speeds)
+            if p == 2:
+                K[:, i], C[:, i] = k, c
+            else:
+                K[:, i, 0, 0] = k[:, 0, 0] - 1j * k[:, 0, 1]
+                C[:, i, 0, 0] = c[:, 0, 0] - 1j * c[:, 0, 1]
+        return K, C
+
+    def mirrored(self, speeds: FloatArray) -> bool:
+        """Whether left eigenvectors are the right ones with y reversed (or, of z, are equal to them).
+
+        So it is where no support has a symmetric cross-coupling: kxy = −kyx, the same for damping.
+        """
+        if self.planes == 1:
+            return True
+        return all(np.array_equal(matrix[..., 0, 1], -matrix[..., 1, 0]) for matrix in self.supports(speeds))
+
+    @property
+    def dtype(self) -> type[Any]:
+        """Of the matrices."""
+        return float if self.planes == 2 else complex
+
+
+@dataclass(frozen=True, eq=False)
+class Quadratic:
+    """λ² M + λ (D₀ + Ω D₁ + supports) + K₀ + Ω K₁ + supports, in a basis of d shaft vectors per plane.
+
+    Unknowns: d per plane, plane after plane, then the pedestals, again plane after plane; R in all.
+
+    Attributes
+    ----------
+    P
+        The rotor.
+    basis
+        Vectors of one plane, shape (size, d).
+    M, D0, D1, K0, K1
+        Shape (R, R).
+    ties
+        What a unit entry (i, j) of each support's matrices adds, shape (s · planes², R²).
+    """
+
+    P: Planes
+    basis: FloatArray
+    M: FloatArray
+    D0: FloatArray
+    D1: AnyArray
+    K0: FloatArray
+    K1: AnyArray
+    ties: FloatArray
+
+    @property
+    def size(self) -> int:
+        """R."""
+        return len(self.M)
+
+    def at(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
+        """D and K at each speed, shape (S, R, R)."""
+        k, c = self.P.supports(speeds)
+        shape = (speeds.size, self.size, self.size)
+        omega = speeds[:, None, None]
+        D = self.D0 + omega * self.D1 + (c.reshape(speeds.size, len(self.ties)) @ self.ties).reshape(shape)
+        K = self.K0 + omega * self.K1 + (k.reshape(speeds.size, len(self.ties)) @ self.ties).reshape(shape)
+        return D, K
+
+    def mirror(self, vectors: AnyArray) -> AnyArray:
+        """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
+        if self.P.planes == 1:
+            return vectors
+        d, f = self.basis.shape[1], len(self.P.feet)
+        out = vectors.copy()
+        out[..., d : 2 * d] *= -1
+        out[..., 2 * d + f :] *= -1
+        return out
+
+    def expand(self, vectors: AnyArray) -> AnyArray:
+        """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
+        d = self.basis.shape[1]
+        coefficients = vectors[..., : self.P.planes * d]
+        return np.asarray(coefficients.reshape(*vectors.shape[:-1], self.P.planes, d) @ self.basis.T)
+
+    def nodes(self, vectors: AnyArray) -> AnyArray:
+        """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
+        d = self.basis.shape[1]
+        coefficients = vectors[..., : self.P.planes * d]
+        picked = self.basis[:: self.P.A.stride]
+        return np.asarray(coefficients.reshape(*vectors.shape[:-1], self.P.planes, d) @ picked.T)
+
+
+def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
+    """Look at a rotor in both planes; by default with the complex coordinate where that is enough."""
+    one = rotor.symmetric if complex_coordinate is None else complex_coordinate
+    p = 1 if one else 2
+    A = assemble(rotor)
+    supports = rotor.supports
+    stands = [(i, s.pedestal) for i, s in enumerate(supports) if s.pedestal is not None]
+    return Planes(
+        rotor=rotor,
+        A=A,
+        planes=p,
+        rows=np.array([A.stride * (s.node - 1) for s in supports], dtype=np.intp),
+        feet=np.array([i for i, _ in stands], dtype=np.intp),
+        foot_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
+        foot_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
+        foot_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
+        tilting=tuple(
+            (A.stride * (s.node - 1) + 1, s.tilting_stiffness) for s in supports if s.tilting_stiffness > 0
+        ),
+    )
+
+
+def project(P: Planes, basis: FloatArray) -> Quadratic:
+    """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
+    d, p, f = basis.shape[1], P.planes, len(P.feet)
+    R = p * (d + f)
+    strain = strains(P.rotor, basis)
+    flat = strain.reshape(-1, d)
+    K = flat.T @ flat
+    for unknown, stiffness in P.tilting:
+        K += stiffness * np.outer(basis[unknown], basis[unknown])
+    M = basis.T @ multiply(P.A.mass, basis)
+    G = basis.T @ multiply(P.A.gyroscopic, basis)
+    damped = (np.sqrt(P.rotor.material_damping)[:, None] * strain).reshape(-1, d)
+    B = damped.T @ damped
+    feet = [slice(p * d + plane * f, p * d + (plane + 1) * f) for plane in range(p)]
+
+    def along(matrix: FloatArray, foot: FloatArray) -> FloatArray:
+        """The same in each plane."""
+        full = np.zeros((R, R))
+        for plane in range(p):
+            full[plane * d : (plane + 1) * d, plane * d : (plane + 1) * d] = (matrix + matrix.T) / 2
+            full[feet[plane], feet[plane]] = np.diag(foot[:, plane])
+        return full
+
+    def across(matrix: FloatArray) -> AnyArray:
+        """Force in x from y, and with the opposite sign in y from x."""
+        full = np.zeros((R, R), dtype=P.dtype)
+        if p == 1:
+            full[:d, :d] = -1j * (matrix + matrix.T) / 2
+        else:
+            full[:d, d : 2 * d] = (matrix + matrix.T) / 2
+            full[d : 2 * d, :d] = -(matrix + matrix.T) / 2
+        return full
+
+    # What a support feels: motion of its node against the ground or the foot, in each plane.
+    felt = np.zeros((len(P.rows), p, R))
+    for plane in range(p):
+        felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
+        felt[P.feet, plane, p * d + plane * f + np.arange(f)] = -1.0
+    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, R * R)
+    return Quadratic(
+        P=P,
+        basis=basis,
+        M=along(M, P.foot_mass),
+        D0=along(B, P.foot_damping),
+        D1=across(G),
+        K0=along(K, P.foot_stiffness),
+        K1=across(B),
+        ties=ties,
+    )

@@ -1,0 +1,268 @@
+"""Campbell diagram and logarithmic decrements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from fem.plots_style import COLORS, QUIET, hertz_beside, new_axes, plain, rpm_above
+from fem.rotor import RPM, FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+
+HIGHEST = 3.0  # log decrements above count as "well damped" and are not drawn to scale
+_Look = tuple[Literal["-", "--", ":"], str, Literal["full", "none"]]
+_LOOKS: dict[str, _Look] = {
+    "forward": ("-", "^", "full"),
+    "backward": ("--", "v", "none"),
+    "mixed": (":", "D", "none"),
+}
+
+
+class CampbellLike(Protocol):
+    """What a Campbell diagram shows."""
+
+    @property
+    def speeds(self) -> FloatArray:
+        """rad/s, shape (S,)."""
+        ...
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """rad/s, shape (S, n)."""
+        ...
+
+    @property
+    def log_decrements(self) -> FloatArray:
+        """Shape (S, n)."""
+        ...
+
+    @property
+    def direction(self) -> FloatArray:
+        """Above 0 forward, below 0 backward, 0 neither, shape (S, n)."""
+        ...
+
+
+def campbell_figure(
+    campbell: CampbellLike,
+    criticals: Sequence[tuple[float, float]] = (),
+    *,
+    operating: tuple[float, float] | None = None,
+) -> Figure:
+    """Make a figure of a Campbell diagram over its logarithmic decrements."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 8.5), layout="constrained")
+    above, below = figure.subplots(2, sharex=True, height_ratios=(5, 3))
+    draw_campbell(campbell, above, criticals=criticals, operating=operating)
+    draw_log_decrements(campbell, below)
+    above.set_xlabel("")
+    above.tick_params(labelbottom=False)
+    return figure
+
+
+def draw_campbell(
+    campbell: CampbellLike,
+    ax: Axes | None = None,
+    *,
+    criticals: Sequence[tuple[float, float]] = (),
+    operating: tuple[float, float] | None = None,
+) -> Axes:
+    """Draw whirl frequencies over speed, with the 1× line.
+
+    Forward whirl is a solid line with filled triangles that point up, backward whirl a dashed one with open
+    triangles that point down, neither (a straight line) a dotted one: told apart in black and white too.
+
+    Parameters
+    ----------
+    campbell
+        Speeds, frequencies and directions.
+    ax
+        Axes to draw into; new ones if None.
+    criticals
+        Damped critical speeds to mark: speed in rad/s and log decrement there.
+    operating
+        Range of operating speeds, rad/s, shaded.
+    """
+    ax = new_axes((10, 6)) if ax is None else ax
+    top = _highest(campbell)
+    _curves(ax, campbell, campbell.frequencies)
+    last = float(campbell.speeds.max())
+    end = min(last, top)
+    ax.plot([0, end], [0, end], color="black", linewidth=1.3)
+    ax.set(xlim=_range(campbell), ylim=(0, top))
+    low = ax.get_xlim()[0]
+    middle = low + 0.93 * (end - low)
+    ax.annotate("1×", (middle, middle), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=11)
+    seen = [(speed, delta) for speed, delta in criticals if speed <= end]
+    if seen:
+        places = np.array([speed for speed, _ in seen])
+        ax.plot(places, places, "o", color="black", markerfacecolor="#F0E442", markersize=9, zorder=6)
+    _label_criticals(ax, seen)
+    if operating is not None:
+        ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+    plain(ax)
+    ax.set(xlabel="speed, rad/s", ylabel="whirl frequency, rad/s")
+    rpm_above(ax)
+    hertz_beside(ax)
+    _legend(ax, campbell, bool(seen))
+    return ax
+
+
+def draw_log_decrements(campbell: CampbellLike, ax: Axes | None = None) -> Axes:
+    """Draw logarithmic decrements over speed, with the limit of stability, as `draw_campbell` draws modes.
+
+    Values above 3 are cut off.
+    """
+    ax = new_axes((10, 4)) if ax is None else ax
+    shown = _shown(campbell)
+    delta = campbell.log_decrements[:, shown]
+    _curves(ax, campbell, campbell.log_decrements)
+    finite = delta[np.isfinite(delta)]
+    high = float(np.clip(1.1 * finite.max(initial=0.1), 0.1, HIGHEST))
+    low = float(min(1.2 * finite.min(initial=0.0), -0.12 * high))
+    ax.set(xlim=_range(campbell), ylim=(max(low, -HIGHEST), high))
+    ax.axhline(0.0, color="black", linewidth=1.1)
+    ax.axhspan(-1e3, 0.0, facecolor="#D55E00", alpha=0.10, hatch="///", edgecolor="#D55E00", linewidth=0)
+    ax.annotate("unstable", (0.01, 0.02), xycoords="axes fraction", fontsize="small", color="#8a3d00")
+    plain(ax)
+    ax.set(xlabel="speed, rad/s", ylabel="logarithmic decrement")
+    return ax
+
+
+def _range(campbell: CampbellLike) -> tuple[float, float]:
+    first, last = float(campbell.speeds.min()), float(campbell.speeds.max())
+    room = 0.06 * (last - first) or 0.05 * last or 1.0
+    return (0.0 if first < 0.3 * last else first - room / 2), last + room
+
+
+def _highest(campbell: CampbellLike) -> float:
+    w = campbell.frequencies
+    return 1.06 * float(max(w[np.isfinite(w)].max(initial=0.0), 1e-9))
+
+
+def _shown(campbell: CampbellLike) -> list[int]:
+    """Modes that have a frequency somewhere."""
+    return np.flatnonzero(np.isfinite(campbell.frequencies).any(axis=0)).tolist()
+
+
+def _curves(ax: Axes, campbell: CampbellLike, values: FloatArray) -> None:
+    S = campbell.speeds.size
+    ends = []
+    for k in _shown(campbell):
+        color = COLORS[k % len(COLORS)]
+        way = np.sign(campbell.direction[:, k])
+        for start, stop in _runs(way):
+            # Each stretch reaches to the next one, so that the curve has no gaps.
+            part = slice(start, min(stop + 1, S))
+            style, marker, fill = _LOOKS[_name(way[start])]
+            ax.plot(
+                campbell.speeds[part],
+                values[part, k],
+                style,
+                color=color,
+                linewidth=1.8,
+                marker=marker,
+                fillstyle=fill,
+                markersize=6,
+                markevery=(3 * k % max(S // 8, 1), max(S // 8, 1)),
+            )
+        good = np.flatnonzero(np.isfinite(values[:, k]))
+        if good.size and good[-1] == S - 1:
+            ends.append((float(values[-1, k]), str(k + 1), color))
+    _label_ends(ax, float(campbell.speeds.max()), ends)
+
+
+def _runs(way: FloatArray) -> list[tuple[int, int]]:
+    """Stretches of equal direction, (first, one past the last)."""
+    breaks = [0, *(np.flatnonzero(np.diff(way) != 0) + 1).tolist(), way.size]
+    return list(pairwise(breaks))
+
+
+def _name(way: float) -> str:
+    return "forward" if way > 0 else "backward" if way < 0 else "mixed"
+
+
+def _label_ends(ax: Axes, x: float, ends: list[tuple[float, str, str]]) -> None:
+    """Mode numbers right of the curves; close neighbours stand side by side."""
+    heights = [value for value, _, _ in ends]
+    near = 0.03 * (max(heights, default=1.0) - min(0.0, *heights, 0.0) or 1.0)
+    last, column = -np.inf, 0
+    for value, text, color in sorted(ends):
+        column = column + 1 if value - last < near else 0
+        last = value if column == 0 else last
+        ax.annotate(
+            text,
+            (x, value),
+            xytext=(5 + 11 * column, 0),
+            textcoords="offset points",
+            va="center",
+            color=color,
+            fontsize="small",
+            fontweight="bold",
+            annotation_clip=True,
+        )
+
+
+def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None:
+    """Speed and log decrement beside each mark, on the other side of the 1× line for close neighbours."""
+    room = 0.06 * (ax.get_ylim()[1] - ax.get_ylim()[0])
+    last, crowd = -np.inf, 0
+    for speed, delta in sorted(criticals):
+        crowd = crowd + 1 if speed - last < room else 0
+        last = speed
+        right = crowd % 2 == 0
+        ax.annotate(
+            f"{speed * RPM:.0f} rpm, δ = {delta:.2f}",
+            (speed, speed),
+            xytext=(9, -5 - 13 * (crowd // 2)) if right else (-9, 5 + 13 * (crowd // 2)),
+            textcoords="offset points",
+            va="top" if right else "bottom",
+            ha="left" if right else "right",
+            fontsize="small",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
+            zorder=7,
+        )
+
+
+def _legend(ax: Axes, campbell: CampbellLike, marked: bool) -> None:
+    from matplotlib.lines import Line2D
+
+    shown = np.sign(campbell.direction[:, _shown(campbell)])
+    names = [name for name in _LOOKS if any(_name(way) == name for way in np.unique(shown))]
+    handles: list[Line2D] = [
+        Line2D(
+            [],
+            [],
+            color=QUIET,
+            linestyle=style,
+            marker=marker,
+            fillstyle=fill,
+            markersize=6,
+            label=f"{name} whirl",
+        )
+        for name, (style, marker, fill) in _LOOKS.items()
+        if name in names
+    ]
+    if marked:
+        handles.append(
+            Line2D(
+                [],
+                [],
+                color="black",
+                linestyle="",
+                marker="o",
+                markerfacecolor="#F0E442",
+                markersize=9,
+                label="damped critical speed",
+            )
+        )
+    ax.legend(
+        handles=handles, loc="upper left", frameon=True, framealpha=0.85, edgecolor="none", fontsize="small"
+    )

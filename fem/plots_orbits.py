@@ -1,0 +1,63 @@
+"""Orbits of shaft centres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem.plots_style import COLORS, STYLES, new_axes, plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_TITLE = "dot: where the shaft is as the mark passes the x axis; rotation anticlockwise"
+
+
+def draw_orbits(
+    x: ArrayLike, y: ArrayLike, labels: Sequence[str], ax: Axes | None = None, *, title: str = ""
+) -> Axes:
+    """Draw orbits: a dot where the mark passes, an arrow in the direction of motion.
+
+    Forward whirl (with the rotation, anticlockwise) is a solid line, backward whirl a dashed one.
+
+    Parameters
+    ----------
+    x, y
+        Complex peak amplitudes of the two directions, m, shape (n,): x(t) = Re(x e^{iωt}).
+    labels
+        Of the orbits, length n.
+    ax
+        Axes to draw into; new ones if None.
+    title
+        Above the legend, such as the speed.
+    """
+    ax = new_axes((6.5, 6)) if ax is None else ax
+    turn = np.linspace(0.0, 2 * np.pi, 241)
+    X, Y = np.atleast_1d(np.asarray(x, complex)), np.atleast_1d(np.asarray(y, complex))
+    for k, (a, b, label) in enumerate(zip(X, Y, labels, strict=True)):
+        color = COLORS[k % len(COLORS)]
+        path = 1e6 * np.real(np.stack((a, b))[:, None] * np.exp(1j * turn))
+        area = float(np.imag(np.conj(a) * -b))  # π times this, with its sign
+        flat = abs(area) < 1e-9 * (abs(a) ** 2 + abs(b) ** 2)
+        direction = "straight" if flat else "forward" if area > 0 else "backward"
+        ax.plot(*path, STYLES[0] if area >= 0 or flat else STYLES[1], color=color, linewidth=1.7,
+                label=f"{label}, {direction}")  # fmt: skip
+        ax.plot(*path[:, 0], "o", color=color, markersize=7, markeredgecolor="white", zorder=4)
+        ax.annotate(
+            "",
+            xy=tuple(path[:, 40]),
+            xytext=tuple(path[:, 34]),
+            arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "mutation_scale": 16},
+        )
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set(xlabel="x, µm", ylabel="y, µm")
+    ax.margins(0.08)
+    plain(ax)
+    ax.axhline(0, color="#9aa2ad", linewidth=0.7, zorder=0.5)
+    ax.axvline(0, color="#9aa2ad", linewidth=0.7, zorder=0.5)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, fontsize="small",
+              title=f"{title}\n{_TITLE}".strip(), title_fontsize="small")  # fmt: skip
+    return ax

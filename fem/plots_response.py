@@ -1,0 +1,233 @@
+"""Vibration over speed: amplitudes, Bode and polar plots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem.plots_style import COLORS, MARKERS, STYLES, legend_above, legend_beside, new_axes, plain, rpm_above
+from fem.rotor import RPM, FloatArray
+from fem.sensors import label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.ticker import MultipleLocator
+
+    from fem.vibration import InfluenceCoefficients, Response
+
+
+def draw_response(response: Response, ax: Axes | None, nodes: Sequence[str | int] | None) -> Axes:
+    """Draw amplitude over speed at some nodes: the longer half axis of their orbits."""
+    amplitude = response.major
+    if nodes is None:
+        # Where a machine is measured, and where it moves most.
+        named_nodes: list[str | int] = [*response.rotor.stations]
+        named_nodes = named_nodes or [support.node for support in response.rotor.supports]
+        nodes = list(dict.fromkeys([*named_nodes, int(np.argmax(amplitude.max(axis=0))) + 1]))
+    named = [f"node {node}" if isinstance(node, int) else str(node) for node in nodes]
+    curves = amplitude[:, [response.rotor.node(node) - 1 for node in nodes]]
+    return _over_speed(ax, response.speeds, 1e6 * curves, named, "amplitude, µm")
+
+
+def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
+    """Draw the size of each influence coefficient over speed."""
+    S = influence.speeds.size
+    named = [
+        f"sensor {label(sensor)}, plane {plane}" for sensor in influence.sensors for plane in influence.planes
+    ]
+    # 1 m per kg·m is 1 µm per g·mm.
+    curves = np.abs(influence.W).reshape(S, -1)
+    return _over_speed(ax, influence.speeds, curves, named, "influence, µm per g·mm")
+
+
+def draw_bode(
+    speeds: ArrayLike,
+    readings: ArrayLike,
+    labels: Sequence[str],
+    axes: tuple[Axes, Axes] | None = None,
+    *,
+    peaks: Sequence[tuple[float, str]] = (),
+    operating: tuple[float, float] | None = None,
+) -> tuple[Axes, Axes]:
+    """Draw amplitude and phase of readings over speed.
+
+    Parameters
+    ----------
+    speeds
+        rad/s, shape (S,), ascending.
+    readings
+        Complex peak amplitudes, m, positive phase = lead, shape (S, C).
+    labels
+        Of the readings, length C.
+    axes
+        For the amplitude and for the phase; new ones if None.
+    peaks
+        Speeds to mark, rad/s, each with a text for the amplitude's axes.
+    operating
+        Range of operating speeds, rad/s, shaded.
+
+    Returns
+    -------
+    tuple of matplotlib.axes.Axes
+        The axes drawn into.
+    """
+    if axes is None:
+        from matplotlib import pyplot as plt
+
+        _, (above, below) = plt.subplots(
+            2, figsize=(10, 6.5), sharex=True, layout="constrained", height_ratios=(3, 2)
+        )
+        axes = above, below
+    above, below = axes
+    omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
+    _over_speed(above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak")
+    for k, reading in enumerate(Z.T):
+        style = _style(k, len(labels))
+        seen = np.abs(reading) > 0
+        phase = np.degrees(np.unwrap(np.angle(reading[seen])))
+        if phase.size:
+            # The middle of the curve between -360 and 0: a lag, as engineers read it.
+            phase -= 360 * np.ceil(np.median(phase) / 360)
+        below.plot(omega[seen], phase, style, color=COLORS[k % len(COLORS)], linewidth=1.6)
+    plain(below)
+    below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
+    below.yaxis.set_major_locator(_right_angles(below))
+    above.set_xlabel("")
+    above.tick_params(labelbottom=False)
+    rpm_above(above)
+    if operating is not None:
+        for ax in axes:
+            ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+        above.annotate(
+            "operating range",
+            (np.mean(operating), 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, -4),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize="small",
+            color="#4a5360",
+        )
+    for speed, text in peaks:
+        for ax in axes:
+            ax.axvline(speed, color="#4a5360", linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
+        above.annotate(
+            text,
+            (speed, 0.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, 5),
+            textcoords="offset points",
+            rotation=90,
+            va="bottom",
+            ha="left",
+            fontsize="small",
+            color="#2f3640",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )
+    return axes
+
+
+def draw_polar(
+    speeds: ArrayLike, readings: ArrayLike, labels: Sequence[str], ax: Axes | None = None, *, marks: int = 6
+) -> Axes:
+    """Draw readings as curves in the plane (Nyquist): distance is amplitude, angle is phase lead.
+
+    Parameters
+    ----------
+    speeds, readings, labels
+        As for `draw_bode`.
+    ax
+        Polar axes; new ones if None.
+    marks
+        About how many speeds to write along each curve.
+    """
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        _, ax = plt.subplots(figsize=(7.5, 7), layout="constrained", subplot_kw={"projection": "polar"})
+    omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
+    marked: list[complex] = []
+    for k, (reading, named) in enumerate(zip(Z.T, labels, strict=True)):
+        color = COLORS[k % len(COLORS)]
+        phase, size = np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
+        ax.plot(phase, size, STYLES[k % len(STYLES)], color=color, linewidth=1.6, label=named)
+        for i in _along(reading, marks):
+            if any(abs(reading[i] - other) < 0.05 * np.abs(Z).max() for other in marked):
+                continue
+            marked.append(complex(reading[i]))
+            marker = MARKERS[k % len(MARKERS)]
+            ax.plot(phase[i], size[i], marker, color=color, markersize=5, markeredgecolor="white")
+            ax.annotate(
+                f"{omega[i] * RPM:.0f}",
+                (phase[i], size[i]),
+                xytext=(8 * np.cos(phase[i]), 8 * np.sin(phase[i])),
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize="x-small",
+                color=color,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+            )
+    ax.grid(color="#d0d5dc", linewidth=0.8)
+    ax.set_xlabel("amplitude, µm peak, over phase lead in degrees; marks: speed in rpm", labelpad=10)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), ncols=3, frameon=False, fontsize="small")
+    return ax
+
+
+def _along(curve: np.ndarray[tuple[int], np.dtype[np.complex128]], marks: int) -> list[int]:
+    """Indices about evenly spaced along a curve, so that a resonance gets its share."""
+    if curve.size < 2:
+        return list(range(curve.size))
+    steps = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve)))))
+    if not steps[-1] > 0:
+        return [0]
+    wanted = np.linspace(0, steps[-1], marks + 1)
+    return sorted({int(np.argmin(np.abs(steps - place))) for place in wanted})
+
+
+def _right_angles(ax: Axes) -> MultipleLocator:
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = ax.get_ylim()
+    return MultipleLocator(next(step for step in (15, 30, 45, 90, 180, 360, 1e9) if (high - low) / step <= 8))
+
+
+def _style(k: int, n: int) -> str:
+    """Few curves differ by their style too, so that a black-and-white print tells them apart."""
+    return STYLES[(k if n <= len(STYLES) else k // len(COLORS)) % len(STYLES)]
+
+
+def _over_speed(
+    ax: Axes | None, speeds: FloatArray, curves: FloatArray, labels: Sequence[str], ylabel: str
+) -> Axes:
+    ax = new_axes() if ax is None else ax
+    n = len(COLORS)
+    order = np.argsort(speeds, kind="stable")
+    marker = "o" if speeds.size < 12 else None
+    for k, (curve, named) in enumerate(zip(curves.T, labels, strict=True)):
+        style = _style(k, len(labels))
+        ax.plot(
+            speeds[order],
+            curve[order],
+            style,
+            color=COLORS[k % n],
+            marker=marker,
+            linewidth=1.6,
+            label=named,
+        )
+    positive = curves[curves > 0]
+    if positive.size and positive.max() > 30 * positive.min():
+        ax.set_yscale("log")
+        ax.set_ylim(bottom=max(positive.min() / 2, positive.max() * 1e-6))
+    ax.set(xlabel="speed, rad/s", ylabel=ylabel)
+    ax.margins(x=0.01)
+    plain(ax)
+    if max(map(len, labels), default=0) > 20:
+        legend_above(ax, columns=2)  # beside, long names would leave no room for the curves
+    else:
+        legend_beside(ax)
+    return ax

@@ -1,0 +1,72 @@
+"""What the pictures share: colours, line styles, axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem.rotor import RPM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Okabe and Ito: told apart by every eye.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STYLES = ("-", "--", "-.", ":")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+GRID, QUIET = "#e4e7eb", "#6b7480"
+
+
+def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
+    """Make axes of a new figure, size in inches."""
+    from matplotlib import pyplot as plt
+
+    _, ax = plt.subplots(figsize=size, layout="constrained")
+    return ax
+
+
+def legend_above(ax: Axes, columns: int = 3, marker_scale: float = 1.0) -> None:
+    """A legend that hides nothing, above the axes."""
+    ax.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        markerscale=marker_scale,
+        labelspacing=0.6,
+    )
+
+
+def legend_beside(ax: Axes) -> None:
+    """A legend that hides nothing, right of the axes."""
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize="small")
+
+
+def plain(ax: Axes) -> None:
+    """A grid behind the curves, no box."""
+    ax.grid(color=GRID, linewidth=0.8)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def rpm_above(ax: Axes) -> None:
+    """A second scale, revolutions per minute, above one in rad/s."""
+    top = ax.secondary_xaxis("top", functions=(times(RPM), times(1 / RPM)))
+    top.set_xlabel("speed, rpm", fontsize="small")
+    top.tick_params(labelsize="small")
+
+
+def hertz_beside(ax: Axes) -> None:
+    """A second scale, Hz, right of one in rad/s."""
+    right = ax.secondary_yaxis("right", functions=(times(1 / (2 * np.pi)), times(2 * np.pi)))
+    right.set_ylabel("frequency, Hz", fontsize="small")
+    right.tick_params(labelsize="small")
+
+
+def times(factor: float) -> Callable[[ArrayLike], ArrayLike]:
+    """A change of units, for a second scale."""
+    return lambda value: np.asarray(value, float) * factor

@@ -1,0 +1,304 @@
+"""Undamped critical speed map: critical speeds over the stiffness of the supports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem.critical import critical_speeds
+from fem.rotor import RPM, FloatArray, Rotor, whole
+from fem.supports import Support
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+_Criticals = Callable[[float], FloatArray]  # critical speeds for a stiffness
+_DECADES = 4  # of the default range, to both sides of the shaft's own stiffness
+
+
+@dataclass(frozen=True)
+class Intersection:
+    """Where a critical speed meets the stiffness that a support really has.
+
+    Attributes
+    ----------
+    support
+        Its name, or "support 2".
+    direction
+        "x", "y", or "x and y" where they are equal.
+    mode
+        Number of the critical speed.
+    speed
+        rad/s.
+    stiffness
+        N/m.
+    """
+
+    support: str
+    direction: str
+    mode: int
+    speed: float
+    stiffness: float
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedMap:
+    """Critical speeds over support stiffness.
+
+    Attributes
+    ----------
+    stiffness
+        Of each support of the map, N/m, shape (K,).
+    speeds
+        Critical speeds, rad/s, shape (K, n); NaN where a mode has none (thin discs).
+    free, pinned
+        Their limits for vanishing and for infinite stiffness, rad/s, shape (n,).
+    own
+        What the supports really have: label, stiffness (N/m) and the speeds (rad/s) at which they have it.
+    intersections
+        Where these curves meet.
+    rotor
+        The rotor.
+    """
+
+    stiffness: FloatArray
+    speeds: FloatArray
+    free: FloatArray
+    pinned: FloatArray
+    own: tuple[tuple[str, FloatArray, FloatArray], ...]
+    intersections: tuple[Intersection, ...]
+    rotor: Rotor
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON; one list of speeds per mode."""
+
+        def plain(row: FloatArray) -> list[float | None]:
+            return [float(v) if np.isfinite(v) else None for v in row]
+
+        return {
+            "stiffness_N_per_m": self.stiffness.tolist(),
+            "critical_speeds_rad_s": [plain(row) for row in self.speeds.T],
+            "free_rad_s": plain(self.free),
+            "pinned_rad_s": plain(self.pinned),
+            "intersections": [
+                {
+                    "support": item.support,
+                    "direction": item.direction,
+                    "mode": item.mode,
+                    "speed_rad_s": item.speed,
+                    "stiffness_N_per_m": item.stiffness,
+                }
+                for item in self.intersections
+            ],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per stiffness, one column per critical speed."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"stiffness_N_per_m": self.stiffness}
+        columns |= {f"critical_speed_{k}_rad_s": row for k, row in enumerate(self.speeds.T, start=1)}
+        return pd.DataFrame(columns)
+
+    def summary(self) -> str:
+        """Limits and intersections as text."""
+        lines = [
+            f"Critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m each",
+            "mode    free, rad/s  pinned, rad/s",
+            *(
+                f"{k:4d}{a:15.4f}{b:15.4f}"
+                for k, (a, b) in enumerate(zip(self.free, self.pinned, strict=True), 1)
+            ),
+        ]
+        if self.intersections:
+            lines.append("with the stiffness that the supports have")
+        lines += [
+            f"{item.support}, {item.direction}: critical speed {item.mode} at {item.speed:.6g} rad/s = "
+            f"{item.speed * RPM:.6g} rpm, {item.stiffness:.4g} N/m"
+            for item in self.intersections
+        ]
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw critical speeds and the supports' own stiffness, both axes logarithmic; return the axes."""
+        from fem.plots_map import draw_speed_map
+
+        return draw_speed_map(self.stiffness, self.speeds, ax, supports=self.own)
+
+
+def speed_map(
+    rotor: Rotor,
+    stiffness: ArrayLike | None = None,
+    n: int = 4,
+    *,
+    supports: Sequence[str | int] | None = None,
+) -> SpeedMap:
+    """Compute the undamped critical speeds for supports of equal stiffness.
+
+    Forward synchronous whirl with gyroscopic effect, as `critical_speeds`. Damping and cross-coupling play no
+    part, and a support of the map stands on the ground.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    stiffness
+        N/m, ascending; by default eight decades around the shaft's own stiffness 48 E I / L³.
+    n
+        How many critical speeds.
+    supports
+        Names or numbers (from 1, in the rotor's order) of the supports whose stiffness varies; the others
+        stay as they are. All by default.
+
+    Raises
+    ------
+    ValueError
+        For impossible stiffness, an unknown support, or more critical speeds than the model has.
+    """
+    chosen = _chosen(rotor, supports)
+    n = whole(n, "the number of critical speeds")
+    flexural = (
+        48 * float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
+    )
+    if stiffness is None:
+        stiffness = flexural * np.logspace(-_DECADES, _DECADES, 8 * _DECADES + 1)
+    k = _checked(stiffness)
+
+    def at(value: float) -> FloatArray:
+        return _criticals(_with_stiffness(rotor, chosen, value), n)
+
+    speeds = np.array([at(float(value)) for value in k])
+    # ω∞ (1 − c/k) for stiff supports: two of them tell the limit.
+    stiff = max(1e5 * flexural, 10 * float(k[-1]))
+    pinned = 2 * at(2 * stiff) - at(stiff)
+    own, meetings = [], []
+    for i in chosen:
+        support = rotor.supports[i]
+        name = support.name or f"support {i + 1}"
+        for direction, curve, where in _own_curves(support):
+            label = name if direction == "x and y" else f"{name}, {direction}"
+            own.append((label, curve, where))
+            meetings += [
+                Intersection(name, direction, mode, speed, value)
+                for mode, speed, value in _meet(at, curve, where)
+            ]
+    for array in (speeds, pinned):
+        array.flags.writeable = False
+    return SpeedMap(k, speeds, _free(at, float(k[0])), pinned, tuple(own), tuple(meetings), rotor)
+
+
+def _chosen(rotor: Rotor, supports: Sequence[str | int] | None) -> list[int]:
+    if not rotor.supports:
+        raise ValueError("the rotor has no support whose stiffness could vary: add supports")
+    if supports is None:
+        return list(range(len(rotor.supports)))
+    names = [support.name for support in rotor.supports]
+    chosen = []
+    for item in supports:
+        if isinstance(item, str):
+            if item not in names or not item:
+                known = ", ".join(name for name in names if name) or "none has a name"
+                raise ValueError(
+                    f"no support is called {item!r} (supports: {known}); give a name or a number"
+                )
+            chosen.append(names.index(item))
+            continue
+        number = whole(item, "a support")
+        if not 1 <= number <= len(names):
+            raise ValueError(f"support {number} does not exist: the rotor has supports 1 to {len(names)}")
+        chosen.append(number - 1)
+    if not chosen:
+        raise ValueError("choose one support at least whose stiffness varies")
+    return chosen
+
+
+def _checked(stiffness: ArrayLike) -> FloatArray:
+    try:
+        k = np.atleast_1d(np.array(stiffness, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError("stiffness must be numbers in N/m") from None
+    if k.ndim != 1 or not k.size or not (np.isfinite(k) & (k > 0)).all() or (np.diff(k) <= 0).any():
+        raise ValueError("stiffness must be finite, above 0 and ascending, in N/m")
+    k.flags.writeable = False
+    return k
+
+
+def _with_stiffness(rotor: Rotor, chosen: list[int], value: float) -> Rotor:
+    supports = [
+        Support(s.node, value, name=s.name, kind=s.kind, tilting_stiffness=s.tilting_stiffness)
+        if i in chosen
+        else s
+        for i, s in enumerate(rotor.supports)
+    ]
+    changed: Rotor = replace(rotor, supports=supports)
+    return changed
+
+
+def _criticals(rotor: Rotor, n: int) -> FloatArray:
+    """The n lowest, NaN for those that the model does not have."""
+    for m in range(n, 0, -1):
+        try:
+            found = critical_speeds(rotor, m).frequencies
+        except ValueError:
+            # Thin discs take critical speeds away; anything else is the user's to know.
+            if m == 1 or not rotor.model.gyroscopic:
+                raise
+            continue
+        return np.concatenate((found, np.full(n - m, np.nan)))
+    raise ValueError(f"{n} critical speeds cannot be found; choose n from 1")
+
+
+def _free(at: _Criticals, lowest: float) -> FloatArray:
+    """Limit for vanishing stiffness; rigid motions have 0."""
+    soft = 1e-4 * lowest
+    one, other = at(soft), at(soft / 4)
+    # Either the frequency tends to 0 with the root of the stiffness, or to its limit linearly.
+    rigid = np.abs(other / one - 0.5) < 0.05
+    limit = np.where(rigid, 0.0, other - (one - other) / 3)
+    limit.flags.writeable = False
+    return limit
+
+
+def _own_curves(support: Support) -> list[tuple[str, FloatArray, FloatArray]]:
+    """Direction, stiffness and the speeds at which the support has it (none: at all speeds)."""
+    where = np.array(support.speeds)
+    k, _ = support.at(where if where.size else np.zeros(1))
+    x, y = k[:, 0, 0], k[:, 1, 1]
+    if support.pedestal is not None:
+        (px, py) = support.pedestal.xy("stiffness")
+        x, y = x * px / (x + px), y * py / (y + py)
+    curves = [("x and y", x)] if np.array_equal(x, y) else [("x", x), ("y", y)]
+    return [(direction, curve, where) for direction, curve in curves]
+
+
+def _meet(at: _Criticals, curve: FloatArray, where: FloatArray) -> list[tuple[int, float, float]]:
+    """Mode, speed and stiffness where ω(k) meets a support's curve."""
+    if not where.size:
+        value = float(curve[0])
+        if value <= 0:
+            return []
+        return [(j + 1, float(w), value) for j, w in enumerate(at(value)) if np.isfinite(w)]
+    if (curve <= 0).any():
+        return []
+    f = np.array([at(float(value)) for value in curve]) - where[:, None]
+    found = []
+    for i, j in zip(*np.nonzero((f[:-1] > 0) != (f[1:] > 0)), strict=True):
+        if not np.isfinite(f[i : i + 2, j]).all():
+            continue
+        (a, b), (fa, fb) = where[i : i + 2], f[i : i + 2, j]
+        for _ in range(60):
+            speed = b - fb * (b - a) / (fb - fa)
+            value = float(np.interp(speed, where, curve))
+            here = float(at(value)[j] - speed)
+            if abs(here) <= 1e-12 * speed:
+                break
+            # Illinois: the end that stays loses half of its weight.
+            fa, a = (fa / 2, a) if (here > 0) == (fb > 0) else (fb, b)
+            b, fb = speed, here
+        found.append((int(j) + 1, float(speed), value))
+    return sorted(found)

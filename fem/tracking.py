@@ -1,0 +1,161 @@
+"""Follow modes over speed by the likeness of their shapes (MAC), with smaller steps where it is not plain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem.planes import ComplexArray
+from fem.quadratic import NONE, solve
+from fem.rotor import FloatArray
+from fem.whirlsolve import Whirl
+
+_ALIKE = 0.8  # MAC of a mode with itself a step further
+_OTHER = 0.5  # largest MAC with another mode, relative to it
+_NEARER = (
+    0.2  # or how much nearer to 1 its own MAC is: heavily damped modes may be alike at one speed already
+)
+_HALVINGS = 10
+_TRIALS = 24  # speeds tried between two given ones: modes alike at every step would cost 2 to the tenth
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Modes over speed.
+
+    Attributes
+    ----------
+    values
+        Eigenvalue of each mode at each speed, NaN where it was not found, shape (S, c).
+    vectors
+        Its vector, shape (S, c, R).
+    lost
+        Whether a mode may have gone on above those that were computed, shape (c,).
+    doubtful
+        Speeds (index of the interval's start) at which shapes did not tell the modes apart at any step.
+    """
+
+    values: ComplexArray
+    vectors: ComplexArray
+    lost: NDArray[np.bool_]
+    doubtful: tuple[int, ...]
+
+
+def follow(whirl: Whirl) -> Followed:
+    """Chain the eigenpairs of neighbouring speeds."""
+    values, X = whirl.found.values, whirl.found.vectors
+    S, m = values.shape
+    weight = whirl.Q.M * whirl.scale**2
+    weight = weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight))
+    labels = np.full((S, m), -1)
+    labels[0, np.isfinite(values[0])] = np.flatnonzero(np.isfinite(values[0]))
+    count = m
+    lost: set[int] = set()
+    doubtful = []
+    alike = likeness(values[:-1], X[:-1], values[1:], X[1:], weight)
+    partner = np.argmax(alike, axis=2)
+    obvious = _obvious(alike, partner)
+    for k in range(S - 1):
+        if obvious[k]:
+            labels[k + 1, partner[k]] = labels[k]
+            continue
+        pairs, plain = _pairs(alike[k])
+        if not plain:
+            ends = (values[k], X[k]), (values[k + 1], X[k + 1])
+            pairs, plain, _ = _bridge(whirl, weight, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
+            if not plain:
+                doubtful.append(k)
+        for i, j in pairs.items():
+            labels[k + 1, j] = labels[k, i]
+        fresh = np.flatnonzero(np.isfinite(values[k + 1]) & (labels[k + 1] < 0))
+        labels[k + 1, fresh] = count + np.arange(fresh.size)
+        count += fresh.size
+        if np.isfinite(values[k + 1]).all():
+            lost |= {int(labels[k, i]) for i in np.flatnonzero(np.isfinite(values[k])) if i not in pairs}
+    out = np.full((S, count), NONE)
+    vectors = np.full((S, count, X.shape[2]), NONE)
+    at, rank = np.nonzero(labels >= 0)
+    out[at, labels[at, rank]] = values[at, rank]
+    vectors[at, labels[at, rank]] = X[at, rank]
+    return Followed(out, vectors, np.isin(np.arange(count), list(lost)), tuple(doubtful))
+
+
+def likeness(
+    one: ComplexArray, X: ComplexArray, other: ComplexArray, Y: ComplexArray, weight: FloatArray
+) -> FloatArray:
+    """MAC of states (u, λ u / |λ|), mass-weighted, between modes (…, i) and (…, j); 0 where there is none.
+
+    The velocities tell apart forward and backward whirl of one shape in a complex coordinate, and modes of
+    different damping.
+    """
+    X, Y = np.nan_to_num(X), np.nan_to_num(Y)
+    WX, WY = X @ weight, Y @ weight
+    cross = np.abs(np.einsum("...ir,...jr->...ij", X.conj(), WY)) ** 2
+    size = np.einsum("...ir,...ir->...i", X.conj(), WX).real[..., :, None]
+    size = size * np.einsum("...jr,...jr->...j", Y.conj(), WY).real[..., None, :]
+    turn = (
+        np.angle(np.nan_to_num(one, nan=1.0))[..., :, None]
+        - np.angle(np.nan_to_num(other, nan=1.0))[..., None, :]
+    )
+    mac = cross / np.maximum(size, np.finfo(float).tiny) * np.cos(turn / 2) ** 2
+    there = np.isfinite(one)[..., :, None] & np.isfinite(other)[..., None, :]
+    return np.asarray(np.where(there, mac, 0.0))
+
+
+def _obvious(mac: FloatArray, partner: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """At which steps every mode has a partner beyond doubt, shape (S − 1,)."""
+    best = np.take_along_axis(mac, partner[:, :, None], axis=2)[:, :, 0]
+    others = mac.copy()
+    np.put_along_axis(others, partner[:, :, None], 0.0, axis=2)
+    across = np.take_along_axis(others.max(axis=1), partner, axis=1)
+    rivals = np.maximum(others.max(axis=2), across)
+    one_each = (np.sort(partner, axis=1) == np.arange(mac.shape[1])).all(axis=1)
+    plain = (rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals))
+    return np.asarray(one_each & ((best >= _ALIKE) & plain).all(axis=1))
+
+
+def _pairs(mac: FloatArray) -> tuple[dict[int, int], bool]:
+    """Partners by falling MAC, and whether they are beyond doubt."""
+    left = mac.copy()
+    pairs: dict[int, int] = {}
+    plain = True
+    for _ in range(len(mac)):
+        i, j = (int(index) for index in np.unravel_index(int(np.argmax(left)), left.shape))
+        best = left[i, j]
+        if best <= 0:
+            break
+        rivals = max(np.delete(mac[i], j).max(initial=0.0), np.delete(mac[:, j], i).max(initial=0.0))
+        plain &= bool(best >= _ALIKE and (rivals <= _OTHER * best or 1 - best <= _NEARER * (1 - rivals)))
+        # What is hardly alike is another mode that came while this one went.
+        if best >= 0.3:
+            pairs[i] = j
+        left[i], left[:, j] = 0.0, 0.0
+    return pairs, plain
+
+
+def _bridge(
+    whirl: Whirl,
+    weight: FloatArray,
+    speeds: FloatArray,
+    start: tuple[ComplexArray, ComplexArray],
+    end: tuple[ComplexArray, ComplexArray],
+    depth: int,
+    trials: int,
+) -> tuple[dict[int, int], bool, int]:
+    """Partners over an interval by way of its middle, whether they are beyond doubt, and trials left."""
+    middle = float(speeds.mean())
+    found = solve(whirl.Q, np.array([middle]), len(start[0]), whirl.scale)
+    trials -= 1
+    half = found.values[0], found.vectors[0]
+    pairs = []
+    plain = True
+    for a, b, ends in ((start, half, (speeds[0], middle)), (half, end, (middle, speeds[1]))):
+        step, sure = _pairs(likeness(a[0], a[1], b[0], b[1], weight))
+        if not sure and depth < _HALVINGS and trials > 0:
+            step, sure, trials = _bridge(whirl, weight, np.array(ends), a, b, depth + 1, trials)
+        pairs.append(step)
+        plain &= sure
+    first, second = pairs
+    return {i: second[j] for i, j in first.items() if j in second}, plain, trials

@@ -1,0 +1,290 @@
+"""Results of the synchronous response: vibration, bearing forces, influence coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fem.rotor import RPM, FloatArray, Rotor, Support
+from fem.sensors import SensorLike, as_sensor, label
+from fem.supports import ComplexArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
+
+    On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
+    others they are ellipses: x = Re X e^{iωt} with X = F + b, y = Re Y e^{iωt} with Y = −i (F − b).
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    amplitudes
+        Forward complex amplitudes F, m, shape (S, N); positive phase = lead.
+    unbalance
+        What was mounted, `{node: m r e^{iφ}}`, kg·m.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    backward
+        Complex amplitudes b, m, shape (S, N).
+    """
+
+    speeds: FloatArray
+    amplitudes: ComplexArray
+    unbalance: Mapping[int, complex]
+    rotor: Rotor
+    warnings: tuple[str, ...]
+    backward: ComplexArray
+
+    @property
+    def x(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in x, m, shape (S, N)."""
+        return np.asarray(self.amplitudes + self.backward)
+
+    @property
+    def y(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in y, m, shape (S, N)."""
+        return np.asarray(-1j * (self.amplitudes - self.backward))
+
+    @property
+    def major(self) -> FloatArray:
+        """Longer half axis of each orbit, m, shape (S, N)."""
+        return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
+
+    @property
+    def minor(self) -> FloatArray:
+        """Shorter half axis, m, shape (S, N); negative where the orbit runs against the rotation."""
+        return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+
+    def at(self, sensor: SensorLike) -> ComplexArray:
+        """Complex amplitude that a sensor reads over speed, m, shape (S,).
+
+        A node or station means the direction x; (node, angle) or a `Sensor` any other.
+        """
+        sensor = as_sensor(sensor, self.rotor)
+        i, turn = self.rotor.node(sensor.node) - 1, np.exp(1j * sensor.radians)
+        return np.asarray(self.amplitudes[:, i] * turn.conj() + self.backward[:, i] * turn)
+
+    def bearing_forces(self) -> BearingForces:
+        """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
+        X, Y = self.x, self.y
+        forces = np.empty((2, self.speeds.size, len(self.rotor.supports)), dtype=complex)
+        for k, support in enumerate(self.rotor.supports):
+            motion = np.stack((X[:, support.node - 1], Y[:, support.node - 1]), axis=1)
+            D = support.dynamic_stiffness(self.speeds)
+            forces[:, :, k] = np.einsum("sij,sj->is", D, motion)
+        forces.flags.writeable = False
+        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1])
+
+    def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
+        sensors = list(range(1, self.rotor.n_nodes + 1) if sensors is None else sensors)
+        Z = np.array([self.at(sensor) for sensor in sensors]).reshape(len(sensors), -1)
+        return {
+            "speeds_rad_s": self.speeds.tolist(),
+            "sensors": [label(sensor) for sensor in sensors],
+            "amplitude_m": np.abs(Z).tolist(),
+            "phase_deg": phase_degrees(Z).tolist(),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and node: the reading in x; where x and y differ, also y and the orbit."""
+        import pandas as pd
+
+        S, N = self.amplitudes.shape
+        columns = {
+            "speed_rad_s": np.repeat(self.speeds, N),
+            "node": np.tile(np.arange(1, N + 1), S),
+            "amplitude_m": np.abs(self.x).ravel(),
+            "phase_deg": phase_degrees(self.x).ravel(),
+        }
+        if not self.rotor.symmetric:
+            columns |= {
+                "amplitude_y_m": np.abs(self.y).ravel(),
+                "phase_y_deg": phase_degrees(self.y).ravel(),
+                "major_axis_m": self.major.ravel(),
+                "minor_axis_m": self.minor.ravel(),
+            }
+        return pd.DataFrame(columns)
+
+    def summary(self) -> str:
+        """The highest peak and where it is, as text."""
+        amplitude = self.major
+        k, i = np.unravel_index(int(np.argmax(amplitude)), amplitude.shape)
+        lines = [
+            f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
+            f"largest amplitude {1e6 * amplitude[k, i]:.4g} µm at node {i + 1}, "
+            f"{self.speeds[k]:.6g} rad/s = {self.speeds[k] * RPM:.6g} rpm",
+        ]
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+
+    def plot(self, ax: Axes | None = None, nodes: Sequence[str | int] | None = None) -> Axes:
+        """Draw amplitude over speed at some nodes; by default stations or supports, and the largest."""
+        from fem.plots import draw_response
+
+        return draw_response(self, ax, nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class BearingForces:
+    """Forces of the rotor on its supports, Re (x, y) e^{iωt}.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    supports
+        What is loaded, length B.
+    x, y
+        Complex amplitudes, N, shape (S, B).
+    """
+
+    speeds: FloatArray
+    supports: Sequence[Support]
+    x: ComplexArray
+    y: ComplexArray
+
+    @property
+    def largest(self) -> FloatArray:
+        """Largest force during a turn, N, shape (S, B)."""
+        F, b = (self.x + 1j * self.y) / 2, (self.x - 1j * self.y) / 2
+        return np.asarray(np.abs(F) + np.abs(b))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and support."""
+        import pandas as pd
+
+        S, B = self.x.shape
+        return pd.DataFrame(
+            {
+                "speed_rad_s": np.repeat(self.speeds, B),
+                "node": [support.node for support in self.supports] * S,
+                "support": [support.name for support in self.supports] * S,
+                "force_x_N": np.abs(self.x).ravel(),
+                "phase_x_deg": phase_degrees(self.x).ravel(),
+                "force_y_N": np.abs(self.y).ravel(),
+                "phase_y_deg": phase_degrees(self.y).ravel(),
+                "largest_N": self.largest.ravel(),
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "speeds_rad_s": self.speeds.tolist(),
+            "nodes": [support.node for support in self.supports],
+            **{
+                f"{name}_{axis}_{unit}": value.T.tolist()
+                for axis, force in (("x", self.x), ("y", self.y))
+                for name, unit, value in (
+                    ("force", "N", np.abs(force)),
+                    ("phase", "deg", phase_degrees(force)),
+                )
+            },
+        }
+
+    def summary(self) -> str:
+        """The largest force on each support, as text."""
+        lines = [f"{'support':>16}{'largest force, N':>18}{'at rad/s':>12}"]
+        for support, force in zip(self.supports, self.largest.T, strict=True):
+            k = int(np.argmax(force))
+            name = support.name or f"node {support.node}"
+            lines.append(f"{name:>16}{force[k]:18.6g}{self.speeds[k]:12.6g}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class InfluenceCoefficients:
+    """Vibration at sensors per unit of unbalance in planes.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    sensors, planes
+        Sensors and planes as they were asked for, lengths C and P.
+    W
+        Complex, m per kg·m, shape (S, C, P); Z = W U, positive phase = lead.
+    warnings
+        What the reader must know.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[SensorLike, ...]
+    planes: tuple[str | int, ...]
+    W: ComplexArray
+    warnings: tuple[str, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed, sensor and plane: the influence table of INTERFACE.md."""
+        import pandas as pd
+
+        S, C, P = self.W.shape
+        return pd.DataFrame(
+            {
+                "speed_rad_s": np.repeat(self.speeds, C * P),
+                "sensor": [label(sensor) for sensor in self.sensors for _ in self.planes] * S,
+                "plane": list(self.planes) * (S * C),
+                "influence_m_per_kg_m": np.abs(self.W).ravel(),
+                "phase_deg": phase_degrees(self.W).ravel(),
+            }
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`; the units stand once."""
+        keys = ("speed", "sensor", "plane", "influence", "phase")
+        units = {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"}
+        rows = self.to_frame().set_axis(list(keys), axis=1).to_dict("records")
+        return {"rows": rows, "units": units, "warnings": list(self.warnings)}
+
+    def summary(self) -> str:
+        """A table at one speed, or the range of sizes over many, as text."""
+        lines = [
+            f"Influence coefficients at {speed_range(self.speeds)}: {len(self.sensors)} sensors, "
+            f"{len(self.planes)} planes",
+            f"{'sensor':>12}{'plane':>12}{'µm per g·mm':>14}{'phase lead, deg':>17}",
+        ]
+        if self.speeds.size > 1:
+            lines[1] = f"{'sensor':>12}{'plane':>12}{'µm per g·mm, least':>20}{'largest':>12}{'at rad/s':>12}"
+        for c, sensor in enumerate(self.sensors):
+            for p, plane in enumerate(self.planes):
+                size = np.abs(self.W[:, c, p])
+                k = int(np.argmax(size))
+                line = f"{label(sensor)!s:>12}{plane!s:>12}"
+                if self.speeds.size > 1:
+                    line += f"{size.min():20.4g}{size[k]:12.4g}{self.speeds[k]:12.6g}"
+                else:
+                    line += f"{size[0]:14.4g}{phase_degrees(self.W[:, c, p])[0]:17.2f}"
+                lines.append(line)
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the size of each influence coefficient over speed; return the axes."""
+        from fem.plots import draw_influence
+
+        return draw_influence(self, ax)
+
+
+def phase_degrees(Z: ComplexArray) -> FloatArray:
+    """Phase as lead, 0 ≤ phase < 360 degrees."""
+    phase = np.mod(np.degrees(np.angle(Z)), 360.0)
+    return np.where(phase >= 360.0, 0.0, phase)
+
+
+def speed_range(speeds: FloatArray) -> str:
+    """A speed, or how many from where to where, as text."""
+    if speeds.size == 1:
+        return f"{speeds[0]:.6g} rad/s"
+    return f"{speeds.size} speeds from {speeds.min():.6g} to {speeds.max():.6g} rad/s"

@@ -1,0 +1,236 @@
+"""Whirl: complex eigenvalues and shapes of the rotor turning at a speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fem.eigen import finite_modes
+from fem.matrices import assemble
+from fem.orbits import whirl_direction
+from fem.planes import ComplexArray, both_planes
+from fem.rotor import RPM, FloatArray, Rotor, whole
+from fem.whirlexact import exact_modes
+from fem.whirlsolve import solve_whirl
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
+
+
+@dataclass(frozen=True, eq=False)
+class WhirlModes:
+    """Modes of the rotor at one speed, by rising frequency.
+
+    Attributes
+    ----------
+    speed
+        rad/s.
+    eigenvalues
+        λ with Im λ > 0, rad/s, shape (n,): the motion is Re(shape · e^{λt}).
+    x, y
+        Complex shapes in both planes, shape (N, n), the farthest node at amplitude 1.
+    real
+        Eigenvalues of motions that do not oscillate (overdamped, or running away), rad/s, as far as they
+        were found, slowest first.
+    error
+        Estimated relative error of the eigenvalues.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    """
+
+    speed: float
+    eigenvalues: ComplexArray
+    x: ComplexArray
+    y: ComplexArray
+    real: FloatArray
+    error: float
+    rotor: Rotor
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Whirl frequencies |Im λ|, rad/s, shape (n,)."""
+        return np.asarray(self.eigenvalues.imag)
+
+    @property
+    def log_decrements(self) -> FloatArray:
+        """Logarithmic decrements −2π Re λ / |Im λ|, shape (n,); negative: unstable."""
+        return np.asarray(-2 * np.pi * self.eigenvalues.real / self.eigenvalues.imag)
+
+    @property
+    def direction(self) -> FloatArray:
+        """1 forward, −1 backward, 0 neither (a line, or different along the rotor), shape (n,)."""
+        return whirl_direction(self.x.T, self.y.T)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "speed_rad_s": self.speed,
+            "frequencies_rad_s": self.frequencies.tolist(),
+            "log_decrements": self.log_decrements.tolist(),
+            "direction": [DIRECTION_NAMES[float(d)] for d in self.direction],
+            "real_eigenvalues_rad_s": self.real.tolist(),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per mode: frequency, log decrement, direction."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "mode": range(1, self.eigenvalues.size + 1),
+                "frequency_rad_s": self.frequencies,
+                "log_decrement": self.log_decrements,
+                "direction": [DIRECTION_NAMES[float(d)] for d in self.direction],
+            }
+        )
+
+    def summary(self) -> str:
+        """The modes as text."""
+        lines = [
+            f"Whirl at {self.speed:.6g} rad/s = {self.speed * RPM:.6g} rpm",
+            "mode     rad/s         rpm   log dec  direction",
+        ]
+        for k, (omega, delta, way) in enumerate(
+            zip(self.frequencies, self.log_decrements, self.direction, strict=True), start=1
+        ):
+            lines.append(
+                f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{delta:10.4f}  {DIRECTION_NAMES[float(way)]}"
+            )
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+
+
+def whirl_modes(
+    rotor: Rotor, speed: float, n: int = 6, *, method: Literal["fast", "exact"] = "fast"
+) -> WhirlModes:
+    """Compute the whirl modes of lowest frequency at a speed.
+
+    Parameters
+    ----------
+    rotor
+        The rotor with all its supports.
+    speed
+        rad/s.
+    n
+        How many modes that oscillate; forward and backward whirl count apart.
+    method
+        "fast" (a reduced basis whose error is known, below 1e-7) or "exact" (the full model: a check).
+
+    Raises
+    ------
+    ValueError
+        If the speed is impossible or outside the table of a support, the model has fewer modes, or the mesh
+        is too fine for float64.
+    """
+    speeds = checked_speeds([speed])
+    P = both_planes(rotor)
+    n = checked_number(rotor, n)
+    if method not in ("fast", "exact"):
+        raise ValueError(f'method must be "fast" or "exact", not {method!r}')
+    if method == "exact":
+        values, vectors, real, still = exact_modes(P, float(speeds[0]), n)
+        shapes = vectors[:, :, :: P.A.stride]
+        error = 0.0
+    else:
+        solution = solve_whirl(P, speeds, n)
+        values, real = solution.found.values[0], solution.found.real[0]
+        still, error = int(solution.found.still[0]), solution.error
+        there = np.isfinite(values)
+        values = values[there]
+        shapes = solution.Q.nodes(solution.found.vectors[0, there])
+    if not values.size:
+        raise ValueError(
+            f"the rotor has no oscillating mode at {speed:.6g} rad/s: all motions are overdamped"
+        )
+    values, x, y = in_both_planes(values, shapes)
+    size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
+    x, y = x.T / size, y.T / size
+    warnings = told(P.planes, real, still, values.size, n)
+    return WhirlModes(float(speeds[0]), values, x, y, real, error, rotor, warnings)
+
+
+def in_both_planes(
+    values: ComplexArray, shapes: ComplexArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Eigenvalues with Im λ > 0 and their x and y, from (…) and (…, planes, N)."""
+    if shapes.shape[-2] == 2:
+        return values, shapes[..., 0, :], shapes[..., 1, :]
+    z = shapes[..., 0, :]
+    back = (values.imag < 0)[..., None]
+    # z = φ e^{λt}: x is its real part, y its imaginary part; the conjugate of λ has the positive frequency.
+    x = np.where(back, z.conj(), z)
+    y = np.where(back, 1j, -1j) * x
+    return np.where(values.imag < 0, values.conj(), values), x, y
+
+
+def told(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
+    """What is not among the modes."""
+    texts = []
+    if found < n:
+        texts.append(f"only {found} of {n} modes oscillate, the others are overdamped")
+    rigid = still // 2
+    if rigid:
+        texts.append(f"rigid-body motions that nothing holds (eigenvalue 0, {still} times) are left out")
+    growing = real[real > 0] if planes == 2 else real[real > 0][:1]
+    if growing.size:
+        texts.append(
+            f"the rotor runs away without oscillating (eigenvalue {growing.max():.4g} 1/s): "
+            "a support pushes it aside; check negative stiffness"
+        )
+    return tuple(texts)
+
+
+def checked_speeds(speeds: ArrayLike) -> FloatArray:
+    """Speeds as an array, ascending.
+
+    Raises
+    ------
+    ValueError
+        If they are no numbers, negative or not ascending.
+    """
+    try:
+        array = np.atleast_1d(np.array(speeds, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError("speeds must be numbers in rad/s") from None
+    if array.ndim != 1 or not array.size:
+        raise ValueError("speeds must be one number or a list of at least one")
+    if not (np.isfinite(array) & (array >= 0)).all():
+        raise ValueError("speeds must be finite and not negative, in rad/s")
+    if (np.diff(array) <= 0).any():
+        k = int(np.argmax(np.diff(array) <= 0))
+        raise ValueError(
+            f"speeds must ascend, but {array[k + 1]:.6g} rad/s follows {array[k]:.6g} rad/s; sort them"
+        )
+    array.flags.writeable = False
+    return array
+
+
+def checked_number(rotor: Rotor, n: int) -> int:
+    """How many modes to look for.
+
+    Raises
+    ------
+    ValueError
+        If the model has fewer.
+    """
+    n, available = whole(n, "the number of modes"), available_modes(rotor)
+    if not 1 <= n <= available:
+        raise ValueError(
+            f"{n} modes cannot be found: the model has 1 to {available}; "
+            "choose n in this range, or divide the shaft into more elements"
+        )
+    return n
+
+
+def available_modes(rotor: Rotor) -> int:
+    """How many modes can oscillate at most: two for each unknown of a plane that moves mass."""
+    feet = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
+    return 2 * (finite_modes(assemble(rotor)) + feet)

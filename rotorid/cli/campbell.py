@@ -1,0 +1,67 @@
+"""`rotorid campbell`: whirl frequencies, logarithmic decrements and damped critical speeds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rotorid.cli.common import (
+    JsonOption,
+    OperatingOption,
+    OutputOption,
+    PlotOption,
+    RotorArgument,
+    band,
+    check_targets,
+    emit,
+    speeds,
+)
+from rotorid.cli.progress import busy
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def campbell(
+    rotor: RotorArgument,
+    speed: Annotated[
+        str,
+        typer.Option("--speeds", help="FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm."),
+    ],
+    n: Annotated[
+        int, typer.Option("-n", "--number", min=1, help="How many modes; forward and backward count apart.")
+    ] = 6,
+    operating: OperatingOption = None,
+    json: JsonOption = False,
+    plot: PlotOption = None,
+    output: OutputOption = None,
+) -> None:
+    """Whirl frequencies, logarithmic decrements and directions over speed, and damped critical speeds.
+
+    The picture is a Campbell diagram with the 1× line, over the logarithmic decrements.
+
+    Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
+    """
+    import fem
+    from fem.plots import campbell_figure
+    from rotorid.tables import read_rotor, rotor_files
+
+    check_targets(plot, output)
+    service = band(operating)
+    model, omega = read_rotor(rotor), speeds(speed)
+    with busy(f"whirl at {len(omega)} speeds"):
+        result = fem.campbell(model, omega, n)
+
+    def picture() -> Figure:
+        return campbell_figure(result, result.criticals, operating=service)
+
+    emit(
+        result.to_dict(),
+        result.summary,
+        as_json=json,
+        files=rotor_files(rotor),
+        options={"speeds": speed, "number": n, "operating": operating},
+        figure=(plot, picture),
+        table=(output, result.to_frame),
+    )

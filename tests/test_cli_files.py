@@ -1,0 +1,206 @@
+"""Files of the command line: nothing is overwritten that should stay, nothing is half done."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from rotorid.cli.common import speeds
+from rotorid.samples import sample_data
+
+ROTOR = sample_data() / "rotor23.csv"
+BK = sample_data() / "bk_two_plane"
+
+
+@pytest.fixture
+def job(tmp_path):
+    for name in ("job.toml", "runs.csv", "weights.csv"):
+        shutil.copy(BK / name, tmp_path / name)
+    shutil.copy(ROTOR, tmp_path / "rotor.csv")
+    return tmp_path
+
+
+@pytest.mark.parametrize("option", ["--output", "--save-influence"])
+@pytest.mark.parametrize("name", ["runs.csv", "weights.csv", "./../{folder}/runs.csv", "link.csv"])
+def test_inputs_are_never_overwritten(cli, job, option, name):
+    (job / "link.csv").symlink_to(job / "runs.csv")
+    before = {path: path.read_bytes() for path in job.iterdir()}
+    target = job / name.format(folder=job.name)
+    for files in (("job.toml",), ("runs.csv", "weights.csv")):
+        outcome = cli("balance", *(job / f for f in files), option, target)
+        assert outcome.code == 2
+        assert f"{target}: this is an input of the command" in outcome.err
+        assert {path: path.read_bytes() for path in job.iterdir()} == before
+
+
+def test_a_rotor_table_is_not_overwritten(cli, job):
+    outcome = cli("critical", job / "rotor.csv", "--output", job / "rotor.csv")
+    assert outcome.code == 2
+    assert "must not be overwritten" in outcome.err
+    assert (job / "rotor.csv").read_bytes() == ROTOR.read_bytes()
+
+
+def test_two_results_need_two_files(cli, job):
+    outcome = cli("balance", job / "job.toml", "--output", job / "s.csv", "--save-influence", job / "s.csv")
+    assert outcome.code == 2
+    assert f"{job / 's.csv'}: two results cannot go into one file" in outcome.err
+    assert not (job / "s.csv").exists()
+
+
+@pytest.mark.parametrize("option", ["--output", "--save-influence", "--plot"])
+def test_all_results_or_none(cli, job, option):
+    others = {"--output": job / "o.csv", "--save-influence": job / "i.csv", "--plot": job / "p.png"}
+    folder = job / f"folder{others[option].suffix}"
+    folder.mkdir()
+    others[option] = folder
+    before = sorted(job.iterdir())
+    outcome = cli("balance", job / "job.toml", *(x for pair in others.items() for x in pair))
+    assert outcome.code == 2
+    assert outcome.err == f"rotorid: {folder}: cannot be written, it is a folder\n"
+    assert outcome.out == ""
+    assert sorted(job.iterdir()) == before
+
+
+def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, monkeypatch):
+    from pathlib import Path
+
+    opened = Path.open
+
+    def full(path, mode="r", *rest, **options):
+        if "x" in mode and ".i.csv" in path.name:
+            raise OSError(28, "No space left on device", str(path))
+        return opened(path, mode, *rest, **options)
+
+    monkeypatch.setattr(Path, "open", full)
+    before = sorted(job.iterdir())
+    outcome = cli("balance", job / "job.toml", "--output", job / "o.csv", "--save-influence", job / "i.csv")
+    assert outcome.code == 2
+    assert outcome.err == f"rotorid: {job / 'i.csv'}: expected a file that can be written (No space left on device)\n"  # fmt: skip  # noqa: E501
+    assert sorted(job.iterdir()) == before
+
+
+def test_demo_keeps_what_people_changed(cli, tmp_path):
+    folder = tmp_path / "d"
+    assert cli("demo", folder).code == 0
+    assert cli("demo", folder).code == 0  # make demo, again
+    mine = folder / "turbo_job" / "job.toml"
+    mine.write_text("mine", encoding="utf-8")
+    outcome = cli("demo", folder)
+    assert outcome.code == 2
+    assert f"{mine}: differs from the sample and would be overwritten; delete it" in outcome.err
+    assert mine.read_text(encoding="utf-8") == "mine"
+
+
+def test_demo_does_not_write_into_the_sample_data(cli, tmp_path):
+    before = sorted(sample_data().rglob("*"))
+    (tmp_path / "link").symlink_to(sample_data())
+    for folder in (sample_data(), sample_data() / "turbo_job", tmp_path / "link"):
+        outcome = cli("demo", folder)
+        assert outcome.code == 2
+        assert "these are the sample data themselves" in outcome.err
+    assert sorted(sample_data().rglob("*")) == before
+    (tmp_path / "file").write_text("x", encoding="utf-8")
+    assert "this is a file" in cli("demo", tmp_path / "file").err
+
+
+@pytest.mark.parametrize(
+    ("redirection", "words"), [(">&-", "standard output is closed"), ("> /dev/full", "No space left")]
+)
+def test_a_result_that_nobody_can_read_is_no_success(redirection, words):
+    command = f"{sys.executable} -m rotorid critical {ROTOR} --json {redirection}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("rotorid: ")
+    assert words in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_names_of_files_cannot_steer_the_terminal(cli):
+    outcome = cli("critical", "no\x1b[31m.csv")
+    assert outcome.code == 2
+    assert "\x1b" not in outcome.err
+    assert "no\\x1b[31m.csv" in outcome.err
+
+
+def test_speeds_of_balance_are_in_the_unit_of_the_job(cli):
+    job = sample_data() / "turbo_job" / "job.toml"
+    found = [
+        cli("balance", job, "--speeds", text, "--json").json
+        for text in ("1220,1360", "1220rpm,1360rpm", "1220,1360rpm", f"{1220 / 60!r}Hz, {1360 / 60!r} Hz")
+    ]
+    assert {r["speed_rpm"] for r in found[0]["residuals"]} == {1220, 1360}
+    for other in found[1:]:
+        assert other["corrections"] == found[0]["corrections"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("20Hz,60rpm", [40 * np.pi, 2 * np.pi]),
+        ("100 rad/s, 60rpm", [100.0, 2 * np.pi]),
+        ("60rpm:120rpm:60rpm", [2 * np.pi, 4 * np.pi]),
+    ],
+)
+def test_a_unit_at_each_speed(text, expected):
+    assert speeds(text) == pytest.approx(expected)
+
+
+def test_speeds_without_a_unit():
+    assert speeds("60,120", "rpm") == pytest.approx([2 * np.pi, 4 * np.pi])
+    assert speeds("60rad_s", "rpm") == [60.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("20Hz,100,60rpm", "give the unit at every speed, or once at the end"),
+        ("20Hz,100", "give the unit at every speed"),
+        ("1rpm:2Hz:1rpm", "a range has one unit"),
+        ("1,,2", "not a range"),
+        ("rpm", "not a range"),
+        ("1:2", "not a range"),
+        ("", "not a range"),
+    ],
+)
+def test_speeds_that_are_none(text, words):
+    with pytest.raises(ValueError, match=words):
+        speeds(text)
+
+
+def test_dependent_planes_end_with_status_2(cli, tmp_path):
+    rows = ["run,speed_rpm,sensor,amplitude_um_pp,phase_deg"]
+    effect, base = np.array([2 + 1j, 1 - 2j, 3j]), np.array([5, 4j, 3 + 3j])
+    for run, size in (("b", 0), ("t1", 1), ("t2", 0.5 + 0.2j)):
+        for sensor, z in zip("ABC", base + effect * size, strict=True):
+            rows.append(f"{run},1000,{sensor},{abs(z):.3f},{np.degrees(np.angle(z)):.3f}")
+    (tmp_path / "runs.csv").write_text("\n".join(rows), encoding="utf-8")
+    (tmp_path / "weights.csv").write_text(
+        "run,plane,mass_g,angle_deg\nt1,L,5,0\nt2,R,5,0\n", encoding="utf-8"
+    )
+    files = tmp_path / "runs.csv", tmp_path / "weights.csv"
+    for options in ((), ("--amplitude-error", 1, "--phase-error", 1)):
+        outcome = cli("balance", *files, *options, "--json")
+        assert (outcome.code, outcome.out) == (2, "")
+        assert "planes 'L' and 'R' act alike at every sensor and speed" in outcome.err
+
+
+def test_reduce_writes_masses_and_modes_apart(cli, tmp_path):
+    import pandas as pd
+
+    table = tmp_path / "t.csv"
+    assert cli("reduce", ROTOR, "--nodes", "7,12,18", "--modes", "2", "--output", table).code == 0
+    frame = pd.read_csv(table)
+    assert frame["table"].tolist() == ["masses"] * 3 + ["modes"] * 3
+    assert table.read_text(encoding="utf-8").splitlines()[1].startswith("masses,7,0.973,134.2")
+    assert frame["mode"].dropna().tolist() == [1, 2, 3]
+
+
+def test_reduce_speaks_as_the_other_commands(cli):
+    text = cli("reduce", ROTOR, "--nodes", "3,7,12", "--modes", "1").out
+    assert "warning:" not in text
+    assert "Warning: " in text
+    assert "e+0" not in text

@@ -1,0 +1,281 @@
+"""Commands on rotor models: critical, campbell, response, influence."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+from tables_data import write_csv
+
+import fem
+from rotorid.cli import progress
+from rotorid.cli.common import band, nodes, sensors
+from rotorid.samples import sample_data
+from rotorid.tables import read_influence, read_rotor, read_unbalance, write_rotor
+
+ROTOR23 = sample_data() / "rotor23.csv"
+COMPRESSOR = sample_data() / "compressor" / "rotor.toml"
+UNBALANCE = sample_data() / "compressor" / "unbalance.csv"
+MOUNTED = [["plane", "unbalance_g_mm", "angle_deg"], ["wheel", 500, 0], ["3", 100, 90]]
+
+
+@pytest.fixture
+def model():
+    """A small anisotropic rotor whose rear bearing is known from 50 to 2000 rad/s."""
+    return fem.Rotor(
+        [0.15] * 6,
+        0.05,
+        discs=[fem.Disc(4, 15.0, 0.15, 0.08, "wheel")],
+        supports=[
+            fem.Support(1, ((2e7, 0.0), (0.0, 4e7)), 2e3, "front"),
+            fem.Support(
+                7, (((2e7, 1e5), (-1e5, 4e7)), ((3e7, 1e5), (-1e5, 5e7))), 2e3, "rear", speeds=(50.0, 2000.0)
+            ),
+        ],
+        stations={"wheel": 4, "probe": 2},
+        model=fem.Model(rotary_inertia=True, gyroscopic=True),
+    )
+
+
+@pytest.fixture
+def files(tmp_path, model):
+    write_rotor(tmp_path / "rotor.toml", model)
+    write_csv(tmp_path / "u.csv", MOUNTED)
+    return tmp_path / "rotor.toml", tmp_path / "u.csv"
+
+
+def test_campbell_gives_the_keys_of_the_interface(cli, files, model, tmp_path):
+    document = cli("campbell", files[0], "--speeds", "50:550:50", "-n", 4, "--json").json
+    assert set(document) >= {"speeds_rad_s", "frequencies_rad_s", "log_decrements", "direction", "provenance"}
+    expected = fem.campbell(model, np.arange(50.0, 551.0, 50.0), 4)
+    np.testing.assert_allclose(document["speeds_rad_s"], expected.speeds)
+    np.testing.assert_allclose(np.array(document["frequencies_rad_s"]).T, expected.frequencies, rtol=1e-9)
+    np.testing.assert_allclose(np.array(document["log_decrements"]).T, expected.log_decrements, rtol=1e-6)
+    assert {way for mode in document["direction"] for way in mode} <= {"forward", "backward", "mixed"}
+    for critical in document["damped_critical_speeds"]:
+        assert 50 < critical["speed_rad_s"] < 550
+    assert [i["file"].rpartition("/")[2] for i in document["provenance"]["inputs"]] == [
+        "rotor.toml", "rotor_shaft.csv", "rotor_bearing_2.csv"
+    ]  # fmt: skip
+    outcome = cli("campbell", files[0], "--speeds", "50:550:50", "--plot", tmp_path / "c.png")
+    assert outcome.code == 0, outcome.err
+    assert "damped critical speeds" in outcome.out
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_response_reads_at_angles_and_stations(cli, files, model):
+    document = cli(
+        "response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10",
+        "--sensors", "probe:45,wheel,3:-30", "--operating", "450:550", "--json",
+    ).json  # fmt: skip
+    assert document["sensors"] == ["probe at 45°", "wheel", "3 at -30°"]
+    speeds = np.array(document["speeds_rad_s"])
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, speeds)
+    Z = expected.at(("probe", 45.0))
+    np.testing.assert_allclose(document["amplitude_m"][0], np.abs(Z), rtol=1e-9)
+    np.testing.assert_allclose(
+        np.exp(1j * np.radians(document["phase_deg"][0])), Z / np.abs(Z), rtol=0, atol=1e-9
+    )
+    assert np.array(document["amplitude_m"]).shape == (3, speeds.size)
+    orbits = document["orbits"]
+    assert orbits["nodes"] == [2, 4, 3]
+    np.testing.assert_allclose(orbits["major_axis_m"][1], expected.major[:, 3], rtol=1e-9)
+    np.testing.assert_allclose(orbits["minor_axis_m"][1], np.abs(expected.minor[:, 3]), rtol=1e-6, atol=1e-15)
+    assert {way for node in orbits["direction"] for way in node} <= {"forward", "backward", "straight"}
+    assert document["bearing_forces"]["nodes"] == [1, 7]
+    peak = next(peak for peak in document["peaks"] if peak["sensor"] == "wheel")
+    summit = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [peak["speed_rad_s"]], method="exact")
+    assert peak["amplitude"] == pytest.approx(abs(summit.at("wheel")[0]), rel=1e-6)
+    assert peak["amplitude"] > max(document["amplitude_m"][1])
+    assert peak["amplification_factor"] > 1
+    assert peak["separation_margin_percent"] >= 0
+
+
+def test_response_without_sensors_reads_stations_or_supports(cli, files, tmp_path):
+    plain = fem.Rotor([0.3] * 3, 0.05, supports=[fem.Support(1, 1e7, 1e3), fem.Support(4, 1e7, 1e3)])
+    write_rotor(tmp_path / "plain.csv", plain)
+    write_csv(tmp_path / "n.csv", [["node", "mass_g", "radius_mm", "angle_deg"], [2, 2, 50, 0]])
+    command = ("--speeds", "60:200:70", "--json")
+    by_stations = cli("response", files[0], "--unbalance", files[1], *command).json
+    assert by_stations["sensors"] == ["wheel", "probe"]
+    by_supports = cli("response", tmp_path / "plain.csv", "--unbalance", tmp_path / "n.csv", *command).json
+    assert by_supports["sensors"] == [1, 4]
+    expected = fem.unbalance_response(plain, {2: 1e-4}, [60.0])
+    assert by_supports["amplitude_m"][0][0] == pytest.approx(abs(expected.at(1)[0]), rel=1e-9)
+    assert {way for node in by_supports["orbits"]["direction"] for way in node} == {"forward"}
+
+
+def test_pictures_and_tables_of_a_response(cli, files, tmp_path):
+    for view in ("bode", "polar", "orbits"):
+        picture = tmp_path / f"{view}.png"
+        outcome = cli(
+            "response", files[0], "--unbalance", files[1], "--speeds", "600:6000:60rpm", "--view", view,
+            "--at", "3000rpm", "--operating", "4500:5500rpm", "--plot", picture,
+            "--output", tmp_path / "t.csv",
+        )  # fmt: skip
+        assert outcome.code == 0, outcome.err
+        assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "largest force" in outcome.out
+    assert "peaks at wheel" in outcome.out
+    frame = pd.read_csv(tmp_path / "t.csv")
+    assert list(frame.columns) == ["speed_rad_s", "sensor", "amplitude_m", "phase_deg"]
+    assert len(frame) == 2 * 91
+
+
+def test_influence_with_angles_feeds_balance(cli, files, model, tmp_path):
+    table = tmp_path / "w.csv"
+    document = cli(
+        "influence", files[0], "--planes", "wheel,3", "--sensors", "probe:45,6", "--speeds", "100,120",
+        "--output", table, "--plot", tmp_path / "w.png", "--json",
+    ).json  # fmt: skip
+    W = fem.influence(model, ["wheel", 3], [("probe", 45.0), 6], [100.0, 120.0]).W
+    sizes = np.array([row["influence"] for row in document["rows"]]).reshape(2, 2, 2)
+    np.testing.assert_allclose(sizes, np.abs(W), rtol=1e-9)
+    stored = read_influence(table)
+    assert stored.sensors == ("probe at 45°", "6")
+    assert stored.planes == ("wheel", "3")
+    assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):
+    document = cli("critical", files[0], "-n", 2, "--mesh-check", "--map", "--json").json
+    assert len(document["direction"]) == 2
+    assert np.abs(document["mesh_check"]["relative_error"]).max() < 1e-3
+    curves = np.array(document["map"]["critical_speeds_rad_s"])
+    assert curves.shape == (2, len(document["map"]["stiffness_N_per_m"]))
+    assert (np.diff(curves[0]) > 0).all()
+    outcome = cli(
+        "critical", files[0], "-n", 2, "--map", "--plot", tmp_path / "m.png", "--output", tmp_path / "m.csv"
+    )
+    assert outcome.code == 0, outcome.err
+    assert "with the stiffness that the supports have" in outcome.out
+    assert len(pd.read_csv(tmp_path / "m.csv")) == curves.shape[1]
+
+
+def test_reduce_takes_stations(cli, files):
+    by_name = cli("reduce", files[0], "--nodes", "probe,wheel,6", "--modes", 2, "--json")
+    if by_name.code == 0:
+        assert by_name.json["nodes"] == [2, 4, 6]
+    else:
+        # What reduction cannot do with such supports is one sentence, not about names.
+        assert "station" not in by_name.err
+
+
+OK_SPEEDS = ("--speeds", "100:200:50")
+BAD = [
+    (("campbell", "R", "--speeds", "100:3000:100"), "'rear' at node 7: its table holds 50 to 2000 rad/s"),
+    (("campbell", "R", *OK_SPEEDS, "-n", "0"), "-n"),
+    (("campbell", "R", *OK_SPEEDS, "-n", "500"), "500 modes cannot be found"),
+    (("campbell", "R", *OK_SPEEDS, "--operating", "9:5"), "--operating '9:5' is not a range"),
+    (("campbell", "R", "--speeds", "200,100"), "ascend"),
+    (("response", "R", "--unbalance", "U", "--speeds", "100:2500:100"), "'rear' at node 7"),
+    (("response", "R", "--unbalance", "none.csv", *OK_SPEEDS), "none.csv"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "prope"), "no station is called 'prope'"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "probe:400"), "-360 to 360"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "1,,2"), "with commas"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "300"), "asked for from 100 to 200 rad/s"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--at", "100,110"), "--at takes one speed"),
+    (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--view", "3d"), "--view"),
+    (("influence", "R", "--planes", "wheel", "--sensors", "99:45", *OK_SPEEDS), "node 99 does not exist"),
+]
+
+
+@pytest.mark.parametrize(("args", "message"), BAD)
+def test_bad_input_ends_with_status_2_and_one_message(cli, files, args, message):
+    outcome = cli(*({"R": files[0], "U": files[1]}.get(arg, arg) for arg in args))
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+    assert outcome.out == ""
+
+
+def test_bad_rotor_files_end_with_status_2(cli, files):
+    good = files[0].read_text(encoding="utf-8")
+    for old, new, message in (
+        ("gyroscopic = true", "gyroscopic = 1", "key model.gyroscopic: found '1', expected true or false"),
+        (
+            "gyroscopic",
+            "gyroscopics",
+            "key model.gyroscopics: found 'true', expected a known key (did you mean 'gyroscopic'?)",
+        ),
+        ("rotor_bearing_2.csv", "bearing.csv", "bearing.csv"),
+        ("kxx_N_per_m = 20000000.0", "kxx_N_per_m = nan", "key bearing[1].kxx_N_per_m: found 'nan'"),
+    ):
+        assert old in good
+        files[0].write_text(good.replace(old, new), encoding="utf-8")
+        outcome = cli("campbell", files[0], *OK_SPEEDS)
+        assert outcome.code == 2
+        assert message in outcome.err
+
+
+BAD_UNBALANCE = [
+    ([["plane", "unbalance_g_mm"], ["4", 1]], "angle_deg"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["wheal", 1, 0]], "did you mean 'wheel'?"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["9", 1, 0]], "a node from 1 to 7 or a station"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 0, 0]], "a number above 0"),
+    ([["plane", "unbalance_g_mm", "angle_deg"], ["4", 1, 400]], "an angle from -360 to 360 degrees"),
+    ([["plane", "mass_g", "angle_deg"], ["4", 1, 0]], "either a column unbalance_<unit>, or both"),
+    ([["plane", "mass_g", "radius_mm", "unbalance_g_mm", "angle_deg"], ["4", 1, 1, 1, 0]], "either a column"),
+    ([["unbalance_g_mm", "angle_deg"], [1, 0]], "one column plane or node: a node or a station"),
+    ([["plane", "node", "unbalance_g_mm", "angle_deg"], ["4", "4", 1, 0]], "plane or node, not both"),
+    ([["plane", "unbalance_gmm", "angle_deg"], ["4", 1, 0]], "unbalance_gmm"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("table", "message"), BAD_UNBALANCE)
+def test_bad_unbalance_tables(cli, files, table, message):
+    write_csv(files[1], table)
+    outcome = cli("response", files[0], "--unbalance", files[1], *OK_SPEEDS)
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1
+
+
+def test_unbalance_of_one_node_adds_up(model, tmp_path):
+    table = [["plane", "unbalance_oz_in", "angle_deg"], ["wheel", 1, 0], ["4", 1, 180], ["3", 1, -90]]
+    mounted = read_unbalance(write_csv(tmp_path / "u.csv", table), model)
+    assert mounted[4] == 0
+    assert mounted[3] == pytest.approx(-1j * 0.028349523125 * 0.0254, rel=1e-14)
+
+
+def test_nodes_sensors_and_ranges_of_the_command_line():
+    assert nodes("7, impeller 3,12", "--planes") == [7, "impeller 3", 12]
+    assert sensors("2:45,probe DE:-30.5,22,a:b") == [(2, 45.0), ("probe DE", -30.5), 22, "a:b"]
+    assert band("60:120rpm") == pytest.approx((2 * np.pi, 4 * np.pi))
+    assert band(None) is None
+
+
+def test_the_sample_compressor_meets_its_margins(cli):
+    document = cli(
+        "response", COMPRESSOR, "--unbalance", UNBALANCE, "--speeds", "1000:15000:20rpm",
+        "--sensors", "probe DE:45,probe NDE:45", "--operating", "5300:6500rpm", "--json",
+    ).json  # fmt: skip
+    judged = [peak["enough"] for peak in document["peaks"] if peak["enough"] is not None]
+    assert len(judged) >= 4
+    assert all(judged)
+    first = read_rotor(COMPRESSOR)
+    assert first.node("probe DE") == 3
+
+
+def test_waiting_is_shown_at_a_terminal_only(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "PATIENCE", 0.01)
+    with progress.busy("nothing to see"):
+        time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress.busy("whirl at 3 speeds"):
+        time.sleep(0.3)
+    assert "whirl at 3 speeds" in capsys.readouterr().err
+    monkeypatch.setattr(progress, "PATIENCE", 60.0)
+    with progress.busy("quickly done"):
+        pass
+    assert capsys.readouterr().err == ""
+
+
+def test_help_has_an_example(cli):
+    for command in ("campbell", "response", "critical", "influence"):
+        assert "Example: rotorid " + command in cli(command, "--help").out

@@ -1,0 +1,171 @@
+import dataclasses
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from fem_rotors import rotor23
+from hypothesis import given, settings
+from whirl_rotors import FULL, machine, whirling_rotors
+
+import fem
+
+mpl.use("Agg")
+
+
+def symmetric(damping=1e4):
+    base = machine()
+    return dataclasses.replace(base, supports=[fem.Support(s.node, 1e8, damping) for s in base.supports])
+
+
+def overhung():
+    """A flywheel at the end of the shaft: its forward tilting rises steeply and crosses another mode."""
+    return fem.Rotor(
+        np.full(10, 0.1),
+        0.06,
+        discs=[fem.Disc(11, 30.0, 1.5, 0.8), fem.Disc(4, 20.0, 0.1, 0.05)],
+        supports=[fem.Support(1, 5e7, 200.0), fem.Support(8, 5e7, 200.0)],
+        model=FULL,
+    )
+
+
+@settings(max_examples=8, deadline=None)
+@given(whirling_rotors())
+def test_every_speed_is_as_alone(rotor):
+    speeds = np.linspace(0.0, 900.0, 12)
+    found = fem.campbell(rotor, speeds, n=4)
+    for k in (0, 5, 11):
+        alone = fem.whirl_modes(rotor, speeds[k], 12, method="exact").eigenvalues
+        for lam in found.eigenvalues[k]:
+            if np.isfinite(lam):
+                assert np.abs(alone - lam).min() < 1e-7 * abs(lam)
+
+
+def test_modes_of_an_axisymmetric_rotor_keep_their_direction_through_crossings():
+    speeds = np.linspace(10.0, 1500.0, 30)
+    found = fem.campbell(overhung(), speeds, n=6)
+    # Forward and backward whirl of a symmetric rotor are different families: they cross, and never mix.
+    assert (found.direction == found.direction[0]).all()
+    omega = found.frequencies
+    assert (np.diff(omega, axis=0)[:, found.direction[0] > 0] > -1e-6).all()
+    assert (np.diff(omega, axis=0)[:, found.direction[0] < 0] < 1e-6).all()
+    # There is a crossing: the order of frequencies changes.
+    assert (np.argsort(omega[0]) != np.argsort(omega[-1])).any()
+    assert found.warnings == ()
+
+
+def test_tracking_does_not_depend_on_the_step():
+    rotor = machine(cross=True, material=1e-5)
+    coarse = fem.campbell(rotor, np.linspace(0.0, 1500.0, 7), n=6)
+    fine = fem.campbell(rotor, np.linspace(0.0, 1500.0, 61), n=6)
+    np.testing.assert_allclose(coarse.frequencies, fine.frequencies[::10], rtol=1e-7)
+    np.testing.assert_allclose(coarse.log_decrements, fine.log_decrements[::10], atol=1e-6)
+
+
+def test_damped_critical_speeds_are_roots():
+    rotor = machine()
+    found = fem.campbell(rotor, np.linspace(0.0, 1000.0, 26))
+    assert found.critical_speeds.size == 4
+    for speed, mode, delta, way in zip(
+        found.critical_speeds,
+        found.critical_modes,
+        found.critical_log_decrements,
+        found.critical_direction,
+        strict=True,
+    ):
+        there = fem.whirl_modes(rotor, speed, 6, method="exact")
+        k = int(np.argmin(np.abs(there.frequencies - speed)))
+        assert there.frequencies[k] == pytest.approx(speed, rel=1e-10)
+        assert there.log_decrements[k] == pytest.approx(delta, abs=1e-9)
+        assert there.direction[k] == way
+        column = found.frequencies[:, mode - 1] - found.speeds
+        assert (np.diff(np.sign(column)) != 0).sum() == 1
+
+
+def test_critical_speeds_do_not_depend_on_the_step():
+    few = fem.campbell(machine(), np.linspace(100.0, 1000.0, 5)).critical_speeds
+    many = fem.campbell(machine(), np.linspace(100.0, 1000.0, 91)).critical_speeds
+    np.testing.assert_allclose(few, many, rtol=1e-10)
+
+
+def test_undamped_forward_critical_speeds_are_those_of_critical_speeds():
+    rotor = symmetric(damping=0.0)
+    found = fem.campbell(rotor, np.linspace(0.0, 1300.0, 20), n=8)
+    forward = found.critical_speeds[found.critical_direction > 0]
+    np.testing.assert_allclose(forward, fem.critical_speeds(rotor, forward.size).frequencies, rtol=1e-9)
+    assert forward.size >= 3
+
+
+def test_without_gyroscopic_effect_nothing_depends_on_speed():
+    found = fem.campbell(rotor23(), np.linspace(0.0, 800.0, 9), n=4)
+    np.testing.assert_allclose(found.frequencies, np.tile(found.frequencies[0], (9, 1)), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.frequencies[0, ::2], fem.critical_speeds(rotor23(), 2).frequencies, rtol=1e-8
+    )
+
+
+def test_speed_dependent_bearings():
+    base = rotor23()
+    table = (0.0, 500.0, 1000.0)
+    rotor = dataclasses.replace(
+        base,
+        supports=[fem.Support(s.node, [5e7, 1e8, 3e8], [1e4, 2e4, 1e4], speeds=table) for s in base.supports],
+    )
+    found = fem.campbell(rotor, [0.0, 250.0, 500.0], n=2)
+    for k, stiffness, damping in ((0, 5e7, 1e4), (1, 7.5e7, 1.5e4), (2, 1e8, 2e4)):
+        plain = dataclasses.replace(
+            base, supports=[fem.Support(s.node, stiffness, damping) for s in base.supports]
+        )
+        np.testing.assert_allclose(
+            found.eigenvalues[k], fem.whirl_modes(plain, 0.0, 2).eigenvalues, rtol=1e-7
+        )
+    with pytest.raises(ValueError, match="not 1200"):
+        fem.campbell(rotor, [0.0, 1200.0])
+
+
+def test_a_mode_that_stops_to_oscillate_is_said():
+    """Damping that grows with speed until a motion is overdamped."""
+    rotor = fem.Rotor(
+        [0.1, 0.1],
+        0.1,
+        density=0.0,
+        discs=[fem.Disc(2, 10.0)],
+        supports=[
+            fem.Support(
+                n, [((1e5, 0), (0, 3e5))] * 2, [((0, 0), (0, 0)), ((3e3, 0), (0, 10.0))], speeds=(0, 100)
+            )
+            for n in (1, 3)
+        ],
+    )
+    found = fem.campbell(rotor, np.linspace(0.0, 100.0, 21), n=2)
+    gone = ~np.isfinite(found.frequencies)
+    assert gone[-1].tolist() == [True, False]
+    assert "mode 1 does not oscillate" in found.warnings[0]
+    assert found.to_dict()["frequencies_rad_s"][0][-1] is None
+    assert "overdamped" in found.summary()
+
+
+def test_results_speak():
+    found = fem.campbell(machine(), np.linspace(0.0, 1000.0, 11), n=4)
+    document = found.to_dict()
+    assert {"speeds_rad_s", "frequencies_rad_s", "log_decrements", "direction"} <= set(document)
+    assert np.shape(document["frequencies_rad_s"]) == (4, 11)
+    assert document["damped_critical_speeds"][0]["direction"] in ("forward", "backward", "mixed")
+    assert len(found.to_frame()) == 44
+    assert "damped critical speeds" in found.summary()
+    assert found.plot().get_xlabel() == "speed, rad/s"
+    assert found.criticals[0][0] == found.critical_speeds[0]
+
+
+@pytest.mark.parametrize(
+    ("speeds", "n", "message"),
+    [
+        ([100.0, 50.0], 2, "must ascend, but 50 rad/s follows 100"),
+        ([-1.0, 50.0], 2, "not negative"),
+        ([], 2, "at least one"),
+        ([1.0, float("nan")], 2, "finite"),
+        ([1.0, 2.0], 0, "0 modes cannot be found"),
+    ],
+)
+def test_bad_input(speeds, n, message):
+    with pytest.raises(ValueError, match=message):
+        fem.campbell(rotor23(), speeds, n)

@@ -1,0 +1,166 @@
+import math
+
+import numpy as np
+import pytest
+
+import fem
+
+
+def jeffcott(speeds, zeta, critical=100.0):
+    return speeds**2 / np.abs(critical**2 - speeds**2 + 2j * zeta * critical * speeds)
+
+
+def closed_form(zeta, critical=100.0):
+    """Peak and half-power speeds: with r = (ω0/Ω)², (r − 1)² + 4 ζ² r is twice its minimum there."""
+    peak = critical / math.sqrt(1 - 2 * zeta**2)
+    low = 4 * zeta**2 * (1 - zeta**2)
+    r = np.roots([1, 4 * zeta**2 - 2, 1 - 2 * low])
+    below, above = np.sort(critical / np.sqrt(r))
+    return peak, below, above
+
+
+@pytest.mark.parametrize("steps", [60, 173, 1000, 4001])
+@pytest.mark.parametrize("zeta", [0.03, 0.1, 0.25])
+def test_jeffcott_whatever_the_step(steps, zeta):
+    speeds = np.linspace(3.0, 400.0, steps)
+    (peak,) = fem.find_peaks(speeds, jeffcott(speeds, zeta)).peaks
+    speed, below, above = closed_form(zeta)
+    assert peak.speed == pytest.approx(speed, rel=1e-7)
+    assert peak.below == pytest.approx(below, rel=1e-8)
+    assert peak.above == pytest.approx(above, rel=1e-8)
+    assert peak.amplification == pytest.approx(speed / (above - below), rel=1e-7)
+    assert peak.amplitude == pytest.approx(1 / (2 * zeta * math.sqrt(1 - zeta**2)), rel=1e-8)
+
+
+def test_a_given_function_replaces_interpolation():
+    speeds = np.linspace(60.0, 140.0, 9)
+    curve = lambda speed: float(jeffcott(np.float64(speed), 0.02))  # noqa: E731
+    (peak,) = fem.find_peaks(speeds, jeffcott(speeds, 0.02), evaluate=curve).peaks
+    speed, below, above = closed_form(0.02)
+    assert peak.speed == pytest.approx(speed, rel=1e-6)
+    assert peak.amplification == pytest.approx(speed / (above - below), rel=1e-6)
+    assert "fewer than three speeds" in peak.note
+
+
+def test_peaks_of_a_rotor_do_not_depend_on_the_step():
+    rotor = fem.Rotor(
+        np.full(10, 0.1),
+        0.05,
+        discs=[fem.Disc(6, 20.0)],
+        supports=[fem.Support(n, 2e7, 2e4) for n in (1, 11)],
+    )
+
+    def found(steps):
+        speeds = np.linspace(20.0, 600.0, steps)
+        amplitude = fem.unbalance_response(rotor, {6: 1e-4}, speeds).at(6)
+        return fem.find_peaks(speeds, amplitude).peaks
+
+    coarse, fine = found(300), found(3000)
+    assert len(coarse) == len(fine) == 1
+    assert coarse[0].speed == pytest.approx(fine[0].speed, rel=1e-6)
+    assert coarse[0].amplification == pytest.approx(fine[0].amplification, rel=1e-4)
+
+
+def test_half_power_points_outside_the_range_are_said():
+    speeds = np.linspace(90.0, 104.0, 200)
+    (peak,) = fem.find_peaks(speeds, jeffcott(speeds, 0.05), operating=(150.0, 200.0)).peaks
+    assert peak.below is not None
+    assert peak.above is None
+    assert peak.amplification is None
+    assert peak.required is None
+    assert peak.enough is None
+    assert "above lies outside the speeds, which end at 104" in peak.note
+    assert "150" not in peak.note
+
+
+def test_a_higher_neighbour_hides_the_half_power_point():
+    speeds = np.linspace(50.0, 200.0, 2000)
+    both = np.abs(jeffcott(speeds, 0.04)) + 3 * np.abs(jeffcott(speeds, 0.04, 112.0))
+    found = fem.find_peaks(speeds, both)
+    if len(found.peaks) == 2:
+        assert found.peaks[0].above is None
+        assert "another peak" in found.peaks[0].note
+    two = jeffcott(speeds, 0.04) + 0.9 * jeffcott(speeds, 0.03, 109.0)
+    first = fem.find_peaks(speeds, two).peaks[0]
+    assert first.amplification is None
+    assert "another peak" in first.note
+
+
+@pytest.mark.parametrize(
+    ("AF", "below", "above"),
+    [
+        (2.4999, 0.0, 0.0),
+        (2.5, 0.0, 10.0),
+        (3.55, 17 * (1 - 1 / 2.05), 10 + 17 * (1 - 1 / 2.05)),
+        (10.0, 15.0, 25.0),
+        (18.5, 16.0, 26.0),
+        (100.0, 16.0, 26.0),
+    ],
+)
+def test_required_margins_of_2005(AF, below, above):
+    assert fem.required_margin(AF, above=False) == pytest.approx(below)
+    assert fem.required_margin(AF, above=True) == pytest.approx(above)
+
+
+@pytest.mark.parametrize(
+    ("AF", "below", "above"), [(2.4, 0, 0), (3.0, 5, 15), (3.55, 5, 15), (5.0, 13, 23), (9.0, 15, 25)]
+)
+def test_required_margins_of_1996(AF, below, above):
+    assert fem.required_margin(AF, above=False, edition="1996") == pytest.approx(below)
+    assert fem.required_margin(AF, above=True, edition="1996") == pytest.approx(above)
+
+
+def test_separation_from_the_operating_range():
+    speeds = np.linspace(3.0, 400.0, 1000)
+    A = jeffcott(speeds, 0.05)
+    speed = closed_form(0.05)[0]
+
+    def peak(low, high):
+        return fem.find_peaks(speeds, A, operating=(low, high)).peaks[0]
+
+    over = peak(110.0, 150.0)  # the critical speed is below
+    assert over.margin == pytest.approx(100 * (110 - speed) / 110)
+    assert over.required == pytest.approx(17 * (1 - 1 / (over.amplification - 1.5)))
+    assert over.enough is False
+    assert peak(130.0, 150.0).enough is True
+    under = peak(20.0, 80.0)
+    assert under.margin == pytest.approx(100 * (speed - 80) / 80)
+    assert under.required == pytest.approx(10 + 17 * (1 - 1 / (under.amplification - 1.5)))
+    inside = peak(80.0, 120.0)
+    assert inside.margin == 0
+    assert inside.enough is False
+    damped = fem.find_peaks(speeds, jeffcott(speeds, 0.35), operating=(80.0, 160.0)).peaks[0]
+    assert damped.amplification < 2.5
+    assert damped.enough is True
+
+
+def test_no_peak():
+    speeds = np.linspace(1.0, 50.0, 30)
+    found = fem.find_peaks(speeds, speeds**2)
+    assert found.peaks == ()
+    assert found.summary() == "no peak in this range of speeds"
+    assert found.to_dict()["peaks"] == []
+
+
+def test_results_speak():
+    speeds = np.linspace(3.0, 400.0, 300)
+    found = fem.find_peaks(speeds, jeffcott(speeds, 0.05), operating=(110.0, 150.0))
+    assert "NOT ENOUGH" in found.summary()
+    assert len(found.to_frame()) == 1
+    assert found.to_dict()["peaks"][0]["enough"] is False
+
+
+@pytest.mark.parametrize(
+    ("speeds", "amplitudes", "options", "message"),
+    [
+        ([1, 2], [1, 2], {}, "at least three"),
+        ([1, 3, 2], [1, 2, 1], {}, "ascending"),
+        ([1, 2, 3], [1, math.nan, 1], {}, "finite"),
+        ([1, 2, 3], [1, 2, 1], {"operating": (5, 2)}, "lowest and a highest"),
+        ([1, 2, 3], [1, 2, 1], {"edition": "2019"}, "edition"),
+        (["a", "b", "c"], [1, 2, 1], {}, "numbers"),
+    ],
+)
+def test_bad_input(speeds, amplitudes, options, message):
+    with pytest.raises(ValueError, match=message):
+        fem.find_peaks(speeds, amplitudes, **options)

@@ -1,0 +1,127 @@
+import dataclasses
+import math
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from fem_rotors import rotor23, uniform
+from whirl_rotors import machine
+
+import fem
+
+mpl.use("Agg")
+
+
+def test_a_rigid_rotor_follows_the_root_of_the_stiffness():
+    rotor = fem.Rotor(
+        np.full(4, 0.05), 0.2, discs=[fem.Disc(3, 50.0)], supports=[fem.Support(1, 1e5), fem.Support(5, 1e5)]
+    )
+    k = np.array([1e3, 1e4, 1e5])
+    found = fem.speed_map(rotor, k, n=2)
+    np.testing.assert_allclose(found.speeds[:, 0], np.sqrt(2 * k / rotor.total_mass), rtol=1e-4)
+    np.testing.assert_allclose(found.free, 0.0)
+
+
+def test_asymptotes_of_a_uniform_beam():
+    rotor = uniform(24, supports=[fem.Support(1, 1e8), fem.Support(25, 1e8)])
+    found = fem.speed_map(rotor, n=4)
+    pinned = np.arange(1, 5) ** 2 * 1276.18775
+    np.testing.assert_allclose(found.pinned, pinned, rtol=1e-4)
+    np.testing.assert_allclose(found.free, [0, 0, 2892.9744, 7974.59535], rtol=1e-4)
+    assert (np.diff(found.speeds, axis=0) > 0).all()
+    np.testing.assert_allclose(found.speeds[-1], found.pinned, rtol=2e-2)
+    assert (found.speeds <= found.pinned * (1 + 1e-9)).all()
+    np.testing.assert_allclose(found.speeds[0, 2:], found.free[2:], rtol=2e-2)
+
+
+def test_it_is_the_critical_speeds_at_each_stiffness():
+    rotor = dataclasses.replace(
+        machine(), supports=[fem.Support(s.node, 1e8, 2e4) for s in machine().supports]
+    )
+    found = fem.speed_map(rotor, [1e7, 1e8, 1e9], n=3)
+    np.testing.assert_allclose(found.speeds[1], fem.critical_speeds(rotor, 3).frequencies, rtol=1e-12)
+    # Forward synchronous whirl of the same rotor.
+    omega = found.speeds[1, 1]
+    modes = fem.whirl_modes(rotor, omega, 6)
+    forward = modes.frequencies[modes.direction > 0]
+    undamped = dataclasses.replace(rotor, supports=[fem.Support(s.node, 1e8) for s in rotor.supports])
+    modes = fem.whirl_modes(undamped, omega, 6)
+    forward = modes.frequencies[modes.direction > 0]
+    assert np.abs(forward - omega).min() < 1e-7 * omega
+
+
+def test_intersections_with_constant_and_tabulated_supports():
+    base = rotor23()
+    k = np.array([5e7, 1e8, 4e8])
+    speeds = (50.0, 300.0, 900.0)
+    rotor = dataclasses.replace(
+        base,
+        supports=[
+            fem.Support(base.supports[0].node, list(k), [0.0] * 3, speeds=speeds, name="front"),
+            fem.Support(base.supports[1].node, ((1e8, 0.0), (0.0, 3e8)), name="rear"),
+        ],
+    )
+    found = fem.speed_map(rotor, np.logspace(7, 9, 9), n=2)
+    rear_y = [m for m in found.intersections if m.support == "rear" and m.direction == "y"]
+    both = dataclasses.replace(base, supports=[fem.Support(s.node, 3e8) for s in base.supports])
+    np.testing.assert_allclose(
+        [m.speed for m in rear_y], fem.critical_speeds(both, 2).frequencies, rtol=1e-12
+    )
+    front = [m for m in found.intersections if m.support == "front"]
+    assert [m.mode for m in front] == [1, 2]
+    for meeting in front:
+        same = dataclasses.replace(
+            base,
+            supports=[fem.Support(s.node, float(np.interp(meeting.speed, speeds, k))) for s in base.supports],
+        )
+        own = fem.critical_speeds(same, 2).frequencies[meeting.mode - 1]
+        assert own == pytest.approx(meeting.speed, rel=1e-9)
+    assert [label for label, _, _ in found.own] == ["front", "rear, x", "rear, y"]
+
+
+def test_a_subset_of_supports():
+    rotor = uniform(
+        10, supports=[fem.Support(1, 1e8, name="left"), fem.Support(11, 1e8), fem.Support(6, 1e7, name="mid")]
+    )
+    found = fem.speed_map(rotor, [1e7], n=2, supports=["mid"])
+    np.testing.assert_allclose(found.speeds[0], fem.critical_speeds(rotor, 2).frequencies)
+    again = fem.speed_map(rotor, [1e7], n=2, supports=[3])
+    np.testing.assert_allclose(again.speeds, found.speeds)
+
+
+def test_pedestals_in_series():
+    soft = fem.Support(1, 1e8, pedestal=fem.Pedestal(10.0, 1e8))
+    rotor = uniform(10, supports=[soft, fem.Support(11, 5e7)])
+    found = fem.speed_map(rotor, n=1)
+    np.testing.assert_allclose([m.stiffness for m in found.intersections], 5e7)
+
+
+def test_results_speak():
+    found = fem.speed_map(rotor23(), n=3)
+    assert "pinned" in found.summary()
+    assert found.to_frame().shape == (found.stiffness.size, 4)
+    assert len(found.to_dict()["critical_speeds_rad_s"]) == 3
+    assert found.plot().get_xscale() == "log"
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "options", "message"),
+    [
+        ([1e8, 1e7], {}, "ascending"),
+        ([-1.0, 1e7], {}, "above 0"),
+        ([math.inf], {}, "finite"),
+        (["stiff"], {}, "numbers"),
+        ([1e8], {"supports": ["nobody"]}, "no support is called"),
+        ([1e8], {"supports": [3]}, "supports 1 to 2"),
+        ([1e8], {"supports": []}, "choose one support"),
+        ([1e8], {"n": 0}, "cannot be found"),
+    ],
+)
+def test_bad_input(stiffness, options, message):
+    with pytest.raises(ValueError, match=message):
+        fem.speed_map(rotor23(), stiffness, **options)
+
+
+def test_no_support():
+    with pytest.raises(ValueError, match="no support"):
+        fem.speed_map(uniform(5), [1e8])

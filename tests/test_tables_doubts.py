@@ -1,0 +1,290 @@
+"""What must not be passed over in silence, and messages that stay readable whatever the file."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+from tables_data import RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
+
+from balancing import correct, estimate_influence
+from rotorid.tables import (
+    InputError,
+    TableWarning,
+    influence_frame,
+    job_from_files,
+    read_influence,
+    read_job,
+    read_rotor,
+    read_trials,
+    write_influence,
+    write_table,
+)
+
+BOOK = {"runs": RUNS, "weights": WEIGHTS}
+SHAFT = [
+    ["length_m", "diameter_m", "support_stiffness_N_per_m", "youngs_modulus_Pa", "density_kg_per_m3"],
+    [1.0, 0.1, 1e8, 2.1e11, 7800],
+    [1.0, 0.1, 1e8, 2.1e11, 7800],
+]
+
+
+@pytest.fixture
+def files(tmp_path):
+    return write_csv(tmp_path / "runs.csv", RUNS), write_csv(tmp_path / "weights.csv", WEIGHTS)
+
+
+@pytest.mark.parametrize(
+    ("sheet", "rows", "column", "words"),
+    [
+        ("settings", [["phase", "lag"]], None, "the columns key and value"),
+        ("planes", [["1", "max_mass_g=3"]], "plane", "a column plane; the columns are 1 and max_mass_g=3"),
+        ("sensors", [["A", 3]], "sensor", "a column sensor; the columns are A and 3"),
+        ("planes", [["plane", "max_mas_g"]], "max_mas_g", "did you mean 'max_mass_g'?"),
+    ],
+)
+def test_a_sheet_with_one_row_is_checked(tmp_path, sheet, rows, column, words):
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, sheet: rows})
+    problem = the_only(complaints(read_job, path), "job.xlsx", 1, column, _found(rows, column), words)
+    assert f"sheet {sheet!r}" in problem.file
+
+
+def _found(rows, column):
+    if column is None:
+        return " and ".join(rows[0])
+    return column if column in rows[0] else None
+
+
+def test_prepared_sheets_with_a_header_alone_do_no_harm(tmp_path):
+    sheets = {"settings": [["key", "value"]], "planes": [["plane", "max_mass_g", "note"]], "sensors": []}
+    read = read_job(write_book(tmp_path / "job.xlsx", {**BOOK, **sheets}))
+    assert read.trials.planes == ("1", "2")
+
+
+@pytest.mark.parametrize("title", [["My rotor"], ["Rotor 7, trial of June", "", "", "7"]])
+def test_a_title_above_the_header_is_named(tmp_path, files, title):
+    path = write_book(tmp_path / "job.xlsx", {"runs": [title, *RUNS], "weights": WEIGHTS})
+    words = "the header in the first row, and it seems to be row 2"
+    [problem] = complaints(read_job, path)
+    assert words in problem.expected
+    text = tmp_path / "titled.csv"
+    text.write_text("My rotor\n\n" + csv_text(RUNS), encoding="utf-8")
+    [problem] = complaints(read_trials, text, files[1])
+    assert "it seems to be row 3" in problem.expected
+
+
+def test_equal_complaints_share_a_line(tmp_path, files):
+    runs = [RUNS[0], *(["r", i + 1, "A", "x", 500] for i in range(500))]
+    path = write_csv(tmp_path / "bad.csv", runs)
+    with pytest.raises(InputError) as caught:
+        read_trials(path, files[1])
+    lines = str(caught.value).splitlines()
+    assert f"{path}, rows 2–501, column amplitude_um_pp: found 'x', expected a number" in lines
+    assert any("rows 2–501, column phase_deg: found '500', expected a phase" in line for line in lines)
+    assert len(lines) <= 21
+    assert len([p for p in caught.value.problems if p.column == "amplitude_um_pp"]) == 500
+
+
+def test_different_values_and_scattered_rows():
+    from rotorid.tables import Problem
+
+    problems = [Problem("f.csv", row, "a", str(row), "a number") for row in (2, 3, 5, 7, 9, 11)]
+    assert str(InputError(problems)) == (
+        "f.csv, rows 2–3, 5, 7, 9 and others (6 in all), column a: found '2', '3', '5' and so on, "
+        "expected a number"
+    )
+    many = [Problem("f.csv", row, f"c{row}", None, "x") for row in range(100)]
+    assert str(InputError(many)).splitlines()[20:] == ["and 80 more problems"]
+
+
+def test_long_files_are_read_in_reasonable_time(tmp_path):
+    """20 000 rows: 0.3 s, and complaints about all of them no longer."""
+    header = [*RUNS[0], "repeat"]
+    good = [header, *([*row, k] for k in range(3333) for row in RUNS[1:])]
+    bad = [RUNS[0], *([f"r{k}", 1000, "A", "x", 1] for k in range(20000))]
+    start = time.perf_counter()
+    trials = read_trials(write_csv(tmp_path / "good.csv", good), write_csv(tmp_path / "w.csv", WEIGHTS))
+    assert trials.readings.shape == (3333, 3, 1, 2)
+    with pytest.raises(InputError) as caught:
+        read_trials(write_csv(tmp_path / "bad.csv", bad), None)
+    assert len(str(caught.value)) < 1000
+    assert time.perf_counter() - start < 6.0
+
+
+def test_many_runs_with_gaps_are_counted(tmp_path):
+    runs = [RUNS[0], *([f"r{k}", 100 * 1.1 ** (k % 40), "A", 1, 1] for k in range(200))]
+    with pytest.raises(InputError) as caught:
+        read_trials(write_csv(tmp_path / "runs.csv", runs), None)
+    problems = caught.value.problems
+    assert "readings of run 'r0' at all 40 speeds of the runs; it has 1" in problems[0].expected
+    assert "as many readings of 180 further runs" in problems[-1].expected
+
+
+@pytest.mark.parametrize("value", ["1e300", "-1e31", "5e-200", "1e-320"])
+def test_sizes_that_no_instrument_shows(tmp_path, files, value):
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 3, "amplitude_um_pp", value))
+    problem = complaints(read_trials, path, files[1])[0]
+    assert (problem.row, problem.column, problem.value) == (3, "amplitude_um_pp", value)
+    assert "between 1e-30 and 1e+30 in size" in problem.expected
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("length_m", 1000, "row 2, column length_m: 1000 means 1000 m; is this in mm?"),
+        ("diameter_m", 110, "column diameter_m: 110 means 110 m; is this in mm?"),
+        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in another unit?"),
+        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in another unit?"),
+    ],
+)
+def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):
+    path = write_csv(tmp_path / "rotor.csv", replaced(SHAFT, 2, column, value))
+    with pytest.warns(TableWarning) as caught:
+        read_rotor(path)
+    assert [words in str(w.message) for w in caught] == [True]
+    both = write_csv(tmp_path / "both.csv", replaced(replaced(SHAFT, 2, column, value), 3, column, value))
+    with pytest.warns(TableWarning, match="row 2 and 1 more row, column"):
+        read_rotor(both)
+
+
+def test_a_usual_rotor_is_not_asked_about(tmp_path):
+    assert read_rotor(write_csv(tmp_path / "rotor.csv", SHAFT)).n_elements == 2
+
+
+def test_control_characters_in_the_name_of_a_file(tmp_path, files):
+    job = tmp_path / "job.toml"
+    job.write_text('runs = ".\\runs.csv"\nweights = "weights.csv"\n', encoding="utf-8")
+    problem = the_only(complaints(read_job, job), "job.toml", None, "runs", ".\runs.csv", "single quotes")
+    assert "write / in its place" in problem.expected
+    assert "'.\\runs.csv'" in str(problem)
+    assert "\r" not in str(problem)
+    [problem] = complaints(read_trials, "no\x1b[31m.csv", files[1])
+    assert str(problem).startswith("no\\x1b[31m.csv: expected a file that exists")
+
+
+@pytest.mark.parametrize("line", ["amplitude = 2", 'amplitude_percent = "2"', "amplitude_percent = -1"])
+def test_one_complaint_about_one_mistake_in_errors(tmp_path, files, line):
+    job = tmp_path / "job.toml"
+    job.write_text(f'runs = "runs.csv"\nweights = "weights.csv"\n[errors]\n{line}\n', encoding="utf-8")
+    assert len(complaints(read_job, job)) == 1
+
+
+def test_tabs_with_decimal_commas(tmp_path, files):
+    plain = read_trials(*files)
+    path = tmp_path / "runs.txt"
+    path.write_text(csv_text(RUNS, "\t", comma=True), encoding="utf-8")
+    np.testing.assert_array_equal(read_trials(path, files[1]).readings, plain.readings)
+    path.write_text(csv_text([RUNS[0], ["b", "1,220", "A", 3, 40]], "\t"), encoding="utf-8")
+    the_only(
+        complaints(read_trials, path, None),
+        "runs.txt", 2, "speed_rpm", "1,220", "this comma may separate thousands",
+    )  # fmt: skip
+
+
+def test_text_with_decimal_commas_in_a_workbook(tmp_path, files):
+    plain = read_trials(*files)
+    texts = [RUNS[0], *([str(c).replace(".", ",") for c in row] for row in RUNS[1:])]
+    path = write_book(tmp_path / "runs.xlsx", {"runs": texts})
+    np.testing.assert_array_equal(read_trials(path, files[1]).readings, plain.readings)
+    # one number shows that 9,487 is not nine thousand; and a point beside it is not passed over
+    mixed = replaced(replaced(RUNS, 2, "amplitude_um_pp", "9,487"), 3, "amplitude_um_pp", "13,5")
+    read = read_trials(write_book(tmp_path / "runs.xlsx", {"runs": mixed}), files[1])
+    assert abs(read.readings[0, 0, 0, 0]) == pytest.approx(9.487 * 0.5e-6)
+    points = replaced(mixed, 4, "amplitude_um_pp", "4.9")
+    the_only(
+        complaints(read_trials, write_book(tmp_path / "runs.xlsx", {"runs": points}), files[1]),
+        "runs.xlsx", 4, "amplitude_um_pp", "4.9", "a number with a decimal comma, as elsewhere",
+    )  # fmt: skip
+
+
+def test_merged_speeds_are_said(tmp_path, files):
+    assert read_trials(*files).warnings == ()
+    path = write_csv(tmp_path / "runs.csv", replaced(RUNS, 2, "speed_rpm", 1003))
+    path = write_csv(path, replaced(replaced(RUNS, 2, "speed_rpm", 1003), 3, "speed_rpm", 1003))
+    [words] = read_trials(path, files[1]).warnings
+    assert words == "speeds of different runs within 0.5 % count as one: 1000, 1003 as 1001 rpm"
+    assert words in correct(estimate_influence(read_trials(path, files[1]))).warnings
+
+
+@pytest.fixture
+def lag(tmp_path, files):
+    """A job with lag and against rotation, its stored coefficients, and a baseline run."""
+    trials = read_trials(*files, phase="lag", angles="against rotation")
+    influence = estimate_influence(trials)
+    write_influence(tmp_path / "influence.csv", influence)
+    write_csv(tmp_path / "now.csv", RUNS[:3])
+    return correct(influence)
+
+
+def test_stored_conventions_hold_for_the_readings_if_nothing_else_is_said(tmp_path, lag):
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    assert (read.trials.labels.phase, read.trials.labels.angles) == ("lag", "against rotation")
+    c = correct(read.influence, read.trials)
+    np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
+    assert c.to_dict()["conventions"]["angles"] == "against rotation"
+    assert "nothing states the conventions of the readings" in c.warnings[0]
+    assert c.warnings[0].endswith("phase = lag and angles against rotation")
+
+
+def test_stated_conventions_hold_for_the_readings_alone(tmp_path, lag):
+    same = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lag")
+    np.testing.assert_allclose(correct(same.influence, same.trials).weights, lag.weights, rtol=1e-9)
+    assert not any("phase =" in w for w in same.trials.warnings)
+    turned = [RUNS[0], *([*row[:4], 360 - row[4]] for row in RUNS[1:3])]
+    write_csv(tmp_path / "now.csv", turned)
+    lead = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv", phase="lead")
+    np.testing.assert_allclose(correct(lead.influence, lead.trials).weights, lag.weights, rtol=1e-9)
+    [words] = [w for w in lead.trials.warnings if "phase =" in w]
+    assert "the readings are taken with phase = lead, as stated" in words
+    assert "the coefficients with phase = lag, as" in words
+
+
+@pytest.mark.parametrize("comment", ["# Phase: lag", "#PHASE = 'Lag'", "# phase is lag", "# phase lag."])
+def test_conventions_in_other_spellings_are_understood(tmp_path, lag, comment):
+    path = tmp_path / "influence.csv"
+    text = path.read_text(encoding="utf-8").replace("# phase = lag", comment)
+    assert comment in text
+    path.write_text(text, encoding="utf-8")
+    assert read_influence(path).labels.phase == "lag"
+
+
+@pytest.mark.parametrize(
+    "comment",
+    ["# phase = lagging", "# phases lag behind the mark", "# a lag is positive phase", "# angle: clockwise"],
+)
+def test_conventions_in_other_words_are_refused(tmp_path, lag, comment):
+    path = tmp_path / "influence.csv"
+    text = path.read_text(encoding="utf-8").replace("# phase = lag", comment)
+    path.write_text(text, encoding="utf-8")
+    problem = complaints(read_influence, path)[0]
+    assert problem.value == comment
+    assert problem.expected.startswith(("# phase = lead or lag", "# angles = with rotation or against"))
+
+
+def test_other_comments_mean_nothing(tmp_path, lag):
+    path = tmp_path / "influence.csv"
+    text = "# measured with a phase meter, angles read twice\n" + path.read_text(encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
+    assert read_influence(path).labels.phase == "lag"
+
+
+def test_a_model_in_si_answers_in_g_mm(tmp_path, lag):
+    influence = estimate_influence(read_trials(tmp_path / "runs.csv", tmp_path / "weights.csv"))
+    frame = influence_frame(influence).rename(columns={"influence_um_pp_per_g": "influence_um_pp_per_kg_m"})
+    write_table(tmp_path / "si.csv", frame)
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "si.csv")
+    assert (read.trials.labels.weight_unit, read.trials.labels.weight_scale) == ("g_mm", 1e6)
+    c = correct(read.influence, read.trials).to_dict()["corrections"][0]
+    assert c["unit"] == "g_mm"
+    assert c["mass"] == pytest.approx(2.951e6, rel=1e-3)
+    read = job_from_files([tmp_path / "now.csv"], influence=tmp_path / "influence.csv")
+    assert read.trials.labels.weight_unit == "g"
+
+
+def test_a_weights_table_without_rows_and_stored_coefficients(tmp_path, lag):
+    write_csv(tmp_path / "none.csv", WEIGHTS[:1])
+    read = job_from_files([tmp_path / "now.csv", tmp_path / "none.csv"], influence=tmp_path / "influence.csv")
+    c = correct(read.influence, read.trials)
+    np.testing.assert_allclose(c.weights, lag.weights, rtol=1e-9)
+    assert c.mounted is None

@@ -1,0 +1,398 @@
+"""Rotor files in full: model, geometry of discs, bearings over speed, pedestals, seals; and writing them."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tables_data import complaints, replaced, the_only, write_book, write_csv
+
+from fem import Disc, Model, Pedestal, Rotor, Support
+from rotorid.samples import sample_data
+from rotorid.tables import InputError, read_rotor, rotor_files, write_rotor
+
+SHAFT = [["length_m", "diameter_m"], [0.3, 0.1], [0.4, 0.12], [0.3, 0.1]]
+TABLE = [
+    ["speed_rad_s", "kxx_N_per_m", "kyy_N_per_m", "kxy_N_per_m", "cxx_N_s_per_m", "cyy_N_s_per_m"],
+    [100, 1e7, 3e7, 2e6, 1e4, 2e4],
+    [200, 2e7, 4e7, 1e6, 5e3, 1e4],
+]
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Read a rotor file beside a shaft of three elements and a table of coefficients."""
+    write_csv(tmp_path / "shaft.csv", SHAFT)
+    write_csv(tmp_path / "b.csv", TABLE)
+
+    def read(text):
+        (tmp_path / "rotor.toml").write_text('shaft = "shaft.csv"\n' + text, encoding="utf-8")
+        return read_rotor(tmp_path / "rotor.toml")
+
+    read.folder = tmp_path
+    return read
+
+
+def bearing(*lines, kind="bearing"):
+    return "\n".join([f"[[{kind}]]", "node = 2", *lines])
+
+
+def the_support(file, *lines, kind="bearing"):
+    (support,) = file(bearing(*lines, kind=kind)).supports
+    return support
+
+
+def test_model_and_material(file):
+    rotor = file("[model]\nshear = true\ngyroscopic = true\n[material]\nmaterial_damping_s = 2e-5")
+    assert rotor.model == Model(shear=True, gyroscopic=True)
+    assert rotor.material_damping.tolist() == [2e-5] * 3
+    assert rotor.poisson_ratio.tolist() == [0.3] * 3
+
+
+def test_properties_of_single_elements(file):
+    write_csv(
+        file.folder / "shaft.csv",
+        [[*SHAFT[0], "poisson_ratio", "material_damping_ms"], *([*row, 0.25, 0.5] for row in SHAFT[1:])],
+    )
+    rotor = file("")
+    assert rotor.poisson_ratio.tolist() == [0.25] * 3
+    assert rotor.material_damping.tolist() == [5e-4] * 3
+
+
+def test_a_disc_by_its_geometry(file):
+    text = "[[disc]]\nnode = 2\nwidth_m = 0.05\nouter_diameter_m = 0.4\n"
+    assert file(text).discs == (Disc.from_geometry(2, 0.05, 0.4, density=7800),)
+    # The material of the file unless the disc says another.
+    light = "[material]\ndensity_kg_per_m3 = 2700\n" + text
+    assert file(light).discs == (Disc.from_geometry(2, 0.05, 0.4, density=2700),)
+    more = light + 'inner_diameter_m = 0.1\ndensity_kg_per_m3 = 8000\nname = "wheel"'
+    assert file(more).discs == (Disc.from_geometry(2, 0.05, 0.4, 0.1, 8000, "wheel"),)
+
+
+def test_coefficients_with_and_without_units(file):
+    matrix = ((1e7, 2e6), (-1e6, 3e7))
+    spelt = ("kxx_N_per_m = 1e7", "kxy_N_per_m = 2e6", "kyx_N_per_m = -1e6", "kyy_N_per_m = 3e7")
+    bare = tuple(line.replace("_N_per_m", "") for line in spelt)
+    damping = ("cxx_N_s_per_m = 10", "cyy = 20")
+    assert the_support(file, *spelt) == Support(2, matrix)
+    assert the_support(file, *bare, *damping) == Support(2, matrix, ((10, 0), (0, 20)))
+    assert the_support(file, *bare, "damping_N_s_per_m = 5") == Support(2, matrix, 5.0)
+    assert the_support(file, "kxx = 1e7", "kyy = 3e7") == Support(2, ((1e7, 0), (0, 3e7)))
+    assert the_support(file, "kxx = 1e7", "kyy = 1e7") == Support(2, 1e7)
+
+
+def test_coefficients_over_speed(file):
+    k = (((1e7, 2e6), (0, 3e7)), ((2e7, 1e6), (0, 4e7)))
+    c = (((1e4, 0), (0, 2e4)), ((5e3, 0), (0, 1e4)))
+    expected = Support(2, k, c, "DE", speeds=(100, 200))
+    assert the_support(file, 'table = "b.csv"', 'name = "DE"') == expected
+    assert the_support(file, 'table = "b.csv"', 'name = "DE"').at(150.0)[0].tolist() == [
+        [1.5e7, 1.5e6],
+        [0, 3.5e7],
+    ]
+    write_csv(file.folder / "s.csv", [["speed_rpm", "stiffness_N_per_mm"], [60, 1e4], [120, 2e4]])
+    scalar = the_support(file, 'table = "s.csv"', "damping_N_s_per_m = 7")
+    assert scalar.stiffness == (1e7, 2e7)
+    assert scalar.damping == (7.0, 7.0)
+    assert scalar.speeds == pytest.approx((2 * math.pi, 4 * math.pi), rel=1e-15)
+    write_book(file.folder / "b.xlsx", {"bearing": TABLE})
+    assert the_support(file, 'table = "b.xlsx"', 'name = "DE"') == expected
+
+
+def test_a_pedestal_a_tilting_stiffness_and_a_seal(file):
+    stand = (
+        "pedestal_mass_kg = 50",
+        "pedestal_stiffness_N_per_m = [1e8, 2e8]",
+        "pedestal_damping_N_s_per_m = 9",
+    )
+    assert the_support(file, "stiffness_N_per_m = 1e7", *stand) == Support(
+        2, 1e7, pedestal=Pedestal(50, (1e8, 2e8), 9)
+    )
+    tilting = the_support(file, "stiffness_N_per_m = 1e7", "tilting_stiffness_N_m_per_rad = 3e5")
+    assert tilting == Support(2, 1e7, tilting_stiffness=3e5)
+    seal = the_support(file, "stiffness_N_per_m = -1e5", "damping_N_s_per_m = 10", kind="seal")
+    assert seal == Support(2, -1e5, 10, kind="seal")
+
+
+def test_files_of_a_rotor_with_tables(file):
+    text = bearing('table = "b.csv"') + "\n" + bearing('table = "b.csv"', kind="seal")
+    assert [support.kind for support in file(text).supports] == ["bearing", "seal"]
+    assert [path.name for path in rotor_files(file.folder / "rotor.toml")] == [
+        "rotor.toml",
+        "shaft.csv",
+        "b.csv",
+    ]
+
+
+SCALAR = "stiffness_N_per_m = 1e7"
+BAD_BEARINGS = [
+    ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "kxx", "10000000.0", "either stiffness_N_per_m or kxx_N_per_m, "),
+    ((SCALAR, "damping_N_s_per_m = 1", "cxx = 3", "cyy = 3"), "cxx", "3", "not some of both"),
+    (("kxx = 1e7",), "kyy_N_per_m", None, "kyy too, as kxx is given"),
+    (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "cxx_N_s_per_m", None, "cxx too, as cxy is given"),
+    (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx", "10000000.0", "the coefficient once, kxx"),
+    ((SCALAR, "kyz = 3"), "kyz", "3", "a known key (did you mean 'k"),
+    ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "the stiffness of the pedestal"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = [1, 2, 3]"), "pedestal_stiffness_N_per_m", "[1, 2, 3]", "[x, y]"),
+    ((SCALAR, "pedestal_stiffness_N_per_m = [1, nan]"), "pedestal_stiffness_N_per_m", "[1, nan]", "[x, y]"),
+    (("kxx = nan", "kyy = 1"), "kxx", "nan", "a finite number"),
+    ((SCALAR, 'kind = "bearings"'), "kind", "bearings", "did you mean 'bearing'?"),
+    ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),
+    (("damping_N_s_per_m = 3",), "stiffness_N_per_m", None, "the stiffness of the bearing"),
+    (("table = 3",), "table", "3", "a text in quotes"),
+    (('table = "b.csv"', SCALAR), "kxx_N_per_m", "kxx_N_per_m", "either stiffness_N_per_m or"),
+    (('table = "b.csv"', "kxx = 3"), "kxx", "3", "has a column kxx_N_per_m"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("lines", "key", "value", "words"), BAD_BEARINGS)
+def test_bad_bearings(file, lines, key, value, words):
+    (problem,) = complaints(file, bearing(*lines))
+    in_table = problem.row is not None
+    assert problem.file.endswith("b.csv" if in_table else "rotor.toml")
+    assert (problem.column, problem.value) == (key if in_table else f"bearing[1].{key}", value)
+    assert words in problem.expected
+
+
+def test_a_pedestal_of_no_stiffness_and_one_under_a_seal(file):
+    (problem,) = complaints(file, bearing(SCALAR, "pedestal_stiffness_N_per_m = 0"))
+    assert problem.column == "bearing[1]"
+    assert "leave out a rigid pedestal" in problem.expected
+    (problem,) = complaints(file, bearing(SCALAR, "pedestal_stiffness_N_per_m = 1e9", kind="seal"))
+    assert problem.column == "seal[1].pedestal_stiffness_N_per_m"
+    assert "a known key" in problem.expected
+
+
+BAD_TABLES = [
+    (replaced(TABLE, 3, "speed_rad_s", 100), 3, "speed_rad_s", "100", "ascending, each once"),
+    (replaced(TABLE, 3, "speed_rad_s", 50), 3, "speed_rad_s", "50", "above that of the row before"),
+    (replaced(TABLE, 2, "speed_rad_s", -1), 2, "speed_rad_s", "-1", "a speed of 0 or more"),
+    (replaced(TABLE, 2, "kxx_N_per_m", "nan"), 2, "kxx_N_per_m", "nan", "a finite number"),
+    (replaced(TABLE, 2, "cxx_N_s_per_m", ""), 2, "cxx_N_s_per_m", "", "a number"),
+    (replaced(TABLE, 1, "kxx_N_per_m", "Kxx_N_per_m"), 1, "Kxx_N_per_m", "Kxx_N_per_m", "did you mean 'kxx"),
+    (replaced(TABLE, 1, "kxx_N_per_m", "kxx"), 1, "kxx", "kxx", "one of the units N_per_m, "),
+    (replaced(TABLE, 1, "kyy_N_per_m", "kyx_N_per_m"), 1, "kyy_N_per_m", None, "kyy too, as kxx is given"),
+    (replaced(TABLE, 1, "speed_rad_s", "speed_rps"), 1, "speed_rps", "speed_rps", "one of the units rpm"),
+    ([row[:1] for row in TABLE], 1, "stiffness_N_per_m", None, "a column of coefficients, such as"),
+    ([row[1:] for row in TABLE], 1, "speed_rpm", None, "a column speed_rpm, speed_rad_s or speed_Hz"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("table", "row", "column", "value", "words"), BAD_TABLES)
+def test_bad_tables_of_bearings(file, table, row, column, value, words):
+    write_csv(file.folder / "b.csv", table)
+    the_only(complaints(file, bearing('table = "b.csv"')), "b.csv", row, column, value, words)
+
+
+def test_a_table_of_one_speed_or_of_none_at_all(file):
+    write_csv(file.folder / "b.csv", TABLE[:2])
+    problems = complaints(file, bearing('table = "b.csv"'))
+    the_only(problems, "rotor.toml", None, "bearing[1]", None, "speeds must be at least two")
+    problems = complaints(file, bearing('table = "c.csv"'))
+    the_only(problems, "c.csv", None, None, None, "did you mean 'b.csv'?")
+
+
+def test_a_negative_stiffness_is_for_seals(file):
+    table = [["speed_Hz", "stiffness_N_per_m"], [1, -1e5], [2, -2e5]]
+    write_csv(file.folder / "s.csv", table)
+    seal = the_support(file, 'table = "s.csv"', kind="seal")
+    assert seal.stiffness == (-1e5, -2e5)
+    problems = complaints(file, bearing('table = "s.csv"'))
+    assert [(p.row, p.expected) for p in problems] == [(2, "0 or more"), (3, "0 or more")]
+
+
+BAD_DISCS = [
+    ("mass_kg = 3\nwidth_m = 1", "mass_kg", "3", "either mass and moments of inertia or a geometry"),
+    ("width_m = 1", "outer_diameter_m", None, "the disc's width and outer diameter"),
+    ("width_m = 0\nouter_diameter_m = 1", "width_m", "0", "a number above 0"),
+    ("mass_kg = 3\npolar_inertia_kg_m2 = nan", "polar_inertia_kg_m2", "nan", "a finite number, 0 or more"),
+    ("mass_kg = 3\nmas = 1", "mas", "1", "did you mean 'mass_kg'?"),
+]
+
+
+@pytest.mark.parametrize(("lines", "key", "value", "words"), BAD_DISCS)
+def test_bad_discs(file, lines, key, value, words):
+    problems = complaints(file, f"[[disc]]\nnode = 2\n{lines}")
+    the_only(problems, "rotor.toml", None, f"disc[1].{key}", value, words)
+
+
+def test_a_disc_with_too_large_a_bore(file):
+    problems = complaints(
+        file, "[[disc]]\nnode = 2\nwidth_m = 1\nouter_diameter_m = 0.1\ninner_diameter_m = 0.2"
+    )
+    the_only(
+        problems, "rotor.toml", None, "disc[1]", None, "a possible disc: disc at node 2: the inner diameter"
+    )
+
+
+@pytest.mark.parametrize("flag", ['"yes"', "1", "[true]"])
+def test_the_model_takes_true_or_false(file, flag):
+    (problem,) = complaints(file, f"[model]\ngyroscopic = {flag}")
+    assert (problem.column, problem.expected) == ("model.gyroscopic", "true or false, without quotes")
+
+
+def test_the_sample_compressor():
+    folder = sample_data() / "compressor"
+    rotor = read_rotor(folder / "rotor.toml")
+    assert rotor.total_mass == pytest.approx(302, abs=0.5)
+    assert [(s.kind, s.name, s.node) for s in rotor.supports] == [
+        ("bearing", "DE", 4),
+        ("bearing", "NDE", 22),
+        ("seal", "balance piston", 18),
+    ]
+    assert rotor.supports[1].pedestal == Pedestal(900, (7e8, 1.2e9), 2e4)
+    assert {path.name for path in rotor_files(folder / "rotor.toml")} == {
+        "rotor.toml", "shaft.csv", "bearing.csv", "seal.csv"
+    }  # fmt: skip
+    with pytest.raises(
+        ValueError, match=r"'DE' at node 4: its table holds 104.72 to 1675.52 rad/s, not 1800"
+    ):
+        rotor.supports[0].at(1800.0)
+
+
+# --- writing
+
+SIZE = st.floats(1e-6, 1e12) | st.floats(1e-30, 1e30)
+ANY = SIZE | st.just(0.0)
+SIGNED = ANY | SIZE.map(lambda value: -value)
+NAME = st.text(st.characters(exclude_categories=["Cs"]), max_size=6)
+STATION = NAME.filter(lambda name: name.strip() and not name.strip().isdecimal())
+
+
+def per_element(n, numbers):
+    return numbers | st.lists(numbers, min_size=n, max_size=n)
+
+
+@st.composite
+def supports(draw, n):
+    kind = draw(st.sampled_from(["bearing", "seal"]))
+    scalar = SIGNED if kind == "seal" else ANY
+    matrix = st.tuples(st.tuples(SIGNED, SIGNED), st.tuples(SIGNED, SIGNED))
+    entry = scalar | matrix
+    speeds = tuple(sorted(draw(st.sets(ANY, min_size=2, max_size=4)))) if draw(st.booleans()) else ()
+    values = [
+        draw(st.lists(entry, min_size=len(speeds), max_size=len(speeds)) if speeds else entry) for _ in "kc"
+    ]
+    pair = st.tuples(SIZE, SIZE) | SIZE
+    pedestal = draw(st.none() | st.builds(Pedestal, ANY, pair, pair))
+    return Support(
+        draw(st.integers(1, n + 1)), *values, draw(NAME), speeds, pedestal, kind, draw(ANY)
+    )  # fmt: skip
+
+
+@st.composite
+def rotors(draw):
+    n = draw(st.integers(1, 4))
+    outer = draw(st.lists(SIZE, min_size=n, max_size=n))
+    inner = [D * draw(st.just(0.0) | st.floats(0.01, 0.99)) for D in outer]
+    node = st.integers(1, n + 1)
+    return Rotor(
+        draw(per_element(n, SIZE)),
+        outer,
+        [d if 1e-30 <= d < D else 0.0 for d, D in zip(inner, outer, strict=True)],
+        draw(per_element(n, SIZE)),
+        draw(per_element(n, ANY)),
+        draw(st.lists(st.builds(Disc, node, ANY, ANY, ANY, NAME), max_size=3)),
+        draw(st.lists(supports(n), max_size=4)),
+        draw(st.dictionaries(STATION, node, max_size=3)),
+        draw(per_element(n, st.floats(-0.999, -1e-9) | st.just(0.0) | st.floats(1e-9, 0.5))),
+        draw(per_element(n, ANY)),
+        draw(st.builds(Model, st.booleans(), st.booleans(), st.booleans())),
+    )
+
+
+@pytest.mark.filterwarnings("ignore::rotorid.tables.TableWarning")  # of odd sizes
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(rotor=rotors())
+def test_any_rotor_comes_back_from_its_file(tmp_path, rotor):
+    path = tmp_path / "again.toml"
+    written = write_rotor(path, rotor)
+    assert read_rotor(path) == rotor
+    assert set(written) == set(rotor_files(path))
+    assert written[0] == path
+
+
+@pytest.mark.filterwarnings("ignore::rotorid.tables.TableWarning")  # of odd sizes
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_plain_rotor_comes_back_from_its_table(tmp_path, data):
+    n = data.draw(st.integers(1, 4))
+    nodes = data.draw(st.sets(st.integers(1, n + 1)))
+    inertia = st.tuples(ANY, ANY, ANY).filter(any)
+    plain = Rotor(
+        data.draw(per_element(n, SIZE)),
+        data.draw(st.lists(SIZE, min_size=n, max_size=n)),
+        youngs_modulus=data.draw(per_element(n, SIZE)),
+        density=data.draw(per_element(n, ANY)),
+        discs=[Disc(node, *data.draw(inertia)) for node in sorted(nodes)],
+        supports=[Support(node, *data.draw(st.tuples(ANY, ANY).filter(any))) for node in sorted(nodes)],
+        material_damping=data.draw(per_element(n, ANY)),
+    )
+    path = tmp_path / "plain.csv"
+    assert write_rotor(path, plain) == (path,)
+    assert read_rotor(path) == plain
+
+
+BEYOND = [
+    ({"stations": {"a": 1}}, "the names of stations"),
+    ({"model": Model(shear=True)}, "the effects of its model"),
+    ({"discs": [Disc(1, 2, name="wheel")]}, "names of discs or supports"),
+    ({"supports": [Support(1, 2), Support(1, 2)]}, "several discs or supports at a node"),
+    ({"discs": [Disc(2, 2), Disc(1, 2)]}, "in another order than the nodes'"),
+    ({"discs": [Disc(1, 0)]}, "without mass"),
+    ({"supports": [Support(1, 0)]}, "without mass, stiffness and damping"),
+    ({"supports": [Support(1, ((1, 2), (3, 4)))]}, "not isotropic"),
+    ({"supports": [Support(1, (1, 2), speeds=(1, 2))]}, "depend on speed"),
+    ({"supports": [Support(1, 1, pedestal=Pedestal(1, 1))]}, "stand on a pedestal"),
+    ({"supports": [Support(1, 1, tilting_stiffness=1)]}, "hold the slope"),
+    ({"supports": [Support(1, 1, kind="seal")]}, "seals"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("more", "words"), BEYOND)
+def test_a_table_refuses_what_it_cannot_hold(tmp_path, more, words):
+    with pytest.raises(ValueError, match=r"write a rotor file, r\.toml") as caught:
+        write_rotor(tmp_path / "r.csv", Rotor([1.0], 0.1, **more))
+    assert words in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_that_would_not_come_back_are_refused(tmp_path):
+    for name in ("12", " ", " 7 "):
+        with pytest.raises(ValueError, match="would read as a node number or as none; rename it"):
+            write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, stations={name: 1}))
+    with pytest.raises(ValueError, match="no Unicode text"):
+        write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, discs=[Disc(1, 2, name="\ud800")]))
+    with pytest.raises(ValueError, match="length_m = 1e-31 cannot be written to a file"):
+        write_rotor(tmp_path / "r.toml", Rotor([1e-31], 0.1))
+    with pytest.raises(ValueError, match=r"mass_kg = 1e\+31 cannot be written to a file"):
+        write_rotor(tmp_path / "r.toml", Rotor([1.0], 0.1, discs=[Disc(1, 1e31)]))
+    with pytest.raises(InputError, match=r"ends in \.toml or \.csv"):
+        write_rotor(tmp_path / "r.txt", Rotor([1.0], 0.1))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_files_or_none(tmp_path):
+    old, new = Rotor([1.0], 0.1), Rotor([2.0], 0.2, supports=[Support(1, (1, 2), speeds=(1, 2))])
+    write_rotor(tmp_path / "r.toml", old)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    (tmp_path / "r_bearing_1.csv").mkdir()  # what stands in the way of the last but one
+    (tmp_path / "r_bearing_1.csv" / "x").touch()
+    with pytest.raises(InputError, match=r"r_bearing_1\.csv: expected a file that can be written"):
+        write_rotor(tmp_path / "r.toml", new)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+    with pytest.raises(InputError, match="a file that can be written"):
+        write_rotor(tmp_path / "no" / "r.toml", new)
+
+
+def test_reading_a_sample_warns_of_nothing(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
+        write_rotor(tmp_path / "copy.toml", rotor)
+        assert read_rotor(tmp_path / "copy.toml") == rotor
+        assert np.isfinite(rotor.positions).all()
