@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_SPARE = 2  # modes above those asked for, which may come down
+_SPARE = 1  # modes above those asked for, which may come down; more are taken where a mode is lost
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,7 @@ TOLERANCE = 3e-8  # of eigenvalues, relative to their size
 _FEW = 4  # speeds for which the coarse basis is not worth while
 _COMPLETE = 40  # unknowns per plane up to which the basis is the whole space
 _ROUNDS = 6
+_STEP = 5e-5  # relative change of an eigenvalue after which inverse iteration goes on
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +65,19 @@ def solve_whirl(P: Planes, speeds: FloatArray, m: int) -> Whirl:
     ValueError
         If a support has no table at a speed, or the basis cannot be made good enough.
     """
-    first = m // 2 + 1
-    ref = reference(P, speeds, max(m - 1, first))
+    room = m
+    while True:
+        whirl = _solve(P, speeds, m, room)
+        # Rigid-body motions and overdamped ones take room, too: only a complete basis knows of no more.
+        if np.isfinite(whirl.found.values).all() or whirl.Y.shape[1] == P.A.size:
+            return whirl
+        room *= 2
+
+
+def _solve(P: Planes, speeds: FloatArray, m: int, room: int) -> Whirl:
+    """The same with a basis that has room for a given number of modes."""
+    first = max(2, (room + 1) // 2)
+    ref = reference(P, speeds, max(room, first))
     Y, more = starting_vectors(P, ref, first)
     n = P.A.size
     if n <= max(_COMPLETE, Y.shape[1] + more.shape[1]):
@@ -132,19 +144,26 @@ def _refined(Q: Quadratic, speeds: FloatArray, coarse: Solutions, scale: float) 
     for part in range(0, S, 8):  # to stay in the processor's cache
         k, j = np.nonzero(there[part : part + 8])
         k += part
-        values[k, j], X[k, j], _ = polish(
-            Q, speeds, k, values[k, j], X[k, j], 1, None if left is None else left[k, j]
-        )
+        for _ in range(4):
+            others = None if left is None else left[k, j]
+            values[k, j], X[k, j], step = polish(Q, speeds, k, values[k, j], X[k, j], 1, others)
+            # The error that a step leaves is about the square of the step.
+            rough = step > _STEP
+            if not rough.any():
+                break
+            k, j = k[rough], j[rough]
     gap = np.abs(coarse.values[:, :, None] - coarse.values[:, None, :])
     gap[:, np.arange(m), np.arange(m)] = np.inf
     gap = np.nanmin(np.where(np.isnan(gap), np.inf, gap), axis=2)
     bad |= (np.abs(values - coarse.values) > 0.2 * gap).any(axis=1)
     bad[[0, S // 2, S - 1]] = True
-    again = solve(Q, speeds[bad], m, scale)
+    again = solve(Q, speeds[bad], m, scale, left=left is not None)
     missing = _differ(again.values, values[bad])
     if missing[[0, -1]].any() or missing.sum() > 2 + S // 10:
-        return solve(Q, speeds, m, scale)
+        return solve(Q, speeds, m, scale, left=left is not None)
     values[bad], X[bad] = again.values, again.vectors
+    if left is not None and again.left is not None:
+        left[bad] = again.left
     order = np.argsort(np.where(np.isfinite(values), np.abs(values.imag), np.inf), axis=1, kind="stable")
     values = np.take_along_axis(values, order, axis=1)
     X = np.take_along_axis(X, order[:, :, None], axis=1)

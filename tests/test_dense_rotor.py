@@ -90,6 +90,8 @@ def test_ross_extrapolated_answers_with_shear(data):
 
 def _compare(rotor, data, answer, modes, response):
     lam, X, Y = dense_rotor.whirl(rotor, answer["speed"])
+    oscillates = lam.imag > 0.1 * np.abs(lam)  # the others were left out
+    lam, X, Y = lam[oscillates], X[oscillates], Y[oscillates]
     expected = ross_rotors.eigenvalues(answer)
     found = [int(np.argmin(np.abs(lam - value))) for value in expected]
     assert sorted(found) == list(range(len(expected)))  # no mode missed, none found twice

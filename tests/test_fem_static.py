@@ -38,7 +38,8 @@ def test_compliance_is_symmetric_positive_and_the_slow_limit_of_the_response(rot
     assert (np.linalg.eigvalsh(alpha) > -1e-9 * np.abs(alpha).max()).all()
     slow = 1e-5 * fem.critical_speeds(rotor, n=1).frequencies[0]
     W = fem.influence(rotor, nodes, nodes, slow).W[0]
-    np.testing.assert_allclose(W / slow**2, alpha, rtol=0, atol=1e-7 * np.abs(alpha).max())
+    # both promise six digits; beyond that they warn
+    np.testing.assert_allclose(W / slow**2, alpha, rtol=0, atol=1e-6 * np.abs(alpha).max())
 
 
 def test_stations_name_nodes():

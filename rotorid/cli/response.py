@@ -144,6 +144,8 @@ def _peaks(
             break
         closer = [np.linspace(omega[k - 1], omega[k + 1], 41) for k in summits]
         omega = np.unique(np.concatenate([omega, *closer]))
+        # speeds that differ by rounding alone would make summits of rounding
+        omega = omega[np.diff(omega, prepend=-np.inf) > 1e-7 * omega]
         finer = fem.unbalance_response(result.rotor, result.unbalance, omega)
         Z = np.stack([finer.at(place) for place in places], axis=1)
     return [fem.find_peaks(omega, np.abs(reading), operating=operating) for reading in Z.T]
