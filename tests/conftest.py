@@ -10,9 +10,9 @@ import pytest
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy; before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import hypothesis  # noqa: E402
+import hypothesis
 
-import rotorid.cli  # noqa: E402
+import rotorid.cli
 
 # The suite is the same on every machine; HYPOTHESIS_PROFILE=search looks at new examples every time.
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
