@@ -12,6 +12,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rotorid.estimate import Combination as Combination
     from rotorid.estimate import Estimate as Estimate
+    from rotorid.harmonic import Experiments as Experiments
+    from rotorid.harmonic import Identification as Identification
+    from rotorid.harmonic import harmonic_model as harmonic_model
+    from rotorid.harmonic import identify as identify
     from rotorid.reduction import Reduction as Reduction
     from rotorid.reduction import equivalent_masses as equivalent_masses
     from rotorid.reduction import mac as mac
@@ -23,8 +27,10 @@ if TYPE_CHECKING:
     from rotorid.regression import unstretch as unstretch
     from rotorid.tables import InputError as InputError
     from rotorid.tables import Job as Job
+    from rotorid.tables import read_harmonic_model as read_harmonic_model
     from rotorid.tables import read_influence as read_influence
     from rotorid.tables import read_job as read_job
+    from rotorid.tables import read_measurements as read_measurements
     from rotorid.tables import read_rotor as read_rotor
     from rotorid.tables import read_trials as read_trials
     from rotorid.tables import read_unbalance as read_unbalance
@@ -41,6 +47,11 @@ _HOME = {
     "stack": "regression",
     "Estimate": "estimate",
     "Combination": "estimate",
+    # harmonic tests, natural frequencies and shapes
+    "harmonic_model": "harmonic",
+    "identify": "harmonic",
+    "Experiments": "harmonic",
+    "Identification": "harmonic",
     # a rotor as a few masses
     "reduce": "reduction",
     "Reduction": "reduction",
@@ -55,6 +66,8 @@ _HOME = {
     "write_influence": "tables",
     "write_rotor": "tables",
     "read_job": "tables",
+    "read_harmonic_model": "tables",
+    "read_measurements": "tables",
     "Job": "tables",
     "InputError": "tables",
 }

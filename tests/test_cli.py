@@ -207,7 +207,7 @@ def test_demo_writes_the_job_and_says_where_the_pictures_are(cli, tmp_path):
 
 def test_help_has_an_example_for_every_command(cli):
     listing = cli("--help").out
-    for command in ("demo", "critical", "campbell", "response", "influence", "balance", "reduce"):
+    for command in ("demo", "critical", "campbell", "response", "influence", "balance", "reduce", "identify"):
         assert command in listing
         assert "Example: rotorid " + command in cli(command, "--help").out
     assert cli("--version").out == "rotorid 0.1.0\n"

@@ -9,7 +9,7 @@ import warnings
 
 import typer
 
-from rotorid.cli import balance, campbell, critical, demo, influence, reduce, response
+from rotorid.cli import balance, campbell, critical, demo, identify, influence, reduce, response
 
 app = typer.Typer(
     name="rotorid",
@@ -25,6 +25,7 @@ app.command("response")(response.response)
 app.command("influence")(influence.influence)
 app.command("balance")(balance.balance)
 app.command("reduce")(reduce.reduce)
+app.command("identify")(identify.identify)
 
 
 def _version(show: bool) -> None:

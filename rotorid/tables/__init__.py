@@ -5,8 +5,10 @@ complaint about a file names the file, row and column, what was found and what w
 """
 
 from rotorid.tables.conventions import Conventions, StatedErrors
+from rotorid.tables.harmonicfile import HarmonicFile, read_harmonic_model
 from rotorid.tables.influence import influence_frame, read_influence, write_influence
 from rotorid.tables.job import Job, job_from_files, read_job
+from rotorid.tables.measurements import read_measurements
 from rotorid.tables.problems import InputError, Problem, TableWarning
 from rotorid.tables.rotor import read_rotor
 from rotorid.tables.rotorfile import rotor_files
@@ -17,6 +19,7 @@ from rotorid.tables.writing import write_table
 
 __all__ = [
     "Conventions",
+    "HarmonicFile",
     "InputError",
     "Job",
     "Problem",
@@ -24,8 +27,10 @@ __all__ = [
     "TableWarning",
     "influence_frame",
     "job_from_files",
+    "read_harmonic_model",
     "read_influence",
     "read_job",
+    "read_measurements",
     "read_rotor",
     "read_trials",
     "read_unbalance",

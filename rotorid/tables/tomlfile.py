@@ -72,6 +72,11 @@ class Section:
     def __contains__(self, key: str) -> bool:
         return key in self._data
 
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """All keys, taken or not."""
+        return tuple(self._data)
+
     def complain(self, key: str, expected: str, *, value: bool = True) -> None:
         """Note a problem with a key."""
         found = _shown(self._data[key]) if value and key in self._data else None

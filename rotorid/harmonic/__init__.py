@@ -1,0 +1,18 @@
+"""Identification from harmonic tests, natural frequencies and shapes: operator models, two methods."""
+
+from __future__ import annotations
+
+from rotorid.harmonic.equation_error import identify
+from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
+from rotorid.harmonic.model import HarmonicModel, harmonic_model
+from rotorid.harmonic.result import FoundCombination, Identification
+
+__all__ = [
+    "AmplitudeErrors",
+    "Experiments",
+    "FoundCombination",
+    "HarmonicModel",
+    "Identification",
+    "harmonic_model",
+    "identify",
+]

@@ -1,0 +1,191 @@
+"""Measured amplitudes: what was excited, what was read, and how well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from rotorid.harmonic.model import HarmonicModel
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class AmplitudeErrors:
+    """Errors of one measured amplitude, one standard deviation each.
+
+    Attributes
+    ----------
+    relative
+        Of the amplitude, as a fraction (0.02 = 2 %).
+    phase
+        Radians.
+    floor
+        In the unit of the amplitudes; added in every direction.
+    """
+
+    relative: float = 0.0
+    phase: float = 0.0
+    floor: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = (self.relative, self.phase, self.floor)
+        if not all(np.isfinite(v) and v >= 0 for v in values):
+            raise ValueError(f"errors of amplitudes must be finite and not negative; got {values}")
+        if not any(values):
+            raise ValueError("state at least one error of the amplitudes greater than zero, or none at all")
+
+    def covariance(self, amplitudes: ComplexArray, real: BoolArray | bool = False) -> FloatArray:
+        """Covariance of real and imaginary part, shape (n, 2, 2), for amplitudes (n,).
+
+        The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
+        Where `real` (free vibration) there is no imaginary part and its variance is zero.
+        """
+        z = np.asarray(amplitudes, dtype=complex)
+        size = np.abs(z)
+        along, across = (self.relative * size) ** 2 + self.floor**2, (self.phase * size) ** 2 + self.floor**2
+        turn = np.exp(1j * np.angle(z))
+        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
+        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack((along, across), -1), e)
+        covariance[np.broadcast_to(real, size.shape)] *= np.array([[1.0, 0.0], [0.0, 0.0]])
+        return np.asarray(covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class Experiments:
+    """Harmonic tests and free vibrations: n experiments.
+
+    Attributes
+    ----------
+    names
+        Of the experiments.
+    frequencies
+        Shape (n,), rad/s: of excitation, or natural.
+    signals
+        Complex amplitudes (n,) by the name they have in the model, inputs too; NaN where not measured.
+    free
+        Shape (n,): free vibration (natural frequency and shape: no input, real amplitudes).
+    errors
+        Stated errors of the measured outputs; None: not stated. Inputs count as exact.
+    covariances
+        From repeated readings: by signal (n, 2, 2), real and imaginary part; before `errors`.
+    """
+
+    names: tuple[str, ...]
+    frequencies: FloatArray
+    signals: Mapping[str, ComplexArray]
+    free: BoolArray
+    errors: AmplitudeErrors | None = None
+    covariances: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        w = np.asarray(self.frequencies)
+        if not n:
+            raise ValueError("there are no experiments")
+        if w.shape != (n,) or np.shape(self.free) != (n,):
+            raise ValueError(f"{n} experiments need {n} frequencies and marks of free vibration")
+        if not np.isfinite(w).all() or (w < 0).any():
+            raise ValueError(f"frequencies must be finite and not negative; got {w.tolist()}")
+        for name, values in self.signals.items():
+            if np.shape(values) != (n,):
+                raise ValueError(f"{n} experiments need {n} amplitudes {name}; got shape {np.shape(values)}")
+        for name, covariance in self.covariances.items():
+            if np.shape(covariance) != (n, 2, 2):
+                raise ValueError(f"the covariance of {name} must have shape ({n}, 2, 2)")
+            if name not in self.signals:
+                raise ValueError(f"a covariance is given for {name}, but no amplitudes")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def stated(self) -> bool:
+        """Whether errors of the amplitudes are stated or known from repeated readings."""
+        return self.errors is not None or bool(self.covariances)
+
+    def covariance(self, name: str) -> FloatArray:
+        """Covariance of an amplitude's real and imaginary part, (n, 2, 2); zero where nothing is stated."""
+        if name in self.covariances:
+            return np.asarray(self.covariances[name], dtype=float)
+        if self.errors is None:
+            return np.zeros((len(self), 2, 2))
+        amplitudes = np.nan_to_num(np.asarray(self.signals[name], dtype=complex))
+        return self.errors.covariance(amplitudes, self.free)
+
+    def take(self, index: ArrayLike) -> Experiments:
+        """Some of the experiments, by index or by a mask (n,)."""
+        chosen = np.arange(len(self))[np.asarray(index)]
+        return Experiments(
+            tuple(self.names[i] for i in chosen),
+            self.frequencies[chosen],
+            {name: values[chosen] for name, values in self.signals.items()},
+            self.free[chosen],
+            self.errors,
+            {name: values[chosen] for name, values in self.covariances.items()},
+        )
+
+
+def experiments(
+    model: HarmonicModel,
+    frequencies: ArrayLike,
+    signals: Mapping[str, ArrayLike | complex],
+    *,
+    names: Sequence[str] | None = None,
+    free: ArrayLike | bool | None = None,
+    errors: AmplitudeErrors | None = None,
+    covariances: Mapping[str, FloatArray] | None = None,
+) -> Experiments:
+    """Gather the amplitudes of a model's signals into `Experiments`.
+
+    Parameters
+    ----------
+    model
+        Says which signals are inputs.
+    frequencies
+        Shape (n,), rad/s.
+    signals
+        Amplitudes by name, (n,) or one for all experiments; NaN: not measured.
+    names
+        Default 1, 2, ….
+    free
+        Which experiments are free vibrations. Default: those whose inputs are all 0, NaN or absent and whose
+        amplitudes are all real, if the model has no term without a signal. Their inputs become 0.
+    errors, covariances
+        As in `Experiments`.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit and frequencies that are not finite.
+    """
+    w = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if w.ndim != 1:
+        raise ValueError(f"frequencies must have one dimension; got shape {w.shape}")
+    table: dict[str, ComplexArray] = {}
+    for name, values in signals.items():
+        z = np.asarray(values, dtype=complex)
+        table[name] = np.full(w.shape, complex(z)) if z.ndim == 0 else z
+        if table[name].shape != w.shape:
+            raise ValueError(f"{len(w)} experiments need {len(w)} amplitudes {name}; got shape {z.shape}")
+    labels = tuple(names) if names is not None else tuple(str(i + 1) for i in range(len(w)))
+    if free is None:
+        marks = np.full(w.shape, not model.has_constant_terms)
+        for name, z in table.items():
+            if name in model.inputs:
+                marks &= np.isnan(z) | (z == 0)
+            elif name in model.signals:
+                marks &= np.isnan(z) | (z.imag == 0)
+    else:
+        marks = np.broadcast_to(np.asarray(free, dtype=bool), w.shape).copy()
+    for name in model.inputs:
+        if name in table or marks.any():
+            table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
+    return Experiments(labels, w, table, marks, errors, dict(covariances or {}))

@@ -1,0 +1,277 @@
+"""Equations as features: Σ P_f(parameters)·f = 0 with f = p^k · amplitude, and what data can see of the P_f.
+
+The monomials of the parameters are lifted into new unknowns ([S] 1.8). The matrix of their coefficients
+(features × monomials, known numbers inserted, exact rationals) has a row space: its reduced echelon form
+lists the combinations of monomials that data can determine at best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, degree, times
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+P = "p"
+CONSTANT = ""
+"""Signal name of a term without a signal: amplitude 1."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One coefficient of one equation: Σ over monomials, each with a polynomial in the known names.
+
+    Attributes
+    ----------
+    equation, power, signal
+        Number of the equation from 0, k of p^k, name of the amplitude (or CONSTANT).
+    exact
+        Coefficient of each monomial of the parameters, known numbers inserted.
+    symbolic
+        The same with the names of the known.
+    """
+
+    equation: int
+    power: int
+    signal: str
+    exact: dict[Monomial, Fraction]
+    symbolic: dict[Monomial, Polynomial]
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """All terms coefficient · monomial(θ) · p^power · signal of all equations as flat arrays (t,)."""
+
+    equation: IntArray
+    power: IntArray
+    signal: IntArray
+    monomial: IntArray
+    coefficient: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """The combinations of parameters that data can determine at best.
+
+    Attributes
+    ----------
+    monomials
+        The lifted unknowns, parameters first.
+    rows
+        Shape (u, monomials): each combination's coefficients.
+    pivots, scales
+        A feature's share of combination i is its coefficient of monomial `pivots[i]` over `scales[i]`.
+    words
+        Such as "b*(1 - delta)".
+    """
+
+    monomials: tuple[Monomial, ...]
+    rows: FloatArray
+    pivots: tuple[int, ...]
+    scales: FloatArray
+    words: tuple[str, ...]
+
+
+def split_features(
+    equation: int, polynomial: Polynomial, known: Mapping[str, Fraction], signals: frozenset[str]
+) -> list[Feature]:
+    """Sort an equation's terms by p^k · signal; ValueError where it is not linear in the signals."""
+    symbolic: dict[tuple[int, str], dict[Monomial, Polynomial]] = {}
+    for monomial, value in polynomial.items():
+        k, signal, numbers, parameters = 0, CONSTANT, [], []
+        for name, exponent in monomial:
+            if name == P:
+                k = exponent
+            elif name in signals:
+                if signal or exponent != 1:
+                    term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
+                    raise ValueError(f"it is not linear in the signals: it contains {term}")
+                signal = name
+            elif name in known:
+                numbers.append((name, exponent))
+            else:
+                parameters.append((name, exponent))
+        place = symbolic.setdefault((k, signal), {}).setdefault(tuple(parameters), {})
+        place[tuple(numbers)] = value
+    features = []
+    for (k, signal), parts in sorted(symbolic.items(), key=lambda item: item[0]):
+        exact = {m: insert(part, known) for m, part in parts.items()}
+        exact = {m: x for m, x in exact.items() if x}
+        if exact:
+            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}))
+    return features
+
+
+def insert(polynomial: Polynomial, known: Mapping[str, Fraction]) -> Fraction:
+    """Value of a polynomial in known names."""
+    total = Fraction(0)
+    for monomial, value in polynomial.items():
+        term = value
+        for name, exponent in monomial:
+            term *= known[name] ** exponent
+        total += term
+    return total
+
+
+def lifted(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Monomial, ...]:
+    """Monomials of the parameters in all features: single parameters first, in their order."""
+    order = {name: i for i, name in enumerate(parameters)}
+    found = {m for feature in features for m in feature.exact if m != ONE}
+    return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
+
+
+def flatten(features: Sequence[Feature], monomials: Sequence[Monomial], signals: Sequence[str]) -> Terms:
+    """Features as flat arrays; monomial 0 is 1, the others follow; signal −1 is the constant."""
+    place = {ONE: 0} | {m: i + 1 for i, m in enumerate(monomials)}
+    column = {name: i for i, name in enumerate(signals)} | {CONSTANT: -1}
+    rows = [
+        (f.equation, f.power, column[f.signal], place[m], float(x))
+        for f in features
+        for m, x in f.exact.items()
+    ]
+    table = np.array(rows, dtype=float).reshape(-1, 5)
+    whole = table[:, :4].astype(np.int64)
+    return Terms(whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], table[:, 4])
+
+
+def merge(
+    features: Sequence[Feature], monomials: Sequence[Monomial], known: Mapping[str, Fraction]
+) -> Combinations:
+    """Merge monomials whose columns no data can tell apart into the combinations that data can see."""
+    place = {m: i for i, m in enumerate(monomials)}
+    echelon: dict[int, dict[int, Fraction]] = {}
+    for feature in features:
+        _insert_row(echelon, {place[m]: x for m, x in feature.exact.items() if m != ONE})
+    pivots = sorted(echelon)
+    rows, words = np.zeros((len(pivots), len(monomials))), []
+    for i, pivot in enumerate(pivots):
+        wanted = {monomials[c]: x for c, x in sorted(echelon[pivot].items())}
+        symbolic = _own_words(wanted, features)
+        for m, part in symbolic.items():
+            rows[i, place[m]] = float(insert(part, known))
+        words.append(combination_words(symbolic))
+    scales = rows[np.arange(len(pivots)), pivots]
+    return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(words))
+
+
+def _insert_row(echelon: dict[int, dict[int, Fraction]], row: dict[int, Fraction]) -> None:
+    """Add a row to a reduced echelon form kept by pivot."""
+    for pivot in [c for c in row if c in echelon]:
+        _subtract(row, echelon[pivot], row[pivot])
+    if not row:
+        return
+    pivot = min(row)
+    lead = row[pivot]
+    row = {c: x / lead for c, x in row.items()}
+    for other in echelon.values():
+        if pivot in other:
+            _subtract(other, row, other[pivot])
+    echelon[pivot] = row
+
+
+def _subtract(row: dict[int, Fraction], other: Mapping[int, Fraction], factor: Fraction) -> None:
+    for column, value in other.items():
+        left = row.get(column, Fraction(0)) - factor * value
+        if left:
+            row[column] = left
+        else:
+            row.pop(column, None)
+
+
+def _own_words(
+    wanted: Mapping[Monomial, Fraction], features: Sequence[Feature]
+) -> dict[Monomial, Polynomial]:
+    """Coefficients with the names of the known as an equation has them, where one has this combination."""
+    if len(wanted) > 1:
+        first = next(iter(wanted))
+        for feature in features:
+            if not all(m in feature.exact and len(feature.symbolic[m]) == 1 for m in wanted):
+                continue
+            scale = feature.exact[first] / wanted[first]
+            if all(feature.exact[m] == scale * x for m, x in wanted.items()):
+                return _without_common(_in_order({m: feature.symbolic[m] for m in wanted}))
+    return {m: {ONE: x} for m, x in wanted.items()}
+
+
+def _in_order(symbolic: Mapping[Monomial, Polynomial]) -> dict[Monomial, Polynomial]:
+    """Short terms and small numbers first, as one would write them."""
+
+    def key(m: Monomial) -> tuple[int, Fraction]:
+        ((numbers, value),) = symbolic[m].items()
+        return degree(m) + degree(numbers), abs(value)
+
+    return {m: symbolic[m] for m in sorted(symbolic, key=key)}
+
+
+def _without_common(symbolic: Mapping[Monomial, Polynomial]) -> dict[Monomial, Polynomial]:
+    """Take out what all coefficients share, so that T0*T1 + T0*T2 of a known T0 is T1 + T2."""
+    terms = {m: next(iter(part.items())) for m, part in symbolic.items()}
+    numbers = [dict(known) for known, _ in terms.values()]
+    names = [name for name in numbers[0] if all(name in n for n in numbers)]
+    inverse = tuple(sorted((name, -min(n[name] for n in numbers)) for name in names))
+    sizes = [value for _, value in terms.values()]
+    smallest = min(map(abs, sizes))
+    shared = smallest if all((v / smallest).denominator == 1 for v in sizes) else Fraction(1)
+    if sizes[0] < 0:
+        shared = -shared
+    return {m: {times(known, inverse): value / shared} for m, (known, value) in terms.items()}
+
+
+def combination_words(coefficients: Mapping[Monomial, Polynomial]) -> str:
+    """Write Σ coefficient·monomial, a common factor in front.
+
+    Examples
+    --------
+    >>> one = Fraction(1)
+    >>> combination_words({(("b", 1),): {(): one}, (("b", 1), ("delta", 1)): {(): -one}})
+    'b*(1 - delta)'
+    """
+    terms = [(known, m, value) for m, part in coefficients.items() for known, value in part.items()]
+    monomials = [dict(m) for m in coefficients]
+    common = tuple(
+        sorted(
+            (name, e)
+            for name, e in monomials[0].items()
+            if e > 0 and all(m.get(name) == e for m in monomials)
+        )
+    )
+    if len(terms) < 2 or not common:
+        return _sum_words(terms)
+    inverse = tuple((name, -e) for name, e in common)
+    inside = _sum_words([(known, times(m, inverse), value) for known, m, value in terms])
+    return f"{_product_words((), common)}*({inside})"
+
+
+def _sum_words(terms: Sequence[tuple[Monomial, Monomial, Fraction]]) -> str:
+    text = ""
+    for known, monomial, value in terms:
+        sign = ("-" if value < 0 else "") if not text else (" - " if value < 0 else " + ")
+        product = _product_words(known, monomial)
+        size = abs(value)
+        number = f"{float(size):.6g}"
+        if product == "1":
+            product = number
+        elif number != "1":
+            product = f"{number}/{product[2:]}" if product.startswith("1/") else f"{number}*{product}"
+        text += sign + product
+    return text
+
+
+def _product_words(known: Monomial, monomial: Monomial) -> str:
+    over = [_power_words(n, e) for n, e in (*known, *monomial) if e > 0]
+    under = [_power_words(n, -e) for n, e in (*known, *monomial) if e < 0]
+    text = "*".join(over) or "1"
+    if not under:
+        return text
+    return f"{text}/{under[0]}" if len(under) == 1 else f"{text}/({'*'.join(under)})"
+
+
+def _power_words(name: str, exponent: int) -> str:
+    return name if exponent == 1 else f"{name}**{exponent}"

@@ -1,0 +1,326 @@
+"""Operator models: linear equations in the amplitudes with coefficients in p = d/dt and parameters."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.harmonic.features import CONSTANT, Combinations, Feature, P, Terms, flatten, lifted, merge
+from rotorid.harmonic.features import split_features as _split
+from rotorid.harmonic.polynomial import Monomial, add, from_expression
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicModel:
+    """Linear operator equations; made by `harmonic_model`.
+
+    Attributes
+    ----------
+    equations
+        As written.
+    parameters
+        Names to be estimated, in their order.
+    known
+        Numbers by name.
+    signals, inputs, outputs
+        Names of all amplitudes, of the exciting ones and of the others.
+    features
+        The coefficients of p^k · signal in each equation.
+    """
+
+    equations: tuple[str, ...]
+    parameters: tuple[str, ...]
+    known: Mapping[str, float]
+    signals: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    features: tuple[Feature, ...] = field(repr=False)
+
+    @property
+    def has_constant_terms(self) -> bool:
+        """Whether a term stands without a signal (amplitude 1), such as a known force."""
+        return any(f.signal == CONSTANT for f in self.features)
+
+    @cached_property
+    def monomials(self) -> tuple[Monomial, ...]:
+        """Products and powers of parameters, lifted into unknowns of the regression."""
+        return lifted(self.features, self.parameters)
+
+    @cached_property
+    def combinations(self) -> Combinations:
+        """What data can determine at best: the row space of the coefficients."""
+        exact = {name: exact_number(value) for name, value in self.known.items()}
+        return merge(self.features, self.monomials, exact)
+
+    @cached_property
+    def terms(self) -> Terms:
+        """All terms as flat arrays."""
+        return flatten(self.features, self.monomials, self.signals)
+
+    @cached_property
+    def exponents(self) -> FloatArray:
+        """Exponents of the parameters, (1 + monomials, parameters); row 0 is the constant 1."""
+        place = {name: i for i, name in enumerate(self.parameters)}
+        table = np.zeros((1 + len(self.monomials), len(self.parameters)))
+        for i, monomial in enumerate(self.monomials):
+            for name, exponent in monomial:
+                table[i + 1, place[name]] = exponent
+        return table
+
+    def monomial_values(self, values: FloatArray) -> FloatArray:
+        """Monomials (1 + monomials,) of parameters (n,)."""
+        return np.asarray(np.prod(np.asarray(values, dtype=float) ** self.exponents, axis=1))
+
+    def monomial_jacobian(self, values: FloatArray) -> FloatArray:
+        """Derivatives (1 + monomials, n) of the monomials by the parameters."""
+        theta = np.asarray(values, dtype=float)
+        jacobian = np.zeros_like(self.exponents)
+        for j in range(len(theta)):
+            used = np.flatnonzero(self.exponents[:, j])
+            lower = self.exponents[used].copy()
+            lower[:, j] -= 1
+            jacobian[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
+        return jacobian
+
+    def matrices(self, values: FloatArray, frequencies: FloatArray) -> ComplexArray:
+        """Coefficients A(iω; θ) of the signals, (n, equations, 1 + signals); the last is the constant's.
+
+        Parameters
+        ----------
+        values
+            Of the parameters.
+        frequencies
+            (n,), rad/s.
+        """
+        t = self.terms
+        weights = t.coefficient * self.monomial_values(values)[t.monomial]
+        A: ComplexArray = self._evaluate(weights[None], frequencies)[0]
+        return A
+
+    def matrix_derivatives(self, values: FloatArray, frequencies: FloatArray) -> ComplexArray:
+        """∂A/∂θ, shape (parameters, n, equations, 1 + signals), in the order of `matrices`."""
+        t = self.terms
+        weights = t.coefficient * self.monomial_jacobian(values)[t.monomial].T
+        return self._evaluate(weights, frequencies)
+
+    def predict(
+        self, values: FloatArray, frequencies: FloatArray, inputs: Mapping[str, ComplexArray]
+    ) -> dict[str, ComplexArray]:
+        """Amplitudes of the outputs at frequencies (n,) for amplitudes of the inputs (n,).
+
+        Raises
+        ------
+        ValueError
+            If there are not as many outputs as equations.
+        """
+        self.check_square()
+        A = self.matrices(values, frequencies)
+        place = {name: i for i, name in enumerate(self.signals)}
+        right = -A[:, :, -1]
+        for name in self.inputs:
+            right = right - A[:, :, place[name]] * np.asarray(inputs[name])[:, None]
+        left = A[:, :, [place[name] for name in self.outputs]]
+        found = np.linalg.solve(left, right[:, :, None])[:, :, 0]
+        return {name: np.asarray(found[:, i], dtype=complex) for i, name in enumerate(self.outputs)}
+
+    def check_square(self) -> None:
+        """Raise ValueError if amplitudes cannot be predicted: not as many outputs as equations."""
+        if len(self.outputs) != len(self.equations):
+            raise ValueError(
+                f"to predict amplitudes the model needs as many outputs as equations; it has outputs "
+                f"{', '.join(self.outputs) or 'none'} in {len(self.equations)} equations: "
+                f"say which signals are given with inputs = [...]"
+            )
+
+    def _evaluate(self, weights: FloatArray, frequencies: FloatArray) -> ComplexArray:
+        """Σ weights · p^k sorted into (rows of weights, n, equations, 1 + signals)."""
+        t = self.terms
+        w = np.asarray(frequencies, dtype=float)
+        if (t.power < 0).any() and (w == 0).any():
+            raise ValueError("an equation divides by p: it has no meaning at the frequency 0")
+        width = 1 + len(self.signals)
+        shape = (len(weights), len(self.equations), width)
+        out = np.zeros((len(weights), len(w), *shape[1:]), dtype=complex)
+        column = np.where(t.signal < 0, width - 1, t.signal)
+        for k in np.unique(t.power):
+            used = t.power == k
+            part = np.zeros(shape)
+            for row, own in zip(part, weights, strict=True):
+                np.add.at(row, (t.equation[used], column[used]), own[used])
+            out += part[:, None] * ((1j * w) ** int(k))[None, :, None, None]
+        return out
+
+
+def harmonic_model(
+    equations: Sequence[str],
+    *,
+    known: Mapping[str, float] | None = None,
+    estimate: Sequence[str],
+    inputs: Sequence[str] | None = None,
+) -> HarmonicModel:
+    """Read an operator model.
+
+    Parameters
+    ----------
+    equations
+        "left = right" in p = d/dt, known names, parameters and signals, such as "(m*p**2 + b*p + c)*X = F".
+        Every name that is neither p, known nor to be estimated is a signal; a term without a signal has
+        amplitude 1. Denominators of several terms are multiplied out.
+    known
+        Numbers by name.
+    estimate
+        Names of the parameters to be estimated.
+    inputs
+        Signals that excite. Default: those that stand only on right sides.
+
+    Raises
+    ------
+    ValueError
+        For equations that cannot be read, are not linear in the signals or not rational in p and parameters,
+        parameters that do not occur, names given twice.
+
+    Examples
+    --------
+    >>> model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    >>> model.outputs, model.inputs
+    (('X',), ('F',))
+    """
+    from rotorid.expressions import names, parse_equation
+
+    if isinstance(equations, str):
+        equations = [equations]
+    if not equations:
+        raise ValueError("the model has no equations")
+    numbers = {name: _finite(name, value) for name, value in (known or {}).items()}
+    _check_names(tuple(estimate), numbers)
+    sides = [parse_equation(text, where=f"equation {i + 1}") for i, text in enumerate(equations)]
+    left, right = ({n for side in sides for n in names(side[i])} for i in (0, 1))
+    given = {P, *numbers, *estimate}
+    occurring = sorted((left | right) - given)
+    for name in estimate:
+        if name not in left | right:
+            hint = _near(name, occurring)
+            raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
+
+    exact = {name: exact_number(value) for name, value in numbers.items()}
+    features: list[Feature] = []
+    for i, (text, (lhs, rhs)) in enumerate(zip(equations, sides, strict=True)):
+        try:
+            features += _expand(i, lhs, rhs, exact, frozenset(occurring))
+        except ValueError as problem:
+            raise ValueError(f"equation {i + 1}, '{text}': {problem}") from None
+    used = {f.signal for f in features} - {CONSTANT}
+    signals = tuple(name for name in _by_place(equations, occurring) if name in used)
+    if not signals:
+        raise ValueError(
+            "the equations contain no signal: no name is left that is neither known nor estimated"
+        )
+    occurs = {name for f in features for m in f.exact for name, _ in m}
+    for name in estimate:
+        if name not in occurs:
+            raise ValueError(
+                f"the parameter {name} cancels out of the equations: nothing can be said about it"
+            )
+    if inputs is None:
+        chosen = tuple(name for name in signals if name not in left)
+    else:
+        chosen = tuple(inputs)
+        for name in chosen:
+            if name not in signals:
+                raise ValueError(
+                    f"the input {name} is no signal of the equations; signals are {', '.join(signals)}"
+                )
+    outputs = tuple(name for name in signals if name not in chosen)
+    if not outputs:
+        raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
+    return HarmonicModel(
+        tuple(equations), tuple(estimate), numbers, signals, chosen, outputs, tuple(features)
+    )
+
+
+def exact_number(value: float) -> Fraction:
+    """The decimal number that a float is printed as: 0.1 is 1/10."""
+    return Fraction(repr(float(value)))
+
+
+def _expand(
+    index: int,
+    lhs: Any,  # noqa: ANN401 - sympy
+    rhs: Any,  # noqa: ANN401
+    known: Mapping[str, Fraction],
+    signals: frozenset[str],
+) -> list[Feature]:
+    def constant(part: Any) -> Fraction | None:  # noqa: ANN401
+        if any(symbol.name not in known for symbol in part.free_symbols):
+            return None
+        value = complex(part.subs({s: float(known[s.name]) for s in part.free_symbols}).evalf())
+        if not np.isfinite(value) or abs(value.imag) > 1e-12 * abs(value):
+            raise ValueError(f"'{part}' is no finite real number for the known values")
+        return exact_number(value.real)
+
+    try:
+        left, right = from_expression(lhs, constant), from_expression(rhs, constant)
+    except ZeroDivisionError:
+        raise ValueError("it divides by zero") from None
+    for factor in (*left.bottom, *right.bottom):
+        for monomial, _ in factor:
+            for name, _ in monomial:
+                if name in signals:
+                    raise ValueError(f"it is not linear in the signals: {name} stands in a denominator")
+    bottom = left.bottom | right.bottom
+    difference = add(left.over(bottom), right.over(bottom), -1)
+    for monomial in difference:
+        for name, exponent in monomial:
+            if name in known and exponent < 0 and not known[name]:
+                raise ValueError(f"it divides by {name}, which is 0")
+    features = _split(index, difference, known, signals)
+    if not any(f.signal for f in features):
+        raise ValueError("it contains no signal; names that are neither known nor estimated are signals")
+    return features
+
+
+def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
+    from rotorid.expressions import is_name
+
+    if not estimate:
+        raise ValueError("no parameter is to be estimated: name at least one")
+    for name in (*estimate, *known):
+        if not is_name(name):
+            raise ValueError(f"'{name}' cannot be a name: letters, digits and _ only, and no function's name")
+        if name == P:
+            raise ValueError("p is d/dt: it can be neither known nor estimated")
+    for name in estimate:
+        if estimate.count(name) > 1:
+            raise ValueError(f"the parameter {name} is named twice")
+        if name in known:
+            raise ValueError(f"{name} is both known and to be estimated")
+
+
+def _finite(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
+        raise ValueError(f"the known {name} must be a finite number; got {value!r}")
+    return float(value)
+
+
+def _near(name: str, names: Sequence[str]) -> str:
+    found = difflib.get_close_matches(name, names, 1, 0.5)
+    return f"; did you mean {found[0]}?" if found else ""
+
+
+def _by_place(equations: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Names in the order in which they first stand in the equations."""
+    import re
+
+    found = re.findall(r"[^\W\d]\w*", " ".join(equations))
+    place = {name: i for i, name in reversed(list(enumerate(found)))}
+    return sorted(names, key=lambda name: place.get(name, len(place)))

@@ -1,0 +1,186 @@
+"""Predicted amplitudes of an operator model and their exact derivatives.
+
+The equations are sums of terms c · Πθ^e · p^k · signal. With the outputs on one side they are
+A(p; θ) Z = b(p; θ), so Z = A⁻¹ b and dZ/dθ = A⁻¹ (db/dθ − dA/dθ Z) ([S] (17), (18)). In free vibration
+p² = −ω², b = 0, and odd powers of p, which would need imaginary amplitudes, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.harmonic.features import CONSTANT, Feature
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+IntArray = NDArray[np.int_]
+
+
+@dataclass(frozen=True, eq=False)
+class Operator:
+    """A model compiled to arrays: f features (equation, signal, power of p), each a polynomial of θ.
+
+    Attributes
+    ----------
+    parameters, outputs, inputs
+        Names; as many outputs as equations.
+    equation, signal, power
+        Of each feature, shape (f,); `signal` counts outputs, then inputs, then −1 for none.
+    C
+        Coefficients, features × monomials.
+    exponents
+        Of the parameters in each monomial, monomials × parameters.
+    """
+
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    equation: IntArray
+    signal: IntArray
+    power: IntArray
+    C: FloatArray
+    exponents: IntArray
+
+    @cached_property
+    def _is_output(self) -> NDArray[np.bool_]:
+        return (self.signal >= 0) & (self.signal < len(self.outputs))
+
+    @cached_property
+    def _place(self) -> FloatArray:
+        """Where the output features stand in A: (f, e·e)."""
+        e = len(self.outputs)
+        place = np.zeros((len(self.signal), e * e))
+        at = np.flatnonzero(self._is_output)
+        place[at, self.equation[at] * e + self.signal[at]] = 1.0
+        return place
+
+    @cached_property
+    def rows(self) -> list[IntArray]:
+        """Features of each equation."""
+        return [np.flatnonzero(self.equation == i) for i in range(len(self.outputs))]
+
+    def polynomials(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (f,) and derivatives (f, n) of the features' coefficients at θ (n,)."""
+        powers = theta ** self.exponents.astype(np.float64)
+        monomials = powers.prod(axis=1)
+        if theta.all():
+            return self.C @ monomials, self.C @ (monomials[:, None] * self.exponents / theta)
+        slopes = np.zeros(powers.shape)
+        for j in np.flatnonzero(self.exponents.any(axis=0)):
+            others = np.delete(powers, j, axis=1).prod(axis=1)
+            e = self.exponents[:, j].astype(np.float64)
+            own = np.where(e == 0, 0.0, e * theta[j] ** np.where(e == 0, 1.0, e - 1))
+            slopes[:, j] = own * others
+        return self.C @ monomials, self.C @ slopes
+
+    def forced(
+        self, theta: FloatArray, frequencies: FloatArray, inputs: ComplexArray, slopes: bool = True
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Amplitudes (n, e) and their derivatives (n, e, parameters).
+
+        Parameters
+        ----------
+        theta
+            Parameters.
+        frequencies
+            ω, shape (n,).
+        inputs
+            Amplitudes of the inputs, (n, inputs).
+        slopes
+            False: without derivatives (an empty array).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            At a resonance without damping.
+        """
+        P, dP = self.polynomials(theta)
+        n, e = len(frequencies), len(self.outputs)
+        pk = self._p(frequencies)
+        A = ((pk * P) @ self._place).reshape(n, e, e)
+        # only inputs and terms without a signal are in it so far
+        load = pk * self._amplitudes(np.zeros((n, e), dtype=complex), inputs)
+        b = -np.stack([load[:, f] @ P[f] for f in self.rows], axis=1)
+        Z: ComplexArray = np.asarray(np.linalg.solve(A, b[..., None])[..., 0], dtype=np.complex128)
+        if not slopes:
+            return Z, np.zeros((n, e, 0), dtype=complex)
+        load = pk * self._amplitudes(Z, inputs)
+        G = -np.stack([load[:, f] @ dP[f] for f in self.rows], axis=1)
+        return Z, np.asarray(np.linalg.solve(A, G), dtype=np.complex128)
+
+    def dynamic_stiffness(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n)."""
+        P, dP = self.polynomials(theta)
+        e = len(self.outputs)
+        use = self._is_output & (self.power % 2 == 0)
+        low = int(self.power[use].min()) if use.any() else 0
+        k = (self.power - low) // 2
+        # multiplied by p^−low: without this a compliance form written with 1/p² would have no polynomial
+        sign = np.where(k % 2 == 0, 1.0, -1.0)
+        degree = int(k[use].max()) + 1 if use.any() else 1
+        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(theta)))
+        for f in np.flatnonzero(use):
+            at = (k[f], self.equation[f], self.signal[f])
+            A[at] += sign[f] * P[f]
+            dA[at] += sign[f] * dP[f]
+        return A, dA
+
+    def loads(self, frequencies: FloatArray, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
+        """What each feature's coefficient multiplies: p^k · amplitude, (n, f)."""
+        return self._p(frequencies) * self._amplitudes(Z, inputs)
+
+    def _amplitudes(self, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
+        """Amplitude that each feature multiplies, (n, f)."""
+        table = np.concatenate((Z, inputs, np.ones((len(Z), 1))), axis=1)
+        return np.asarray(table[:, self.signal])
+
+    def _p(self, frequencies: FloatArray) -> ComplexArray:
+        """p^k of each feature, (n, f)."""
+        p = 1j * np.asarray(frequencies, dtype=np.float64)
+        return np.asarray(p[:, None] ** self.power, dtype=np.complex128)
+
+
+def compile_operator(
+    features: Sequence[Feature], *, parameters: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
+) -> Operator:
+    """Gather the features of a model into an `Operator`.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many outputs as equations.
+    """
+    count = len({f.equation for f in features})
+    if count != len(outputs) or count == 0:
+        raise ValueError(
+            f"predicting amplitudes needs as many equations as outputs; there are {count} equations and "
+            f"{len(outputs)} outputs ({', '.join(outputs) or 'none'}): say which signals are known with "
+            "inputs = [...], or use the equation-error method"
+        )
+    names = [*outputs, *inputs]
+    monomials: dict[tuple[int, ...], int] = {}
+    entries: list[tuple[int, int, float]] = []
+    for i, feature in enumerate(features):
+        for monomial, value in feature.exact.items():
+            powers = dict(monomial)
+            key = tuple(powers.get(name, 0) for name in parameters)
+            entries.append((i, monomials.setdefault(key, len(monomials)), float(value)))
+    C = np.zeros((len(features), len(monomials)))
+    for f, m, coefficient in entries:
+        C[f, m] += coefficient
+    signal = [names.index(f.signal) if f.signal != CONSTANT else -1 for f in features]
+    return Operator(
+        parameters=tuple(parameters),
+        outputs=tuple(outputs),
+        inputs=tuple(inputs),
+        equation=np.array([f.equation for f in features], dtype=np.int_),
+        signal=np.array(signal, dtype=np.int_),
+        power=np.array([f.power for f in features], dtype=np.int_),
+        C=C,
+        exponents=np.array(list(monomials), dtype=np.int_).reshape(-1, len(parameters)),
+    )

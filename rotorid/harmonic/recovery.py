@@ -1,0 +1,263 @@
+"""From combinations back to the parameters: all real solutions, or why there are several or none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.estimate import WORD_TOLERANCE
+from rotorid.harmonic.elimination import real_solutions
+
+FloatArray = NDArray[np.float64]
+Bounds = Mapping[str, tuple[float, float]]
+
+GAUGE = 0.7318
+"""Value given to a parameter that nothing determines while the others are solved for."""
+SAME = 1e-6
+"""Relative difference below which two solutions are one."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Combinations `matrix @ monomials(θ) = values`.
+
+    Attributes
+    ----------
+    names
+        Of the n parameters.
+    exponents
+        (monomials, n).
+    matrix
+        (q, monomials).
+    values, covariance
+        (q,), and (q, q) or None.
+    """
+
+    names: tuple[str, ...]
+    exponents: FloatArray
+    matrix: FloatArray
+    values: FloatArray
+    covariance: FloatArray | None
+
+    def monomials(self, theta: FloatArray) -> FloatArray:
+        """Values (monomials,)."""
+        return np.asarray(np.prod(theta**self.exponents, axis=1))
+
+    def jacobian(self, theta: FloatArray) -> FloatArray:
+        """Derivatives (q, n) of the combinations by the parameters."""
+        out = np.zeros_like(self.exponents)
+        for j in range(len(theta)):
+            used = np.flatnonzero(self.exponents[:, j])
+            lower = self.exponents[used].copy()
+            lower[:, j] -= 1
+            out[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
+        return np.asarray(self.matrix @ out)
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """Parameters recovered from combinations.
+
+    Attributes
+    ----------
+    solutions
+        All real ones, (n,) each; complete, also where `undetermined` says that a value is arbitrary.
+    undetermined
+        (n,) mask: parameters that the combinations do not fix at all.
+    gain
+        (n, q): change of the parameters per change of the combinations, at the first solution; NaN rows for
+        undetermined ones. None without a solution.
+    reasons
+        In words, if there are several solutions or none.
+    warnings
+        What is doubtful.
+    """
+
+    solutions: tuple[FloatArray, ...]
+    undetermined: NDArray[np.bool_]
+    gain: FloatArray | None
+    reasons: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def values(self) -> FloatArray:
+        """Parameters with one value in all solutions; NaN for the others."""
+        n = len(self.undetermined)
+        if not self.solutions:
+            return np.full(n, np.nan)
+        table = np.array(self.solutions)
+        spread = np.ptp(table, axis=0) > SAME * np.max(np.abs(table), axis=0)
+        return np.where(spread | self.undetermined, np.nan, table[0])
+
+
+def undetermined_parameters(system: System) -> tuple[NDArray[np.bool_], list[int]]:
+    """Which parameters the combinations leave open at a general point, and which of them to fix to solve."""
+    rng = np.random.default_rng(5)
+    n = len(system.names)
+    theta = rng.uniform(0.6, 1.7, n)
+    J = system.jacobian(theta)
+    J = J / np.where((size := np.linalg.norm(J, axis=1, keepdims=True)) > 0, size, 1)
+    scale = np.linalg.norm(J, axis=0)
+    J = J / np.where(scale > 0, scale, 1)
+    _, s, Vt = np.linalg.svd(J)
+    rank = int(np.count_nonzero(s > 1e-9 * max(s[0], 1e-300))) if s.size else 0
+    null = Vt[rank:]
+    open_ = np.linalg.norm(null, axis=0) > WORD_TOLERANCE
+    fixed: list[int] = []
+    while len(null):  # the last of the open parameters are fixed, one per dimension of the null space
+        j = int(np.flatnonzero(np.abs(null).max(axis=0) > 1e-4)[-1])
+        fixed.append(j)
+        i = int(np.argmax(np.abs(null[:, j])))
+        pivot = null[i] / null[i, j]
+        null = np.delete(null - np.outer(null[:, j], pivot), i, axis=0)
+    return open_, fixed
+
+
+def recover(system: System, bounds: Bounds | None = None) -> Recovery:
+    """Solve for the parameters.
+
+    Parameters
+    ----------
+    system
+        The estimated combinations.
+    bounds
+        Lowest and highest value by name: solutions outside are dropped.
+    """
+    names = system.names
+    open_, fixed = undetermined_parameters(system)
+    free = [j for j in range(len(names)) if j not in fixed]
+    base = np.full(len(names), GAUGE)
+    warnings: list[str] = []
+    candidates, searched = real_solutions(system, free, base)
+    found: list[tuple[float, FloatArray]] = []
+    weight = _weights(system)
+    for start in candidates:
+        theta = _refine(system, start, free, weight)
+        if theta is not None and not any(_same(theta, other) for _, other in found):
+            found.append((_misfit(system, theta), theta))
+    if found:
+        best = min(misfit for misfit, _ in found)
+        found = [(m, t) for m, t in found if m <= max(1.0, 3 * best)]
+        if best > 1:
+            warnings.append("the estimated combinations contradict each other by more than their errors")
+    found.sort(key=lambda item: tuple(-item[1]))
+    solutions = [theta for _, theta in found]
+    reasons: list[str] = []
+    if bounds and len(solutions) > 1:
+        solutions = [t for t in solutions if _inside(t, names, bounds, open_)] or solutions
+    if searched and len(free):
+        warnings.append("the parameters were found by a search; there may be more solutions than shown")
+    if not solutions:
+        reasons.append("no real values of the parameters give the estimated combinations")
+        return Recovery((), open_, None, tuple(reasons), tuple(warnings))
+    reasons += why_several(solutions, names, open_)
+    gain = np.full((len(names), len(system.values)), np.nan)
+    J = system.jacobian(solutions[0])[:, free]
+    white = weight @ J
+    scale = np.linalg.norm(white, axis=0)
+    scale[scale == 0] = 1.0
+    s = np.linalg.svd(white / scale, compute_uv=False)
+    if len(s) and s[-1] < 1e-7 * s[0]:
+        warnings.append("two solutions nearly coincide: the parameters are hardly determined there")
+    gain[free] = (np.linalg.pinv(white / scale, rcond=1e-13) / scale[:, None]) @ weight
+    gain[open_] = np.nan
+    return Recovery(tuple(solutions), open_, gain, tuple(reasons), tuple(warnings))
+
+
+def _weights(system: System) -> FloatArray:
+    """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
+    if system.covariance is not None:
+        std = np.sqrt(np.diag(system.covariance))
+        floor = 1e-14 * np.abs(system.values) + 1e-300
+        scale = np.maximum(std, floor)
+        correlation = system.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
+        correlation[np.diag_indices(len(scale))] = np.maximum(np.diag(correlation), 1e-6)
+        try:
+            lower = np.linalg.cholesky(correlation)
+        except np.linalg.LinAlgError:
+            lower = np.eye(len(scale))
+        return np.asarray(np.linalg.inv(lower) / scale)
+    size = np.where(system.values != 0, np.abs(system.values), 1.0)
+    return np.diag(1.0 / size)
+
+
+def _refine(system: System, start: FloatArray, free: Sequence[int], weight: FloatArray) -> FloatArray | None:
+    """Gauss–Newton on all combinations, steps halved until the misfit does not grow."""
+    theta = start.copy()
+    if not free:
+        return theta
+
+    def misfit(t: FloatArray) -> FloatArray:
+        return np.asarray(weight @ (system.matrix @ system.monomials(t) - system.values))
+
+    with np.errstate(all="ignore"):
+        r = misfit(theta)
+        if not np.isfinite(r).all():
+            return None
+        for _ in range(60):
+            J = weight @ system.jacobian(theta)[:, free]
+            scale = np.linalg.norm(J, axis=0)
+            if not np.isfinite(J).all():
+                return None
+            scale[scale == 0] = 1.0
+            step = np.linalg.lstsq(J / scale, -r, rcond=1e-12)[0] / scale
+            length = 1.0
+            while length > 1e-6:
+                trial = theta.copy()
+                trial[free] += length * step
+                new = misfit(trial)
+                if np.isfinite(new).all() and new @ new <= (r @ r) * (1 + 1e-12):
+                    break
+                length /= 2
+            else:
+                break
+            moved = np.max(np.abs(trial - theta) / np.maximum(np.abs(trial), 1e-300))
+            theta, r = trial, new
+            if moved < 1e-14:
+                break
+    return theta
+
+
+def _misfit(system: System, theta: FloatArray) -> float:
+    """Largest error of a combination in units of what rounding and four standard deviations allow."""
+    mu = system.monomials(theta)
+    size = np.abs(system.matrix) @ np.abs(mu) + np.abs(system.values) + 1e-300
+    error = np.abs(system.matrix @ mu - system.values) / size
+    std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
+    return float(np.max(error / (1e-6 + 4 * std / size)))
+
+
+def _same(a: FloatArray, b: FloatArray) -> bool:
+    return bool(np.all(np.abs(a - b) <= SAME * np.maximum(np.abs(a), np.abs(b))))
+
+
+def _inside(theta: FloatArray, names: Sequence[str], bounds: Bounds, open_: NDArray[np.bool_]) -> bool:
+    return all(
+        bounds[name][0] <= theta[j] <= bounds[name][1]
+        for j, name in enumerate(names)
+        if name in bounds and not open_[j]
+    )
+
+
+def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: NDArray[np.bool_]) -> list[str]:
+    """Say in words how several solutions differ; empty for one."""
+    if len(solutions) < 2:
+        return []
+    table = np.array(solutions)
+    differ = np.flatnonzero((np.ptp(table, axis=0) > SAME * np.max(np.abs(table), axis=0)) & ~open_)
+    if not len(differ):
+        return []
+    who = and_words([names[int(j)] for j in differ])
+    ordered = np.sort(table[:, differ], axis=1)
+    if np.all(np.ptp(ordered, axis=0) <= 1e-5 * np.max(np.abs(ordered), axis=0)):
+        return [f"{who} can be exchanged without any change of the amplitudes: see the solutions"]
+    several = "has {} values" if len(differ) == 1 else "have {} sets of values"
+    return [f"{who} {several.format(len(solutions))} that explain the data equally well"]
+
+
+def and_words(words: Sequence[str]) -> str:
+    """Join words: "a, b and c"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -1,0 +1,243 @@
+"""What an identification found: parameters with intervals, and what the data cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rotorid.estimate import coverage_factor
+from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.model import HarmonicModel
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+METHODS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
+
+
+@dataclass(frozen=True)
+class FoundCombination:
+    """A combination of parameters that the data determine; std None: unknown."""
+
+    words: str
+    value: float
+    std: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Parameters of a harmonic model, identified.
+
+    Attributes
+    ----------
+    model, experiments, method
+        What was identified from what, "equation-error" or "output-error".
+    values
+        Shape (n,), in the order of `model.parameters`; NaN where the data do not determine one value.
+    covariance
+        Shape (n, n), NaN where not determined; None where errors are unknown.
+    dof, errors_stated
+        Degrees of freedom; whether the covariance comes from stated errors (normal intervals) and not from
+        the residuals (Student's t).
+    combinations
+        The estimated products and sums of parameters ([S] 1.8) that are no single parameter.
+    solutions
+        All parameter sets that explain the combinations; NaN for parameters that are not determined.
+    starts
+        The same sets with arbitrary consistent values where a parameter is not determined: where output error
+        can begin.
+    rank, condition_number
+        Of the row-weighted, column-scaled regression (merged unknowns).
+    unidentifiable
+        Reasons in words why parameters have no one value; empty if all have.
+    residuals
+        Complex, shape (experiments, residual_names): of the equations, or of the amplitudes (output error);
+        NaN where left out.
+    residual_names
+        "equation 1", …, or the names of the outputs.
+    residual_rms
+        Over the real rows used.
+    predicted
+        Amplitudes of the outputs for `values`, or for the first solution; empty where they cannot be had.
+    influence
+        Shape (experiments, n): change of each parameter if the experiment is left out; NaN where unknown.
+    left_out
+        Rows without effect because an amplitude was not measured, in words.
+    warnings
+        What should be known before the numbers are used.
+    """
+
+    model: HarmonicModel
+    experiments: Experiments
+    method: str
+    values: FloatArray
+    covariance: FloatArray | None
+    dof: int
+    errors_stated: bool
+    combinations: tuple[FoundCombination, ...]
+    solutions: tuple[Mapping[str, float], ...]
+    rank: int
+    condition_number: float
+    unidentifiable: tuple[str, ...]
+    residuals: ComplexArray
+    residual_names: tuple[str, ...]
+    residual_rms: float
+    predicted: Mapping[str, ComplexArray] = field(default_factory=dict)
+    influence: FloatArray | None = None
+    starts: tuple[Mapping[str, float], ...] = ()
+    left_out: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.model.parameters
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data determine one value of every parameter."""
+        return bool(np.isfinite(self.values).all())
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
+        return None if self.covariance is None else np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals (n, 2); None where errors are unknown."""
+        std, factor = self.std, coverage_factor(None if self.errors_stated else self.dof)
+        if std is None or factor is None:
+            return None
+        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
+
+    @property
+    def correlation(self) -> FloatArray | None:
+        """Correlation matrix (n, n); None where errors are unknown."""
+        std = self.std
+        if self.covariance is None or std is None:
+            return None
+        scale = np.where(std > 0, std, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+    def value(self, name: str) -> float:
+        """Value of a parameter by name; NaN if it is not determined."""
+        if name not in self.parameters:
+            raise ValueError(f"{name} is no parameter; parameters are {', '.join(self.parameters)}")
+        return float(self.values[self.parameters.index(name)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        std, ci95 = self.std, self.ci95
+        return {
+            "method": self.method,
+            "parameters": {
+                name: {
+                    "value": _number(self.values[i]),
+                    "std": None if std is None else _number(std[i]),
+                    "ci95": None if ci95 is None or not np.isfinite(ci95[i]).all() else ci95[i].tolist(),
+                }
+                for i, name in enumerate(self.parameters)
+            },
+            "rank": self.rank,
+            "condition_number": _number(self.condition_number),
+            "identifiable": self.identifiable,
+            "unidentifiable": list(self.unidentifiable),
+            "combinations": {
+                c.words: {"value": _number(c.value), "std": None if c.std is None else _number(c.std)}
+                for c in self.combinations
+            },
+            "solutions": [{k: _number(v) for k, v in s.items()} for s in self.solutions],
+            "residual_rms": _number(self.residual_rms),
+            "left_out": list(self.left_out),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
+        import pandas as pd
+
+        unknown = np.full(len(self.parameters), np.nan)
+        ci95 = self.ci95
+        return pd.DataFrame(
+            {
+                "parameter": self.parameters,
+                "value": self.values,
+                "std": unknown if self.std is None else self.std,
+                "ci95_low": unknown if ci95 is None else ci95[:, 0],
+                "ci95_high": unknown if ci95 is None else ci95[:, 1],
+            }
+        )
+
+    def residual_frame(self) -> pd.DataFrame:
+        """One row per experiment and equation (or output): real and imaginary part of the residual."""
+        import pandas as pd
+
+        n, e = self.residuals.shape
+        return pd.DataFrame(
+            {
+                "experiment": np.repeat(self.experiments.names, e),
+                "frequency_rad_s": np.repeat(self.experiments.frequencies, e),
+                "row": np.tile(self.residual_names, n),
+                "re": self.residuals.real.ravel(),
+                "im": self.residuals.imag.ravel(),
+            }
+        )
+
+    def summary(self) -> str:
+        """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
+        words = [*self.parameters, *(c.words for c in self.combinations)]
+        width = max(len(w) for w in words)
+        lines = [METHODS.get(self.method, self.method)]
+        lines += [self._line(i, width) for i in range(len(self.parameters))]
+        for c in self.combinations:
+            lines.append(f"{c.words:<{width}} = {c.value:.6g}" + ("" if c.std is None else f" ± {c.std:.2g}"))
+        if self.identifiable:
+            n = len(self.parameters)
+            known = "the parameter is" if n == 1 else f"all {n} parameters are"
+            lines.append(f"{known} determined (condition number {self.condition_number:.3g})")
+        lines += self.unidentifiable
+        if len(self.solutions) > 1:
+            for i, solution in enumerate(self.solutions):
+                values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
+                lines.append(f"solution {i + 1}: {values}")
+        if self.covariance is None:
+            lines.append("no intervals: no errors are stated and there are no more equations than unknowns")
+        lines += [f"left out: {row}" for row in self.left_out]
+        lines += [f"warning: {text}" for text in self.warnings]
+        lines += self.notes
+        return "\n".join(lines)
+
+    def plot(self, ax: Any = None) -> Axes:  # noqa: ANN401 - matplotlib's axes
+        """Draw measured and fitted amplitudes over frequency."""
+        from importlib import import_module
+
+        return import_module("rotorid.plots_harmonic").plot_identification(self, ax)  # type: ignore[no-any-return]
+
+    def _line(self, i: int, width: int) -> str:
+        name, std, ci95 = self.parameters[i], self.std, self.ci95
+        value = self.values[i]
+        if not np.isfinite(value):
+            several = len({round(s[name], 12) for s in self.solutions if np.isfinite(s[name])}) > 1
+            reason = "has several values, see the solutions" if several else "not determined by these data"
+            return f"{name:<{width}} = {reason}"
+        text = f"{name:<{width}} = {value:.6g}"
+        if std is not None and np.isfinite(std[i]):
+            share = f" ({100 * std[i] / abs(value):.2g} %)" if value else ""
+            text += f" ± {std[i]:.2g}{share}"
+        if ci95 is not None and np.isfinite(ci95[i]).all():
+            text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
+        return text
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,248 @@
+"""Every exercise of [S] from the command line: printed results, singular problems, exact data."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from rotorid.samples import sample_data
+
+FOLDER = sample_data() / "identify"
+EXPECTED = {
+    path.parent.name: tomllib.loads(path.read_text(encoding="utf-8"))
+    for path in sorted(FOLDER.glob("*/expected.toml"))
+}
+PRINTED = [task for task, expected in EXPECTED.items() if "printed" in expected]
+EXACT = [path.parent.name for path in sorted(FOLDER.glob("*/data_exact.csv"))]
+KEYS = {
+    "parameters", "rank", "condition_number", "identifiable", "unidentifiable", "combinations", "solutions",
+    "residual_rms", "warnings", "provenance",
+}  # fmt: skip
+
+
+@pytest.fixture
+def identify(cli):
+    def run(task, *options, data="data.csv"):
+        outcome = cli("identify", FOLDER / task / "model.toml", FOLDER / task / data, *options, "--json")
+        assert outcome.code == 0, outcome.err
+        assert outcome.err == ""
+        return outcome.json
+
+    return run
+
+
+def half_unit(printed):
+    """Half a unit of the last printed digit: 999.935 -> 0.0005, 1.991e4 -> 5."""
+    mantissa, _, exponent = printed.partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+
+
+def test_every_exercise_that_the_book_has_is_here():
+    assert sorted(EXPECTED) == sorted(
+        [f"section_1_{n}" for n in (6, 7, 8)]
+        + [f"task_{n}" for n in ("1_1", "1_2", "2_1", "2_2", "2_3", "3_1", "3_2", "3_3", "4_1", "4_2", "4_3")]
+        + [f"task_{n}" for n in ("5_1", "5_2", "6_1", "6_2", "7_1", "7_2", "8_1", "8_2")]
+    )
+    assert len(PRINTED) == 9
+    assert len(EXACT) == len(EXPECTED) - len(PRINTED)
+    for task, expected in EXPECTED.items():
+        assert expected["source"].startswith(f"[S] {task.split('_')[0]} {'.'.join(task.split('_')[1:])}")
+
+
+@pytest.mark.parametrize("task", PRINTED)
+def test_printed_results_to_all_printed_digits(identify, task):
+    found = identify(task)
+    assert set(found) >= KEYS
+    assert found["identifiable"] is True
+    assert found["unidentifiable"] == []
+    expected = EXPECTED[task]
+    assert set(found["parameters"]) == set(expected["printed"]) == set(expected["truth"])
+    for name, printed in expected["printed"].items():
+        assert abs(found["parameters"][name]["value"] - float(printed)) <= half_unit(printed), name
+    for words, printed in expected.get("printed_combinations", {}).items():
+        assert abs(found["combinations"][words]["value"] - float(printed)) <= half_unit(printed), words
+
+
+def test_more_digits_of_the_reference(identify):
+    """Recomputed with plain NumPy from the printed data, before this program existed."""
+    for task, values in {
+        "task_5_2": {"c": 99791, "b": 9977},
+        "task_7_1": {"c1": 9954.3, "c2": 19906.2, "c3": 5006.7},
+        "task_7_2": {"c1": 10027.1, "c2": 19781.7, "c3": 4945.4, "m2": 19.7817, "m3": 9.8909},
+    }.items():
+        parameters = identify(task)["parameters"]
+        for name, value in values.items():
+            assert abs(parameters[name]["value"] - value) <= half_unit(str(value)), name
+    shapes = identify("task_7_2", data="data_three_digits.csv")["parameters"]
+    for name, value in {"c1": "10025", "c2": "19786", "c3": "4947", "m2": "19.790", "m3": "9.892"}.items():
+        assert abs(shapes[name]["value"] - float(value)) <= half_unit(value), name
+
+
+@pytest.mark.parametrize("task", EXACT)
+@pytest.mark.parametrize("method", ["equation-error", "output-error"])
+def test_exact_data_give_the_parameters_back(identify, task, method):
+    found = identify(task, "--method", method, data="data_exact.csv")
+    expected = EXPECTED[task]
+    lost = expected.get("undetermined", [])
+    exchange = expected.get("exchange", [])
+    assert found["identifiable"] is not bool(lost or exchange)
+    assert bool(found["unidentifiable"]) is bool(lost or exchange)
+    for name, truth in expected["truth"].items():
+        value = found["parameters"][name]["value"]
+        if name in lost or (name in exchange and method == "equation-error"):
+            assert value is None
+            assert found["parameters"][name]["std"] is None
+        elif name not in exchange:
+            assert value == pytest.approx(truth, rel=1e-6)
+    if exchange and method == "equation-error":
+        pairs = [[solution[name] for name in exchange] for solution in found["solutions"]]
+        truth = [expected["truth"][name] for name in exchange]
+        np.testing.assert_allclose(sorted(pairs), sorted([truth, truth[::-1]]), rtol=1e-6)
+        assert "exchanged" in " ".join(found["unidentifiable"])
+
+
+@pytest.mark.parametrize("task", [t for t in EXPECTED if "combinations" in EXPECTED[t]])
+@pytest.mark.parametrize("data", ["data.csv", "data_exact.csv"])
+def test_singular_exercises_name_their_combinations(identify, task, data):
+    found = identify(task, data=data)
+    words = list(found["combinations"])
+    assert words == EXPECTED[task]["combinations"]
+    truth = {
+        **EXPECTED[task]["truth"],
+        **tomllib.loads((FOLDER / task / "model.toml").read_text()).get("known", {}),
+    }
+    tolerance = 1e-6 if data == "data_exact.csv" else 0.3
+    for expression, combination in found["combinations"].items():
+        expected = eval(expression, {"__builtins__": {}}, truth)  # the words are arithmetic of Python
+        assert combination["value"] == pytest.approx(expected, rel=tolerance)
+
+
+def test_two_digits_give_the_parameters_roughly(identify):
+    """The book's rounding: no parameter of a simulated exercise is off by more than its interval allows."""
+    for task in EXACT:
+        found = identify(task)
+        for name, entry in found["parameters"].items():
+            if entry["value"] is None:
+                continue
+            gap = abs(entry["value"] - EXPECTED[task]["truth"][name])
+            assert gap <= 8 * entry["std"], (task, name)
+
+
+def test_4_1_says_what_is_determined_and_ends_well(cli, identify):
+    found = identify("task_4_1")
+    assert found["identifiable"] is False
+    assert found["unidentifiable"] == [
+        "only c and b*(1 - delta) are determined; b and delta by themselves are not"
+    ]
+    assert found["parameters"]["b"] == {"value": None, "std": None, "ci95": None}
+    assert found["parameters"]["c"]["value"] == pytest.approx(1e5, rel=0.01)
+    text = cli("identify", FOLDER / "task_4_1" / "model.toml", FOLDER / "task_4_1" / "data.csv")
+    assert text.code == 0
+    assert "only c and b*(1 - delta) are determined" in text.out
+
+
+def test_the_generator_wrote_these_tables(tmp_path, monkeypatch):
+    import runpy
+
+    script = FOLDER / "make_data.py"
+    copy = tmp_path / "make_data.py"
+    copy.write_bytes(script.read_bytes())
+    runpy.run_path(str(copy), run_name="__main__")
+    written = sorted(path.relative_to(tmp_path) for path in tmp_path.glob("*/*.csv"))
+    assert written == sorted(path.relative_to(FOLDER) for path in FOLDER.glob("*/*.csv"))
+    for path in written:
+        if path.name != "data_exact.csv":  # whose last digits depend on the processor
+            assert (tmp_path / path).read_text() == (FOLDER / path).read_text(), path
+
+
+def test_pictures_and_tables(cli, tmp_path):
+    for task in ("task_5_1", "task_7_1", "task_4_1"):
+        picture, table = tmp_path / f"{task}.png", tmp_path / f"{task}.csv"
+        folder = FOLDER / task
+        options = ("--plot", picture, "--output", table)
+        outcome = cli("identify", folder / "model.toml", folder / "data.csv", *options)
+        assert outcome.code == 0, outcome.err
+        assert picture.read_bytes().startswith(b"\x89PNG")
+        assert table.read_text().startswith("parameter,value,std,ci95_low,ci95_high\n")
+
+
+def test_stated_errors_and_output_error(identify):
+    options = ("--amplitude-error", 2, "--phase-error", 1)
+    for method in ("equation-error", "output-error"):
+        found = identify("task_5_1", *options, "--method", method)
+        assert found["method"] == method
+        for name, truth in {"c": 1000.0, "alpha": 10.0}.items():
+            low, high = found["parameters"][name]["ci95"]
+            assert low < truth < high
+            assert high - low < 0.1 * truth
+        assert found["provenance"]["options"]["amplitude_error"] == 2
+    assert {row["experiment"] for row in found["influence"]} == {"1", "2", "3"}
+    assert found["correlation"]["c"]["c"] == pytest.approx(1)
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (("--method", "newton"), "equation-error or output-error"),
+        (("--loss", "huber"), "belongs to --method output-error"),
+        (("--loss", "none", "--method", "output-error"), "soft_l1"),
+        (("--amplitude-error", "-1"), "from 0 to 1000"),
+        (("--phase-error", "nan"), "from 0 to 360"),
+        (("--amplitude-error", "0"), "greater than zero"),
+        (("--plot", "x.gif"), ".png, .svg, .pdf"),
+    ],
+)
+def test_bad_options_end_with_one_message(cli, args, message):
+    folder = FOLDER / "task_5_1"
+    outcome = cli("identify", folder / "model.toml", folder / "data.csv", *args)
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_design_chooses_frequencies_with_and_without_data(cli, tmp_path):
+    folder = FOLDER / "task_5_1"
+    options = ("--amplitude-error", 2, "--phase-error", 1, "--design", "5:40:1", "--choose", 2)
+    found = cli("identify", folder / "model.toml", folder / "data.csv", *options, "--json").json
+    assert set(found) >= KEYS
+    chosen = found["design"]["frequencies_rad_s"]
+    assert len(chosen) == 2
+    assert min(abs(w - 10.0) for w in chosen) <= 1.0  # near the resonance lies what tells the damping
+    model = tmp_path / "model.toml"
+    text = (folder / "model.toml").read_text(encoding="utf-8")
+    model.write_text(text + "\n[start]\nc = 999.935\nalpha = 10.0014\n", encoding="utf-8")
+    alone = cli("identify", model, *options, "--json").json
+    assert alone["design"]["frequencies_rad_s"] == chosen
+    assert "measure at" in cli("identify", model, *options).out
+    table = tmp_path / "t.csv"
+    assert cli("identify", model, *options, "--output", table).code == 0
+    assert table.read_text(encoding="utf-8").startswith("frequency_rad_s,chosen,c_std,alpha_std\n")
+    for args, message in (
+        ((folder / "model.toml", *options), "needs a guess of c, alpha"),
+        ((model, "--design", "5:40:1"), "needs the errors"),
+        ((model, "--choose", 2), "table of measured amplitudes"),
+        ((model, folder / "data.csv", "--choose", 2), "belongs to --design"),
+        ((model, *options[:-4], "--design", "5:40"), "--design '5:40' is not a range"),
+        ((model, *options[:-2], "--choose", 99), "36"),
+        ((model, *options, "--plot", tmp_path / "p.png"), "table of measured amplitudes"),
+        ((FOLDER / "section_1_7" / "model.toml", *options), "guess of c, b, q"),
+        ((FOLDER / "task_7_1" / "model.toml", FOLDER / "task_7_1" / "data.csv", *options), "free vibrations"),
+    ):
+        outcome = cli("identify", *args)
+        assert outcome.code == 2, args
+        assert message in outcome.err
+
+
+def test_bad_files_end_with_one_message(cli, tmp_path):
+    folder = FOLDER / "task_5_1"
+    for args in (
+        (tmp_path / "nowhere.toml", folder / "data.csv"),
+        (folder / "model.toml", tmp_path / "nowhere.csv"),
+        (folder / "model.toml", FOLDER / "task_7_1" / "data.csv"),
+        (folder / "data.csv", folder / "model.toml"),
+    ):
+        outcome = cli("identify", *args)
+        assert outcome.code == 2
+        assert outcome.err
+        assert "Traceback" not in outcome.err

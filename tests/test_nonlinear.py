@@ -1,0 +1,281 @@
+"""The nonlinear kernel against certified values, closed forms and the linear kernel."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rotorid.nonlinear import nonlinear_least_squares
+from rotorid.regression import least_squares
+
+# NIST StRD, nonlinear: predictor, response, starting points, certified values and standard deviations
+MISRA1A_Y = [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02, 44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78]
+MISRA1A_X = [77.6, 114.9, 141.1, 190.8, 239.9, 289.0, 332.8, 378.4, 434.8, 477.3, 536.8, 593.1, 689.1, 760.0]
+MISRA1A_STARTS = [[500.0, 1e-4], [250.0, 5e-4]]
+MISRA1A_VALUES = [2.3894212918e2, 5.5015643181e-4]
+MISRA1A_STD = [2.7070075241, 7.2668688436e-6]
+MISRA1A_RESIDUAL_SUM = 1.2455138894e-1
+
+THURBER_Y = """
+80.574 84.248 87.264 87.195 89.076 89.608 89.868 90.101 92.405 95.854 100.696 101.060 401.672 390.724 567.534
+635.316 733.054 759.087 894.206 990.785 1090.109 1080.914 1122.643 1178.351 1260.531 1273.514 1288.339
+1327.543 1353.863 1414.509 1425.208 1421.384 1442.962 1464.350 1468.705 1447.894 1457.628
+"""
+THURBER_X = """
+-3.067 -2.981 -2.921 -2.912 -2.840 -2.797 -2.702 -2.699 -2.633 -2.481 -2.363 -2.322 -1.501 -1.460 -1.274
+-1.212 -1.100 -1.046 -0.915 -0.714 -0.566 -0.545 -0.400 -0.309 -0.109 -0.103 0.010 0.119 0.377 0.790 0.963
+1.006 1.115 1.572 1.841 2.047 2.200
+"""
+THURBER_STARTS = [[1000, 1000, 400, 40, 0.7, 0.3, 0.03], [1300, 1500, 500, 75, 1, 0.4, 0.05]]
+THURBER_VALUES = [
+    1.2881396800e3,
+    1.4910792535e3,
+    5.8323836877e2,
+    7.5416644291e1,
+    9.6629502864e-1,
+    3.9797285797e-1,
+    4.9727297349e-2,
+]
+THURBER_STD = [
+    4.6647963344,
+    3.9571156086e1,
+    2.8698696102e1,
+    5.5675370270,
+    3.1333340687e-2,
+    1.4984928198e-2,
+    6.5842344623e-3,
+]
+THURBER_RESIDUAL_SUM = 5.6427082397e3
+
+# NIST StRD, linear: 1 + x/10 + … + (x/10)^5, exact to the printed digits
+WAMPLER2_Y = """
+1.00000 1.11111 1.24992 1.42753 1.65984 1.96875 2.38336 2.94117 3.68928 4.68559 6.00000 7.71561 9.92992
+12.75603 16.32384 20.78125 26.29536 33.05367 41.26528 51.16209 63.00000
+"""
+WAMPLER2_VALUES = [1.0, 0.1, 0.01, 0.001, 1e-4, 1e-5]
+
+
+def digits(found, certified):
+    """Fewest decimal digits in common."""
+    error = np.abs(np.asarray(found) - certified) / np.abs(certified)
+    return float(-np.log10(np.maximum(error, 1e-16)).max(initial=-np.inf, where=error == error.max()))
+
+
+def misra1a():
+    x, y = np.array(MISRA1A_X), np.array(MISRA1A_Y)
+
+    def residual(b):
+        return b[0] * (1 - np.exp(-b[1] * x)) - y
+
+    def jacobian(b):
+        return np.stack((1 - np.exp(-b[1] * x), b[0] * x * np.exp(-b[1] * x)), axis=1)
+
+    return residual, jacobian, ["b1", "b2"]
+
+
+def thurber():
+    x, y = np.array(THURBER_X.split(), float), np.array(THURBER_Y.split(), float)
+
+    def parts(b):
+        top = b[0] + b[1] * x + b[2] * x**2 + b[3] * x**3
+        return top, 1 + b[4] * x + b[5] * x**2 + b[6] * x**3
+
+    def residual(b):
+        top, bottom = parts(b)
+        return top / bottom - y
+
+    def jacobian(b):
+        top, bottom = parts(b)
+        over = [x**k / bottom for k in range(4)]
+        under = [-top * x**k / bottom**2 for k in range(1, 4)]
+        return np.stack(over + under, axis=1)
+
+    return residual, jacobian, [f"b{i + 1}" for i in range(7)]
+
+
+def test_wampler2_agrees_to_nine_digits():
+    x = np.arange(21.0)
+    estimate = least_squares(x[:, None] ** np.arange(6), np.array(WAMPLER2_Y.split(), float))
+    assert digits(estimate.values, WAMPLER2_VALUES) >= 9
+    assert estimate.std.max() < 1e-9  # certified: zero
+
+
+@pytest.mark.parametrize("start", MISRA1A_STARTS)
+def test_misra1a_agrees_to_seven_digits_from_both_starts(start):
+    fit = nonlinear_least_squares(*misra1a()[:2], start, names=["b1", "b2"], sigma_stated=False)
+    assert fit.converged
+    assert digits(fit.values, MISRA1A_VALUES) >= 7
+    assert digits(fit.std, MISRA1A_STD) >= 7
+    assert 2 * fit.costs[-1] == pytest.approx(MISRA1A_RESIDUAL_SUM, rel=1e-9)
+    assert fit.estimate.dof == 12
+
+
+@pytest.mark.parametrize("start", THURBER_STARTS)
+def test_thurber_agrees_to_seven_digits_from_both_starts(start):
+    residual, jacobian, names = thurber()
+    fit = nonlinear_least_squares(residual, jacobian, start, names=names, sigma_stated=False)
+    assert fit.converged
+    assert digits(fit.values, THURBER_VALUES) >= 7
+    assert digits(fit.std, THURBER_STD) >= 5
+    assert 2 * fit.costs[-1] == pytest.approx(THURBER_RESIDUAL_SUM, rel=1e-9)
+
+
+def line(seed=0, m=30, sigma=0.5):
+    rng = np.random.default_rng(seed)
+    K = np.stack((np.ones(m), np.linspace(0, 3, m)), axis=1)
+    return K, K @ [1.0, 2.0] + rng.normal(0, sigma, m)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000), st.booleans(), st.floats(1e-3, 1e3))
+def test_a_linear_model_gives_the_linear_kernel(seed, stated, sigma):
+    K, y = line(seed, sigma=sigma)
+    linear = least_squares(K, y, sigma=sigma if stated else None)
+    fit = nonlinear_least_squares(
+        lambda x: (K @ x - y) / sigma, lambda x: K / sigma, [0.3, -4.0], names="ab", sigma_stated=stated
+    )
+    np.testing.assert_allclose(fit.values, linear.values, rtol=1e-9, atol=1e-12 * sigma)
+    np.testing.assert_allclose(fit.estimate.covariance, linear.covariance, rtol=1e-9)
+    np.testing.assert_allclose(fit.ci95, linear.ci95, rtol=1e-8, atol=1e-10 * sigma)
+
+
+def test_a_parameter_at_its_bound_is_named_and_held():
+    K, y = line()
+    fit = nonlinear_least_squares(
+        lambda x: K @ x - y, lambda x: K, [0.0, 0.0], names=["a", "slope"], sigma_stated=False,
+        bounds={"slope": (None, 1.5)},
+    )  # fmt: skip
+    assert fit.at_bounds == ("slope",)
+    assert fit.values[1] == 1.5
+    held = least_squares(K[:, :1], y - 1.5 * K[:, 1])
+    assert fit.values[0] == pytest.approx(held.values[0], rel=1e-9)
+    assert fit.std[0] == pytest.approx(held.std[0], rel=1e-9)
+    assert np.isnan(fit.std[1])
+    assert fit.to_dict()["parameters"]["slope"]["std"] is None
+    assert fit.to_dict()["parameters"]["slope"]["ci95"] is None
+    assert "at its bound" in fit.summary()
+    assert "nan" not in fit.summary()
+    assert "slope stands at its bound" in fit.warnings[0]
+
+
+def test_everything_at_bounds_is_still_an_answer():
+    K, y = line()
+    fit = nonlinear_least_squares(
+        lambda x: K @ x - y, lambda x: K, [0.0, 0.0], names=["a", "b"], sigma_stated=True,
+        bounds={"a": (5.0, None), "b": (10.0, None)},
+    )  # fmt: skip
+    assert fit.at_bounds == ("a", "b")
+    np.testing.assert_array_equal(fit.values, [5.0, 10.0])
+    assert fit.converged
+
+
+def test_a_bound_that_does_not_bind_changes_nothing():
+    residual, jacobian, names = misra1a()
+    free = nonlinear_least_squares(residual, jacobian, [250, 5e-4], names=names, sigma_stated=False)
+    fit = nonlinear_least_squares(
+        residual, jacobian, [-3, 5e-4], names=names, sigma_stated=False, bounds={"b1": (0, 1e4)}
+    )
+    assert fit.at_bounds == ()
+    np.testing.assert_allclose(fit.values, free.values, rtol=1e-9)
+
+
+def test_a_product_cannot_be_split_and_the_words_say_so():
+    t = np.linspace(1, 2, 8)
+    y = 6 * t
+    fit = nonlinear_least_squares(
+        lambda x: x[0] * x[1] * t + x[2] - y,
+        lambda x: np.stack((x[1] * t, x[0] * t, np.ones(8)), axis=1),
+        [1.0, 4.0, 0.5],
+        names=["a", "b", "c"],
+        sigma_stated=True,
+    )
+    assert fit.estimate.rank == 2
+    assert fit.estimate.undetermined == ("a", "b")
+    assert abs(fit.values[2]) < 1e-9
+    solution = fit.estimate.solution
+    assert solution[0] * solution[1] == pytest.approx(6, rel=1e-9)
+    assert any("not" in w and "a, b" in w for w in fit.warnings)
+
+
+@pytest.mark.parametrize("loss", ["huber", "soft_l1", "cauchy"])
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_robust_loss_shrugs_off_gross_errors(loss, stated):
+    K, y = line(seed=3, m=60, sigma=0.1)
+    y[::12] += 30.0
+    run = {"names": ["a", "b"], "sigma_stated": stated}
+    fit = nonlinear_least_squares(lambda x: (K @ x - y) / 0.1, lambda x: K / 0.1, [0, 0], loss=loss, **run)
+    plain = nonlinear_least_squares(lambda x: (K @ x - y) / 0.1, lambda x: K / 0.1, [0, 0], **run)
+    error, harm = np.abs(fit.values - [1, 2]), np.abs(plain.values - [1, 2])
+    assert fit.converged
+    assert (error < 4 * fit.std).all()
+    assert (error < 0.15).all()
+    assert harm.max() > 10 * error.max()
+
+
+@pytest.mark.parametrize("loss", ["linear", "huber", "soft_l1", "cauchy"])
+def test_spread_of_a_robust_estimate_is_the_spread_of_repetitions(loss):
+    K, _ = line(m=60)
+    rng = np.random.default_rng(11)
+    values, stds = [], []
+    for _ in range(200):
+        y = K @ [1.0, 2.0] + rng.standard_t(3, 60)
+        fit = nonlinear_least_squares(
+            lambda x, y=y: K @ x - y, lambda x: K, [1, 2], names="ab", sigma_stated=False, loss=loss
+        )
+        values.append(fit.values)
+        stds.append(fit.std)
+    ratio = np.sqrt(np.mean(np.square(stds), axis=0)) / np.std(values, axis=0)
+    # 200 repetitions know a standard deviation to 5 %
+    np.testing.assert_array_less(np.abs(np.log(ratio)), 0.2)
+
+
+def test_no_convergence_is_said():
+    residual, jacobian, names = thurber()
+    fit = nonlinear_least_squares(
+        residual, jacobian, THURBER_STARTS[0], names=names, sigma_stated=False, max_iterations=2
+    )
+    assert not fit.converged
+    assert "not converged" in fit.message
+    assert fit.message in fit.warnings
+    assert fit.message in fit.summary()
+
+
+def test_history_starts_at_the_start_and_descends():
+    residual, jacobian, names = misra1a()
+    fit = nonlinear_least_squares(residual, jacobian, [500, 1e-4], names=names, sigma_stated=False)
+    assert fit.history.shape == (fit.iterations + 1, 2)
+    np.testing.assert_array_equal(fit.history[0], [500, 1e-4])
+    np.testing.assert_array_equal(fit.history[-1], fit.values)
+    assert (np.diff(fit.costs) <= 1e-12).all()
+    assert len(fit.to_dict()["history"]) == fit.iterations + 1
+    assert list(fit.to_frame()["at_bound"]) == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"names": ["a"]}, "as many finite starting values"),
+        ({"names": ["a", "a"]}, "different names"),
+        ({"start": [np.nan, 1]}, "finite starting values"),
+        ({"loss": "median"}, "unknown loss 'median'"),
+        ({"bounds": {"z": (0, 1)}}, "'z', which is not estimated"),
+        ({"bounds": {"b1": (1, 1)}}, "lower bound of b1"),
+        ({"start": [1e308, -1e6]}, "not finite"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid value")
+def test_bad_input_is_refused_in_words(change, words):
+    residual, jacobian, names = misra1a()
+    given_ = {"start": [250, 5e-4], "names": names, "sigma_stated": False} | change
+    with pytest.raises(ValueError, match=words):
+        nonlinear_least_squares(residual, jacobian, **given_)
+
+
+@pytest.mark.parametrize("start", [[239.0, 5.5e-4], [500.0, 1e-4], [20.0, 5e-2]])
+def test_a_start_said_to_be_near_ends_at_the_same_minimum(start):
+    residual, jacobian, names = misra1a()
+    fit = nonlinear_least_squares(residual, jacobian, start, names=names, sigma_stated=False, near=True)
+    assert fit.converged
+    assert digits(fit.values, MISRA1A_VALUES) >= 7
+    np.testing.assert_array_equal(fit.history[0], start)
+    assert len(fit.history) == fit.iterations + 1
