@@ -7,7 +7,7 @@ import os
 import platform
 import sys
 
-BENCHMARKS = ("startup", "critical_speeds", "unbalance_response", "campbell", "identification")
+BENCHMARKS = ("startup", "critical_speeds", "unbalance_response", "campbell", "identification", "time_fit")
 
 
 def main(names: list[str]) -> int:

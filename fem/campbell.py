@@ -9,18 +9,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem.crossing import synchronous
+from fem.growth import GROWTH, Growing, growing
 from fem.orbits import whirl_direction
 from fem.planes import ComplexArray, both_planes
 from fem.rotor import RPM, FloatArray, Rotor
 from fem.tracking import Followed, follow
-from fem.whirl import DIRECTION_NAMES, checked_number, checked_speeds, in_both_planes
+from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl, solve_whirl
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-_SPARE = 1  # modes above those asked for, which may come down; more are taken where a mode is lost
+_SPARE = 2  # modes above those asked for, which may come down; more are taken where a mode is lost
+_MOST = 3  # modes computed for each one asked for, at most
+_REACH = 0.5  # part of the highest frequency computed above which a mode that vanished may have gone on
+_PAIR = 1e-6  # relative distance of forward and backward whirl that start together, as at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,8 @@ class Campbell:
         The rotor.
     warnings
         What the reader must know.
+    unstable
+        Modes that grow at some of the speeds, and from which speed on, by that speed.
     """
 
     speeds: FloatArray
@@ -62,6 +68,7 @@ class Campbell:
     error: float
     rotor: Rotor
     warnings: tuple[str, ...] = ()
+    unstable: tuple[Growing, ...] = ()
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -97,6 +104,7 @@ class Campbell:
                 }
                 for speed, mode, delta, way in self._criticals()
             ],
+            "unstable": [mode.to_dict() for mode in self.unstable],
             "warnings": list(self.warnings),
         }
 
@@ -131,13 +139,14 @@ class Campbell:
             parts = [f"{k + 1:4d}"]
             for s in (0, -1):
                 omega, delta = self.frequencies[s, k], self.log_decrements[s, k]
-                text = f"{omega:16.4f} {_LETTERS[float(self.direction[s, k])]}{delta:10.4f}"
-                parts.append(text if np.isfinite(omega) else f"{'overdamped':>18}{'':10}")
+                text = f"{omega:16.4f} {_LETTERS[float(self.direction[s, k])]}{_rounded(delta):10.4f}"
+                parts.append(text if np.isfinite(omega) else f"{'none':>18}{'':10}")
             lines.append("".join(parts))
         if self.critical_speeds.size:
             lines.append("damped critical speeds")
             lines.append("mode     rad/s         rpm   log dec  direction")
         for speed, mode, delta, way in self._criticals():
+            delta = _rounded(delta)
             lines.append(
                 f"{mode:4d}{speed:12.4f}{speed * RPM:12.2f}{delta:10.4f}  {DIRECTION_NAMES[float(way)]}"
             )
@@ -170,9 +179,11 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
-    between the given speeds where it leaves a doubt. The n modes are those that are most often among the n of
-    lowest frequency, numbered by frequency at the first speed. Where a curve crosses the 1× line between two
-    speeds, the crossing is found by iteration on the model.
+    between the given speeds where it leaves a doubt; on rotationally symmetric supports forward and backward
+    whirl are kept apart exactly. The n modes are those that meet the 1× line first, then those that are most
+    often among the n of lowest frequency; they are numbered by frequency at the first speed, backward before
+    forward where a pair coincides. Where a curve crosses the 1× line between two speeds, the crossing is
+    found by iteration on the model.
 
     Parameters
     ----------
@@ -187,7 +198,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     ------
     ValueError
         If speeds are impossible or outside the table of a support, the model has fewer modes, or the mesh is
-        too fine for float64.
+        too fine for float64, or the rotor is pushed aside by negative stiffness at every speed.
     """
     speeds = checked_speeds(speeds)
     checked_number(rotor, n)
@@ -195,6 +206,11 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     if not columns.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
     values, X = paths.values[:, columns], paths.vectors[:, columns]
+    if all(runs_away(whirl)):
+        raise ValueError(
+            "the rotor on its supports is statically unstable at these speeds: a support has negative "
+            "stiffness; check its sign and size"
+        )
     lam, x, y = in_both_planes(values, whirl.Q.nodes(X))
     gone = ~np.isfinite(lam)
     direction = np.where(gone, 0.0, whirl_direction(np.nan_to_num(x), np.nan_to_num(y)))
@@ -202,6 +218,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     log_decrements = -2 * np.pi * lam.real / frequencies
     crossings = synchronous(whirl, values, X)
     at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
+    unstable = growing(whirl, values, X)
     for array in (frequencies, log_decrements, direction, crossings.speeds):
         array.flags.writeable = False
     return Campbell(
@@ -215,66 +232,162 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
         critical_direction=whirl_direction(cx, cy),
         error=whirl.error,
         rotor=rotor,
-        warnings=_warnings(whirl, paths, columns, n),
+        warnings=(*(mode.said() for mode in unstable), *_warnings(whirl, paths, columns, n)),
+        unstable=unstable,
     )
 
 
 def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, NDArray[np.intp]]:
     """Modes over speed, and which n (or fewer) of them were asked for."""
     P = both_planes(rotor)
-    spare = _SPARE
+    available = available_modes(rotor)
+    m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
+    best, missing = None, np.inf
     while True:
-        whirl = solve_whirl(P, speeds, n + spare)
+        whirl = solve_whirl(P, speeds, m)
         paths = follow(whirl)
-        columns = _asked_for(paths, n)
-        # One that went on above those computed needs more of them.
-        if not paths.lost[columns].any() or spare > 4 * n + 8:
-            return whirl, paths, columns
-        spare *= 2
+        columns = asked_for(paths, speeds, n)
+        above = int(went_above(whirl, paths, columns).sum())
+        # A mode that went on above those computed needs more of them, an overdamped one is not found so.
+        if best is None or above < missing:
+            best, missing = (whirl, paths, columns), above
+        else:
+            return best
+        if not above or m >= min(_MOST * n + 16, available):
+            return best
+        m = min(m + max(4, n), available)
 
 
-def _asked_for(paths: Followed, n: int) -> NDArray[np.intp]:
-    size = np.abs(paths.values.imag)
-    ranked = np.where(np.isfinite(size), size, np.inf)
-    order = np.argsort(ranked, axis=1, kind="stable")[:, :n]
-    low = np.zeros(size.shape, dtype=bool)
-    np.put_along_axis(low, order, True, axis=1)
-    low &= np.isfinite(size)
-    often = low.sum(axis=0)
-    begins = np.argmax(np.isfinite(size), axis=0)
-    start = ranked[begins, np.arange(size.shape[1])]
-    best = [c for c in np.lexsort((start, begins, -often)) if often[c]][:n]
-    return np.array(sorted(best, key=lambda c: (begins[c], start[c])), dtype=np.intp)
+def went_above(whirl: Whirl, paths: Followed, columns: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Where a mode is missing that may lie above those that were computed, shape (S, n).
+
+    Elsewhere a missing mode does not oscillate: all that do are known, or all of its frequencies.
+    """
+    size = np.abs(paths.values[:, columns].imag)
+    gone: NDArray[np.bool_] = np.isnan(size)
+    full = np.asarray(np.isfinite(whirl.found.values).all(axis=1))
+    top = np.abs(np.nan_to_num(whirl.found.values).imag).max(axis=1)
+    near = np.zeros(size.shape)
+    for k in range(len(columns)):
+        known = np.flatnonzero(~gone[:, k])
+        if known.size:
+            nearest = np.abs(np.arange(len(size))[:, None] - known).argmin(axis=1)
+            near[:, k] = size[known[nearest], k]
+    return np.asarray(gone & full[:, None] & (near > _REACH * top[:, None]))
+
+
+def asked_for(paths: Followed, speeds: FloatArray, n: int) -> NDArray[np.intp]:
+    """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
+
+    Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
+    speed is left out below that of another; then those that are most often among the n of lowest frequency.
+    Modes that grow go before all others, heavily damped ones that oscillate at few speeds come last.
+    """
+    values = paths.values
+    there = np.isfinite(values)
+    size = np.where(there, np.abs(values.imag), np.inf)
+    S, count = size.shape
+    lowest = np.argsort(size, axis=1, kind="stable")[:, :n]
+    low: NDArray[np.bool_] = np.zeros(size.shape, dtype=bool)
+    np.put_along_axis(low, lowest, True, axis=1)
+    low &= there
+    begins = np.asarray(there.argmax(axis=0))
+    start = values[begins, np.arange(count)]
+    grows = ((np.nan_to_num(values.real / np.abs(values)) > GROWTH) & low).any(axis=0)
+    seldom = there.sum(axis=0) < S / 2
+    meets = np.array([_meets(size[there[:, c], c], speeds[there[:, c]]) for c in range(count)])
+    order = np.lexsort((_paired(start, begins), -low.sum(axis=0), meets, seldom, ~grows))
+    best = [c for c in order if low[:, c].any() or np.isfinite(meets[c])][:n]
+    rank = _paired(start, begins)
+    return np.array(sorted(best, key=lambda c: rank[c]), dtype=np.intp)
+
+
+def _meets(size: FloatArray, speeds: FloatArray) -> float:
+    """Frequency at which a mode is synchronous, or at its first speed if it is below that; else infinite."""
+    below = np.flatnonzero(size <= speeds)
+    if not below.size:
+        return np.inf
+    k = int(below[0])
+    if k == 0:
+        return float(size[0])
+    before, after = size[k - 1] - speeds[k - 1], speeds[k] - size[k]
+    return float(speeds[k - 1] + (speeds[k] - speeds[k - 1]) * before / (before + after))
+
+
+def _paired(start: ComplexArray, begins: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Rank by where a mode begins and its frequency there; of two that coincide the backward one first.
+
+    In a complex coordinate Im λ < 0 is backward whirl.
+    """
+    out: list[int] = []
+    for c in np.lexsort((np.abs(start.imag), begins)).tolist():
+        before = start[out[-1]].imag if out and begins[out[-1]] == begins[c] else -1.0
+        if start[c].imag < 0 < before and -start[c].imag - before <= _PAIR * before:
+            out.insert(-1, c)
+        else:
+            out.append(c)
+    rank = np.empty(len(out), dtype=np.intp)
+    rank[out] = np.arange(len(out))
+    return rank
+
+
+def runs_away(whirl: Whirl) -> list[bool]:
+    """At which speeds a motion grows without oscillating, length S."""
+    return [bool(real.size) and bool(real.max() > 1e-6 * whirl.scale) for real in whirl.found.real]
+
+
+def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
+    """Columns by frequency; of two that coincide the backward one first: Im λ < 0 in a complex coordinate."""
+    out: list[int] = []
+    for c in sorted(modes, key=lambda c: abs(start[c].imag)):
+        here = start[c].imag
+        before = start[out[-1]].imag if out else np.inf
+        if here < 0 < before and -here - before <= _PAIR * before:
+            out.insert(-1, c)
+        else:
+            out.append(c)
+    return out
 
 
 def _warnings(whirl: Whirl, paths: Followed, columns: NDArray[np.intp], n: int) -> tuple[str, ...]:
     texts = []
     values = paths.values[:, columns]
     gone = ~np.isfinite(values)
-    for k in np.flatnonzero(gone.any(axis=0)):
-        where = whirl.speeds[gone[:, k]]
-        texts.append(
-            f"mode {k + 1} does not oscillate (overdamped) or was not found at {where.size} of "
-            f"{whirl.speeds.size} speeds, from {where[0]:.6g} to {where[-1]:.6g} rad/s"
-        )
+    above = went_above(whirl, paths, columns)
+    for text, cells in (
+        ("does not oscillate (overdamped)", gone & ~above),
+        ("was not found (overdamped, or above the frequencies computed)", above),
+    ):
+        for k in np.flatnonzero(cells.any(axis=0)):
+            where = whirl.speeds[cells[:, k]]
+            texts.append(
+                f"mode {k + 1} {text} at {where.size} of {whirl.speeds.size} speeds, "
+                f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
+            )
     if columns.size < n:
         texts.append(f"only {columns.size} of {n} modes oscillate, the others are overdamped")
     rigid = whirl.found.still // 2
     if rigid.any():
         texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
-    growing = [k for k, real in enumerate(whirl.found.real) if real.size and real.max() > 1e-6 * whirl.scale]
-    if growing:
+    away = np.flatnonzero(runs_away(whirl))
+    if away.size:
         texts.append(
-            f"the rotor runs away without oscillating from {whirl.speeds[growing[0]]:.6g} rad/s on: "
+            f"the rotor runs away without oscillating from {whirl.speeds[away[0]]:.6g} rad/s on: "
             "a support pushes it aside; check negative stiffness"
         )
-    if paths.doubtful:
-        places = ", ".join(f"{whirl.speeds[k]:.6g}" for k in paths.doubtful[:5])
+    doubtful = sorted({k for k, mode in paths.doubtful if mode in columns})
+    if doubtful:
+        places = ", ".join(f"{whirl.speeds[k]:.6g}" for k in doubtful[:5])
         texts.append(
             f"modes could not be told apart by shape just above {places} rad/s: from there on two curves "
             "may be exchanged"
         )
     return tuple(texts)
+
+
+def _rounded(delta: float) -> float:
+    """To the four digits that are printed, without a negative zero."""
+    return round(float(delta), 4) + 0.0
 
 
 def _plain(array: FloatArray) -> list[list[float | None]]:

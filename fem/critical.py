@@ -49,24 +49,25 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     Returns
     -------
     Modes
-        Frequencies in rad/s and shapes.
+        Frequencies in rad/s and shapes; of fewer than n where bearing tables end before, with a warning.
 
     Raises
     ------
     ValueError
-        If the model has fewer than n modes, a bearing table ends before the n-th critical speed, nothing
+        If the model has fewer than n modes, the bearing tables hold no critical speed, nothing
         that moves has mass, or the mesh is too fine for float64.
     """
     n = whole(n, "the number of critical speeds")
     A = assemble(rotor)
+    said: tuple[str, ...] = ()
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
         _check_number(n, finite_modes(pencil))
         found = [_lowest(pencil, n)]
     else:
         _check_number(n, finite_modes(A) * (1 if rotor.symmetric else 2))
-        found = _over_speed(rotor, A, n)
-    return _modes(rotor, A, found)
+        found, said = _over_speed(rotor, A, n)
+    return _modes(rotor, found, said)
 
 
 def _check_number(n: int, available: int, reason: str = "") -> None:
@@ -91,8 +92,11 @@ def _lowest(pencil: Pencil, n: int) -> _Found:
     return _Found(spectrum.squares[real], spectrum.vectors[:, real], pencil, spectrum.rounding[real])
 
 
-def _over_speed(rotor: Rotor, A: Matrices, n: int) -> list[_Found]:
-    """The n lowest intersections of natural frequency and speed, over the range of all bearing tables."""
+def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[_Found], tuple[str, ...]]:
+    """The n lowest intersections of natural frequency and speed, over the range of all bearing tables.
+
+    There may be fewer; then warnings say so.
+    """
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
@@ -108,29 +112,42 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> list[_Found]:
     def surplus(omega: float, k: int) -> float:
         return float(np.sqrt(max(at(omega, k + 1).squares[k], 0.0)) - omega)
 
-    frequencies = [np.sqrt(np.maximum(at(first, n).squares, 0.0))]
-    if frequencies[0][0] < first:
-        raise ValueError(
-            f"the first natural frequency at {first:.6g} rad/s, where a bearing table begins, is "
-            f"{frequencies[0][0]:.6g} rad/s: critical speeds below it cannot be known; extend the table"
-        )
+    m, below = n, 0  # modes to follow; those below the first speed are met where nothing is known
+    while True:
+        frequencies = [np.sqrt(np.maximum(at(first, m).squares, 0.0))]
+        below = int(np.count_nonzero(frequencies[0] < first))
+        if frequencies[0].size < m or m >= n + below:
+            break
+        m = n + below
     found: list[tuple[float, int]] = []
     for left, right in itertools.pairwise(grid):
-        frequencies.append(np.sqrt(np.maximum(at(right, n).squares, 0.0)))
+        frequencies.append(np.sqrt(np.maximum(at(right, m).squares, 0.0)))
         a, b = frequencies[-2] - left, frequencies[-1] - right
         crossing = [k for k in range(min(a.size, b.size)) if (a[k] >= 0) != (b[k] >= 0)]
         found += [(_root(surplus, k, left, right, a[k], b[k]), k) for k in crossing]
         if len(found) >= n:
             break
     found = sorted(found)[:n]
-    if len(found) < n:
+    if not found:
+        reason = (
+            f"the first natural frequency at {first:.6g} rad/s is {frequencies[0][0]:.6g} rad/s"
+            if below
+            else f"the first natural frequency at {last:.6g} rad/s is {frequencies[-1][0]:.6g} rad/s"
+        )
         raise ValueError(
-            f"only {len(found)} critical speed{'s' if len(found) != 1 else ''} lie between {first:.6g} and "
-            f"{last:.6g} rad/s, where the bearing tables hold; ask for n={len(found)}, or extend the tables"
-            if found
-            else f"no critical speed lies between {first:.6g} and {last:.6g} rad/s, where the bearing tables "
-            f"hold; the first natural frequency at {last:.6g} rad/s is {frequencies[-1][0]:.6g} rad/s: "
-            "extend them"
+            f"no critical speed lies between {first:.6g} and {last:.6g} rad/s, where the bearing tables "
+            f"hold; {reason}: extend the tables"
+        )
+    warnings: tuple[str, ...] = ()
+    if len(found) < n:
+        warnings += (
+            f"only {len(found)} of {n} critical speeds {'lies' if len(found) == 1 else 'lie'} between "
+            f"{first:.6g} and {last:.6g} rad/s, where the tables hold; extend them to find more",
+        )
+    if below:
+        warnings += (
+            f"at {first:.6g} rad/s, where the bearing tables begin, the lowest natural frequency is only "
+            f"{frequencies[0][0]:.6g} rad/s: critical speeds below the tables are not known, nor counted",
         )
     result = []
     for omega, k in found:
@@ -139,7 +156,7 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> list[_Found]:
         result.append(
             _Found(np.array([omega * omega]), modes.vectors[:, pick], modes.pencil, modes.rounding[pick])
         )
-    return result
+    return result, warnings
 
 
 def _root(function: Callable[[float, int], float], k: int, a: float, b: float, fa: float, fb: float) -> float:
@@ -163,10 +180,10 @@ def _root(function: Callable[[float, int], float], k: int, a: float, b: float, f
     return b
 
 
-def _modes(rotor: Rotor, A: Matrices, found: list[_Found]) -> Modes:
+def _modes(rotor: Rotor, found: list[_Found], said: tuple[str, ...]) -> Modes:
     squares = np.concatenate([part.squares for part in found])
     rounding = np.concatenate([part.rounding for part in found])
-    warnings = ignored_inertia(rotor) + fine_mesh_warning(rotor, rounding)
+    warnings = said + ignored_inertia(rotor) + fine_mesh_warning(rotor, rounding)
     rigid = int(np.count_nonzero(squares == 0))
     if rigid:
         motions = "motion" if rigid == 1 else "motions"

@@ -126,7 +126,9 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     ValueError
         As `critical_speeds`.
     """
-    coarse, middle, fine = (critical_speeds(refined(rotor, times), n).frequencies for times in (1, 2, 4))
+    lists = [critical_speeds(refined(rotor, times), n).frequencies for times in (1, 2, 4)]
+    common = min(map(len, lists))  # bearing tables may end between
+    coarse, middle, fine = (frequencies[:common] for frequencies in lists)
     first, second = coarse - middle, middle - fine
     share = 2.0**RATE / (2.0**RATE - 1)
     extrapolated = coarse - share * first

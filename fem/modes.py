@@ -83,13 +83,14 @@ class Modes:
 
     def summary(self) -> str:
         """Critical speeds as text."""
-        lines = ["mode     rad/s         rpm          Hz"]
+        mixed = any(word != "forward" for word in self.direction)
+        lines = ["mode       rad/s           rpm            Hz"]
         for k, omega in enumerate(self.frequencies, start=1):
             note = "  rigid body" if omega == 0 else ""
-            if self.direction[k - 1] != "forward":
+            if mixed:
                 note += f"  {self.direction[k - 1]}"
             lines.append(
-                f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{omega / (2 * np.pi):12.4f}{note}",
+                f"{k:4d} {omega:11.4f} {omega * RPM:13.2f} {omega / (2 * np.pi):13.4f}{note}",
             )
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 

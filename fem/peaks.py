@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 Edition = Literal["2005", "1996"]
 HALF_POWER = float(np.sqrt(0.5))
+_UNDAMPED = 1e5  # an AF beyond which damping is none
 _POINTS = 6  # of the local polynomial
 
 
@@ -49,13 +50,15 @@ class Peak:
     below, above
         Speeds N₁ and N₂ at 0.707 of it, rad/s; None where the curve does not show them.
     amplification
-        AF; None where N₁ or N₂ is not known.
+        AF; None where N₁ or N₂ is not known, too few speeds show them, or damping is practically none.
     margin
         Distance to the operating range in percent of its nearest end, 0 inside; None without a range.
     required
         What is required; None where AF is not known or there is no range.
     note
         What is missing, and why; else empty.
+    undamped
+        Whether AF exceeds 1e5: practically nothing limits the amplitude, which then says nothing.
     """
 
     speed: float
@@ -66,6 +69,7 @@ class Peak:
     margin: float | None
     required: float | None
     note: str = ""
+    undamped: bool = False
 
     @property
     def enough(self) -> bool | None:
@@ -102,7 +106,7 @@ class Peaks:
                 {
                     "speed_rad_s": p.speed,
                     "speed_rpm": p.speed * RPM,
-                    "amplitude": p.amplitude,
+                    "amplitude": None if p.undamped else p.amplitude,
                     "half_power_rad_s": [p.below, p.above],
                     "amplification_factor": p.amplification,
                     "separation_margin_percent": p.margin,
@@ -123,19 +127,22 @@ class Peaks:
         ]
         return pd.DataFrame(rows)
 
-    def summary(self) -> str:
-        """The peaks as text."""
+    def summary(self, unit: str = "", scale: float = 1.0) -> str:
+        """The peaks as text, amplitudes times `scale` with the name of their unit."""
         if not self.peaks:
             return "no peak in this range of speeds"
-        lines = ["     rad/s         rpm      AF   margin, %  required, %"]
+        named = f"amplitude, {unit}" if unit else "amplitude"
+        lines = [f"{'rad/s':>12} {'rpm':>13} {named:>14} {'AF':>9} {'margin, %':>11} {'required, %':>12}"]
         for p in self.peaks:
             values = [
                 "-" if v is None else f"{v:.{d}f}"
                 for v, d in ((p.amplification, 2), (p.margin, 1), (p.required, 1))
             ]
+            size = "-" if p.undamped else f"{scale * p.amplitude:.5g}"
             verdict = {True: "  enough", False: "  NOT ENOUGH", None: ""}[p.enough]
             lines.append(
-                f"{p.speed:10.4f}{p.speed * RPM:12.2f}{values[0]:>8}{values[1]:>12}{values[2]:>13}{verdict}"
+                f"{p.speed:12.4f} {p.speed * RPM:13.2f} {size:>14} {values[0]:>9} {values[1]:>11} "
+                f"{values[2]:>12}{verdict}"
             )
             if p.note:
                 lines.append(f"    {p.note}")
@@ -182,7 +189,10 @@ def find_peaks(
         operating = low, high
     inside = (A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:]) & (A[1:-1] > 0)
     curve = evaluate or _interpolation(omega, A)
-    found = [_peak(omega, A, int(k) + 1, curve, operating, edition) for k in np.flatnonzero(inside)]
+    found = [
+        _peak(omega, A, int(k) + 1, curve, operating, edition, exact=evaluate is not None)
+        for k in np.flatnonzero(inside)
+    ]
     return Peaks(tuple(found), operating, edition)
 
 
@@ -260,6 +270,8 @@ def _peak(
     curve: Callable[[float], float],
     operating: tuple[float, float] | None,
     edition: Edition,
+    *,
+    exact: bool,
 ) -> Peak:
     speed = _maximum(curve, float(omega[k - 1]), float(omega[k]), float(omega[k + 1]))
     amplitude = curve(speed)
@@ -268,9 +280,18 @@ def _peak(
     above, why_above = _half_power(omega, A, k, 1, curve, level, speed)
     notes = [text for text in (why_below, why_above) if text]
     AF = None
+    undamped = False
     if below is not None and above is not None:
-        AF = speed / (above - below)
-        if np.count_nonzero((omega >= below) & (omega <= above)) < 3:
+        AF = speed / max(above - below, 1e-300)
+        unresolved = not exact and np.count_nonzero((omega >= below) & (omega <= above)) < 3
+        if unresolved:
+            # The band lies between the neighbours: how narrow it may be is not known, how wide is.
+            AF = speed / (omega[k + 1] - omega[k - 1])
+        undamped = bool(_UNDAMPED < AF)
+        if undamped:
+            notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
+        elif unresolved:
+            AF = None
             notes.append("fewer than three speeds lie in the half-power band: take smaller steps here")
     margin, required = None, None
     if operating is not None:
@@ -280,7 +301,8 @@ def _peak(
         if AF is not None:
             # Inside the range any margin is missing; the smaller requirement is then said.
             required = required_margin(AF, above=over, edition=edition)
-    return Peak(speed, amplitude, below, above, AF, margin, required, "; ".join(notes))
+    shown = None if undamped else AF
+    return Peak(speed, amplitude, below, above, shown, margin, required, "; ".join(notes), undamped)
 
 
 def _maximum(curve: Callable[[float], float], a: float, b: float, c: float) -> float:
@@ -319,7 +341,7 @@ def _half_power(
         beyond = (omega[i] - speed) * way > 0
         if beyond and A[i] <= level:
             return float(
-                brentq(lambda w: curve(w) - level, near, omega[i], xtol=1e-13 * omega[i], rtol=1e-14)
+                brentq(lambda w: curve(w) - level, near, omega[i], xtol=1e-13 * speed, rtol=1e-14)
             ), ""
         if beyond and A[i] > level / HALF_POWER * (1 + 1e-9):
             return None, f"the curve rises to another peak before it falls to 0.707 {side}"

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 HIGHEST = 3.0  # log decrements above count as "well damped" and are not drawn to scale
+_HEADROOM = 1.1  # above the highest curve, for the legend
 _Look = tuple[Literal["-", "--", ":"], str, Literal["full", "none"]]
 _LOOKS: dict[str, _Look] = {
     "forward": ("-", "^", "full"),
@@ -96,11 +97,10 @@ def draw_campbell(
     last = float(campbell.speeds.max())
     end = min(last, top)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
-    ax.set(xlim=_range(campbell), ylim=(0, top))
-    low = ax.get_xlim()[0]
-    middle = low + 0.93 * (end - low)
-    ax.annotate("1×", (middle, middle), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=11)
+    ax.set(xlim=_range(campbell), ylim=(0, _HEADROOM * top))
     seen = [(speed, delta) for speed, delta in criticals if speed <= end]
+    middle = _free(ax.get_xlim()[0], end, [speed for speed, _ in seen])
+    ax.annotate("1×", (middle, middle), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=11)
     if seen:
         places = np.array([speed for speed, _ in seen])
         ax.plot(places, places, "o", color="black", markerfacecolor="#F0E442", markersize=9, zorder=6)
@@ -145,6 +145,14 @@ def _range(campbell: CampbellLike) -> tuple[float, float]:
 def _highest(campbell: CampbellLike) -> float:
     w = campbell.frequencies
     return 1.06 * float(max(w[np.isfinite(w)].max(initial=0.0), 1e-9))
+
+
+def _free(low: float, end: float, taken: Sequence[float]) -> float:
+    """Place on the 1× line with room from the critical speeds, as high as may be."""
+    places = low + np.linspace(0.95, 0.3, 27) * (end - low)
+    room = np.abs(places[:, None] - np.array([*taken, np.inf])).min(axis=1)
+    wide = np.flatnonzero(room >= 0.1 * (end - low))
+    return float(places[wide[0] if wide.size else np.argmax(room)])
 
 
 def _shown(campbell: CampbellLike) -> list[int]:
@@ -263,6 +271,14 @@ def _legend(ax: Axes, campbell: CampbellLike, marked: bool) -> None:
                 label="damped critical speed",
             )
         )
+    # One row in the room above the curves.
     ax.legend(
-        handles=handles, loc="upper left", frameon=True, framealpha=0.85, edgecolor="none", fontsize="small"
+        handles=handles,
+        loc="upper left",
+        ncols=len(handles),
+        frameon=True,
+        framealpha=0.85,
+        edgecolor="none",
+        fontsize="small",
+        borderaxespad=0.2,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fem.eigen import fine_mesh_warning
+from fem.growthcheck import growing_warning, surely_stable
 from fem.matrices import Matrices, assemble, ignored_inertia
 from fem.receptance import receptance
 from fem.rotor import FloatArray, Rotor
@@ -139,6 +140,9 @@ def _solve(
     F *= force
     if b is not None:
         b *= force
+    if not surely_stable(rotor):
+        size = np.abs(F).max(axis=(1, 2)) + (0.0 if b is None else np.abs(b).max(axis=(1, 2)))
+        warnings = (*warnings, *growing_warning(rotor, speeds, size))
     return F, b, (*ignored_inertia(rotor), *fine_mesh_warning(rotor, rounding), *warnings)
 
 

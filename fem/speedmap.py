@@ -249,7 +249,7 @@ def _criticals(rotor: Rotor, n: int) -> FloatArray:
             if m == 1 or not rotor.model.gyroscopic:
                 raise
             continue
-        return np.concatenate((found, np.full(n - m, np.nan)))
+        return np.concatenate((found, np.full(n - found.size, np.nan)))
     raise ValueError(f"{n} critical speeds cannot be found; choose n from 1")
 
 

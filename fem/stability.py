@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fem.campbell import followed
+from fem.campbell import followed, runs_away
 from fem.crossing import crossings
 from fem.orbits import whirl_direction
 from fem.planes import AnyArray, ComplexArray
@@ -130,7 +130,7 @@ def stability_threshold(
     whirl, paths, columns = followed(rotor, speeds, n)
     values, X = paths.values[:, columns], paths.vectors[:, columns]
     growth = np.nan_to_num(values.real / np.abs(values), nan=-np.inf)
-    running = np.array([bool(real.size) and real.max() > 1e-6 * whirl.scale for real in whirl.found.real])
+    running = np.array(runs_away(whirl))
     grows = (growth > _GROWTH).any(axis=1) | running
     upto = int(np.argmax(grows)) if grows.any() else len(speeds)
     decrements = (-2 * np.pi * values.real / np.abs(values.imag))[: max(upto, 1)]

@@ -82,7 +82,8 @@ class Support:
     pedestal
         What the bearing stands on, None for the ground.
     kind
-        "bearing" or "seal"; only drawings make a difference. A seal's stiffness may be negative.
+        "bearing" or "seal"; only drawings make a difference.
+        Diagonal entries may be negative for a seal only.
     tilting_stiffness
         N·m/rad, isotropic, of a spring that holds the slope, as a long bearing does; a very large one
         clamps the shaft.
@@ -250,7 +251,10 @@ def _coefficient(value: Any, what: str, signed: bool) -> Coefficient:  # noqa: A
     if not _is_matrix(value):
         raise ValueError(f"{what} must be a number or 2 × 2, ((xx, xy), (yx, yy)), not {value!r}")
     (xx, xy), (yx, yy) = (
-        tuple(number(entry, f"{what} {name}", signed=True) for entry, name in zip(row, names, strict=True))
+        tuple(
+            number(entry, f"{what} {name}", signed=signed or name in ("xy", "yx"))
+            for entry, name in zip(row, names, strict=True)
+        )
         for row, names in zip(value, (("xx", "xy"), ("yx", "yy")), strict=True)
     )
     if xx == yy and xy == yx == 0 and (xx >= 0 or signed):

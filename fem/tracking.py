@@ -17,6 +17,7 @@ _OTHER = 0.5  # largest MAC with another mode, relative to it
 _NEARER = (
     0.2  # or how much nearer to 1 its own MAC is: heavily damped modes may be alike at one speed already
 )
+_HARDLY = 0.3  # MAC below which two modes are not one
 _HALVINGS = 10
 _TRIALS = 24  # speeds tried between two given ones: modes alike at every step would cost 2 to the tenth
 
@@ -34,13 +35,13 @@ class Followed:
     lost
         Whether a mode may have gone on above those that were computed, shape (c,).
     doubtful
-        Speeds (index of the interval's start) at which shapes did not tell the modes apart at any step.
+        (index of an interval's start, mode) where shapes did not tell the mode apart from others at any step.
     """
 
     values: ComplexArray
     vectors: ComplexArray
     lost: NDArray[np.bool_]
-    doubtful: tuple[int, ...]
+    doubtful: tuple[tuple[int, int], ...]
 
 
 def follow(whirl: Whirl) -> Followed:
@@ -54,19 +55,20 @@ def follow(whirl: Whirl) -> Followed:
     count = m
     lost: set[int] = set()
     doubtful = []
-    alike = likeness(values[:-1], X[:-1], values[1:], X[1:], weight)
+    # In a complex coordinate the sign of Im λ is the direction: forward and backward whirl never mix.
+    apart = whirl.Q.P.planes == 1
+    alike = likeness(values[:-1], X[:-1], values[1:], X[1:], weight, apart)
     partner = np.argmax(alike, axis=2)
     obvious = _obvious(alike, partner)
     for k in range(S - 1):
         if obvious[k]:
             labels[k + 1, partner[k]] = labels[k]
             continue
-        pairs, plain = _pairs(alike[k])
-        if not plain:
+        pairs, doubt = _pairs(alike[k])
+        if doubt:
             ends = (values[k], X[k]), (values[k + 1], X[k + 1])
-            pairs, plain, _ = _bridge(whirl, weight, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
-            if not plain:
-                doubtful.append(k)
+            pairs, doubt, _ = _bridge(whirl, weight, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
+            doubtful += [(k, int(labels[k, i])) for i in sorted(doubt)]
         for i, j in pairs.items():
             labels[k + 1, j] = labels[k, i]
         fresh = np.flatnonzero(np.isfinite(values[k + 1]) & (labels[k + 1] < 0))
@@ -83,12 +85,17 @@ def follow(whirl: Whirl) -> Followed:
 
 
 def likeness(
-    one: ComplexArray, X: ComplexArray, other: ComplexArray, Y: ComplexArray, weight: FloatArray
+    one: ComplexArray,
+    X: ComplexArray,
+    other: ComplexArray,
+    Y: ComplexArray,
+    weight: FloatArray,
+    apart: bool = False,
 ) -> FloatArray:
     """MAC of states (u, λ u / |λ|), mass-weighted, between modes (…, i) and (…, j); 0 where there is none.
 
     The velocities tell apart forward and backward whirl of one shape in a complex coordinate, and modes of
-    different damping.
+    different damping. With `apart` modes of different sign of Im λ are not alike at all.
     """
     X, Y = np.nan_to_num(X), np.nan_to_num(Y)
     WX, WY = X @ weight, Y @ weight
@@ -101,6 +108,8 @@ def likeness(
     )
     mac = cross / np.maximum(size, np.finfo(float).tiny) * np.cos(turn / 2) ** 2
     there = np.isfinite(one)[..., :, None] & np.isfinite(other)[..., None, :]
+    if apart:
+        there &= (one.imag > 0)[..., :, None] == (other.imag > 0)[..., None, :]
     return np.asarray(np.where(there, mac, 0.0))
 
 
@@ -116,23 +125,24 @@ def _obvious(mac: FloatArray, partner: NDArray[np.intp]) -> NDArray[np.bool_]:
     return np.asarray(one_each & ((best >= _ALIKE) & plain).all(axis=1))
 
 
-def _pairs(mac: FloatArray) -> tuple[dict[int, int], bool]:
-    """Partners by falling MAC, and whether they are beyond doubt."""
+def _pairs(mac: FloatArray) -> tuple[dict[int, int], set[int]]:
+    """Partners by falling MAC, and the modes whose partner is in doubt."""
     left = mac.copy()
     pairs: dict[int, int] = {}
-    plain = True
+    doubt: set[int] = set()
     for _ in range(len(mac)):
         i, j = (int(index) for index in np.unravel_index(int(np.argmax(left)), left.shape))
         best = left[i, j]
         if best <= 0:
             break
         rivals = max(np.delete(mac[i], j).max(initial=0.0), np.delete(mac[:, j], i).max(initial=0.0))
-        plain &= bool(best >= _ALIKE and (rivals <= _OTHER * best or 1 - best <= _NEARER * (1 - rivals)))
+        if not (best >= _ALIKE and (rivals <= _OTHER * best or 1 - best <= _NEARER * (1 - rivals))):
+            doubt.add(i)
         # What is hardly alike is another mode that came while this one went.
-        if best >= 0.3:
+        if best >= _HARDLY:
             pairs[i] = j
         left[i], left[:, j] = 0.0, 0.0
-    return pairs, plain
+    return pairs, doubt
 
 
 def _bridge(
@@ -143,19 +153,19 @@ def _bridge(
     end: tuple[ComplexArray, ComplexArray],
     depth: int,
     trials: int,
-) -> tuple[dict[int, int], bool, int]:
-    """Partners over an interval by way of its middle, whether they are beyond doubt, and trials left."""
+) -> tuple[dict[int, int], set[int], int]:
+    """Partners over an interval by way of its middle, the modes in doubt, and trials left."""
     middle = float(speeds.mean())
     found = solve(whirl.Q, np.array([middle]), len(start[0]), whirl.scale)
     trials -= 1
     half = found.values[0], found.vectors[0]
-    pairs = []
-    plain = True
+    apart = whirl.Q.P.planes == 1
+    steps = []
     for a, b, ends in ((start, half, (speeds[0], middle)), (half, end, (middle, speeds[1]))):
-        step, sure = _pairs(likeness(a[0], a[1], b[0], b[1], weight))
-        if not sure and depth < _HALVINGS and trials > 0:
-            step, sure, trials = _bridge(whirl, weight, np.array(ends), a, b, depth + 1, trials)
-        pairs.append(step)
-        plain &= sure
-    first, second = pairs
-    return {i: second[j] for i, j in first.items() if j in second}, plain, trials
+        step, doubt = _pairs(likeness(a[0], a[1], b[0], b[1], weight, apart))
+        if doubt and depth < _HALVINGS and trials > 0:
+            step, doubt, trials = _bridge(whirl, weight, np.array(ends), a, b, depth + 1, trials)
+        steps.append((step, doubt))
+    (first, unsure), (second, later) = steps
+    unsure = unsure | {i for i, j in first.items() if j in later}
+    return {i: second[j] for i, j in first.items() if j in second}, unsure, trials

@@ -102,8 +102,9 @@ class WhirlModes:
         for k, (omega, delta, way) in enumerate(
             zip(self.frequencies, self.log_decrements, self.direction, strict=True), start=1
         ):
+            rounded = round(float(delta), 4) + 0.0  # no negative zero
             lines.append(
-                f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{delta:10.4f}  {DIRECTION_NAMES[float(way)]}"
+                f"{k:4d}{omega:12.4f}{omega * RPM:12.2f}{rounded:10.4f}  {DIRECTION_NAMES[float(way)]}"
             )
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 

@@ -31,11 +31,18 @@ if TYPE_CHECKING:
     from rotorid.tables import read_influence as read_influence
     from rotorid.tables import read_job as read_job
     from rotorid.tables import read_measurements as read_measurements
+    from rotorid.tables import read_ode_model as read_ode_model
+    from rotorid.tables import read_record as read_record
     from rotorid.tables import read_rotor as read_rotor
     from rotorid.tables import read_trials as read_trials
     from rotorid.tables import read_unbalance as read_unbalance
     from rotorid.tables import write_influence as write_influence
     from rotorid.tables import write_rotor as write_rotor
+    from rotorid.timedomain import Record as Record
+    from rotorid.timedomain import ode_model as ode_model
+    from rotorid.timedomain.fit import fit as fit
+    from rotorid.timedomain.result import Fit as Fit
+    from rotorid.timedomain.simulate import simulate as simulate
 
 __version__ = "0.1.0"
 
@@ -52,6 +59,12 @@ _HOME = {
     "identify": "harmonic",
     "Experiments": "harmonic",
     "Identification": "harmonic",
+    # time records
+    "ode_model": "timedomain",
+    "Record": "timedomain",
+    "simulate": "timedomain.simulate",
+    "fit": "timedomain.fit",
+    "Fit": "timedomain.result",
     # a rotor as a few masses
     "reduce": "reduction",
     "Reduction": "reduction",
@@ -68,6 +81,8 @@ _HOME = {
     "read_job": "tables",
     "read_harmonic_model": "tables",
     "read_measurements": "tables",
+    "read_ode_model": "tables",
+    "read_record": "tables",
     "Job": "tables",
     "InputError": "tables",
 }

@@ -11,6 +11,7 @@ linear in the masses: formula (50) of [S]. The rows stand as in the book: unweig
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import fem
+from fem.matrices import ignored_inertia
 from rotorid.regression import Estimate, least_squares
 
 if TYPE_CHECKING:
@@ -31,6 +33,9 @@ RAD_S_TO_RPM = 30.0 / np.pi
 
 SENSITIVE = 0.1
 """A report warns where input errors of 1 % move a mass by more than this share."""
+
+ALIKE = 0.9
+"""Below this MAC two shapes are not those of one mode."""
 
 
 def equivalent_masses(
@@ -203,7 +208,7 @@ class Reduction:
     frequencies, shapes
         Of the n-mass model: rad/s (n,), and at the masses (n, n), scaled to fit the rotor's.
     rotor_frequencies, rotor_shapes
-        Of the rotor: rad/s (n,), and at the masses (n, n).
+        Of the rotor's plane at rest: rad/s (n,), and at the masses (n, n).
     rotor_modes
         The rotor's modes at every node, to draw.
     warnings
@@ -320,8 +325,13 @@ class Reduction:
         return plot_reduction(self, ax)
 
 
-def reduce(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2) -> Reduction:
+def reduce(
+    rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2, *, speed: float | None = None
+) -> Reduction:
     """Reduce a rotor to masses at chosen nodes by regression over its first modes.
+
+    Formula (50) is one of a plane that does not turn: of a rotor with gyroscopic effect, or on supports that
+    are more than constant isotropic springs, the plane x at rest is reduced, and `warnings` say so.
 
     Parameters
     ----------
@@ -331,12 +341,14 @@ def reduce(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2) -> Reduction:
         Different node numbers, from 1, where the masses stand.
     modes
         How many of the rotor's modes the regression uses, 1 … n.
+    speed
+        Where tables of supports are read, rad/s; by default their lowest common speed.
 
     Raises
     ------
     ValueError
-        For nodes that do not exist or repeat, a number of modes out of range, a rotor free to move, or
-        masses that these modes do not determine.
+        For a speed outside a table, nodes that do not exist or repeat, a number of modes out of range, a
+        rotor free to move, or masses that these modes do not determine.
 
     Notes
     -----
@@ -352,8 +364,9 @@ def reduce(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2) -> Reduction:
         raise ValueError(f"node {bad[0]} does not exist: this rotor has nodes 1 … {rotor.n_nodes}")
     if not 1 <= modes <= n:
         raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
-    alpha = fem.compliance(rotor, places)
-    full = fem.critical_speeds(rotor, n)
+    plane, said = _plane_at_rest(rotor, speed)
+    alpha = fem.compliance(plane, places)
+    full = fem.critical_speeds(plane, n)
     index = np.array(places) - 1
     rotor_shapes = full.shapes[index]
     estimate = equivalent_masses(alpha, full.frequencies[:modes], rotor_shapes[:, :modes])
@@ -364,6 +377,8 @@ def reduce(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2) -> Reduction:
         )
     sensitivity = mass_sensitivity(alpha, full.frequencies[:modes], rotor_shapes[:, :modes])
     omega, shapes = natural_frequencies(alpha, estimate.solution)
+    shapes = _like(shapes, rotor_shapes)
+    agreement = np.diag(mac(shapes, rotor_shapes))[:modes]
     return Reduction(
         rotor=rotor,
         nodes=places,
@@ -373,15 +388,72 @@ def reduce(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2) -> Reduction:
         sensitivity=sensitivity,
         compliance=alpha,
         frequencies=omega,
-        shapes=_like(shapes, rotor_shapes),
+        shapes=shapes,
         rotor_modes=full,
         rotor_shapes=rotor_shapes,
-        warnings=(*full.warnings, *_warnings(estimate, sensitivity, omega, places)),
+        warnings=(
+            *said,
+            *_of_shaft(rotor, full),
+            *_warnings(estimate, sensitivity, omega, places, agreement),
+        ),
     )
 
 
+def _plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, list[str]]:
+    """The rotor's plane x without rotation, on springs to the ground or to pedestals, and what to say of it.
+
+    Neither gyroscopic moments nor coupling between x and y nor damping have a place in formula (50).
+    """
+    if speed is not None and not (np.isfinite(speed) and speed >= 0):
+        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
+    lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
+    omega = lowest if speed is None else float(speed)
+    supports = []
+    for support in rotor.supports:
+        stand = support.pedestal
+        supports.append(
+            fem.Support(
+                support.node,
+                float(support.at(omega)[0][0, 0]),
+                name=support.name,
+                pedestal=None if stand is None else fem.Pedestal(stand.mass, stand.xy("stiffness")[0]),
+                kind=support.kind,
+                tilting_stiffness=support.tilting_stiffness,
+            )
+        )
+    plane = dataclasses.replace(
+        rotor, supports=supports, model=dataclasses.replace(rotor.model, gyroscopic=False)
+    )
+    said = []
+    if rotor.model.gyroscopic or not (rotor.symmetric and _uncoupled(rotor)):
+        said.append(
+            "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
+            "of the rotor at rest, without gyroscopic effect and cross-coupling"
+        )
+    if not rotor.constant:
+        which = "the lowest of" if speed is None else "chosen in"
+        said.append(f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables")
+    return plane, said
+
+
+def _of_shaft(rotor: fem.Rotor, full: fem.Modes) -> list[str]:
+    """Warnings of the modes, without those on what the plane at rest leaves out of a rotor that has it."""
+    ours = ignored_inertia(full.rotor)
+    return [*ignored_inertia(rotor), *(text for text in full.warnings if text not in ours)]
+
+
+def _uncoupled(rotor: fem.Rotor) -> bool:
+    """Whether no support's stiffness couples x and y."""
+    matrices = [support.at(support.speeds or 0.0)[0] for support in rotor.supports]
+    return not any(K[..., 0, 1].any() or K[..., 1, 0].any() for K in matrices)
+
+
 def _warnings(
-    estimate: Estimate, sensitivity: FloatArray, omega: FloatArray, places: tuple[int, ...]
+    estimate: Estimate,
+    sensitivity: FloatArray,
+    omega: FloatArray,
+    places: tuple[int, ...],
+    agreement: FloatArray,
 ) -> list[str]:
     out = [
         f"the mass at node {p} is {m:.4g} kg, not positive: no physical model; use other nodes or more modes"
@@ -390,6 +462,12 @@ def _warnings(
     ]
     if np.isnan(omega).any():
         out.append("with these masses the model has modes that do not vibrate")
+    out += [
+        f"mode {k} of the model does not have the shape of the rotor's (MAC {value:.2f}, below {ALIKE}): "
+        "do not rely on its frequency; use other nodes or more masses"
+        for k, value in enumerate(agreement, start=1)
+        if not value >= ALIKE
+    ]
     if (sensitivity > SENSITIVE / 0.01).any():
         moves = ", ".join(f"{x:.0f} %" for x in sensitivity)
         out.append(

@@ -156,12 +156,130 @@ def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):
 
 
 def test_reduce_takes_stations(cli, files):
-    by_name = cli("reduce", files[0], "--nodes", "probe,wheel,6", "--modes", 2, "--json")
-    if by_name.code == 0:
-        assert by_name.json["nodes"] == [2, 4, 6]
-    else:
-        # What reduction cannot do with such supports is one sentence, not about names.
-        assert "station" not in by_name.err
+    by_name = cli("reduce", files[0], "--nodes", "probe,wheel,6", "--modes", 2, "--json").json
+    assert by_name["nodes"] == [2, 4, 6]
+    said = " ".join(by_name["warnings"])
+    assert "plane x of the rotor at rest" in said
+    assert "at 50 rad/s, the lowest of their tables" in said
+    at = cli("reduce", files[0], "--nodes", "probe,wheel,6", "--speed", "100,200")
+    assert "--speed takes one speed" in at.err
+    at = cli("reduce", files[0], "--nodes", "probe,wheel,6", "--speed", "2000", "--json").json
+    assert at["rotor_frequencies_rad_s"][0] > by_name["rotor_frequencies_rad_s"][0]
+
+
+def test_speeds_in_any_order_and_more_than_once(cli, files):
+    for command in (
+        ("campbell",),
+        ("influence", "--planes", "wheel", "--sensors", "probe"),
+        ("response", "--unbalance", files[1]),
+    ):
+        mixed, sorted_ = (
+            cli(command[0], files[0], *command[1:], "--speeds", text, "--json").json
+            for text in ("300,100,100,200", "100,200,300")
+        )
+        del mixed["provenance"], sorted_["provenance"]
+        assert mixed == sorted_
+
+
+@pytest.mark.parametrize("damping", [100.0, 5e3])
+def test_peaks_do_not_depend_on_the_steps(cli, tmp_path, damping):
+    rotor = fem.Rotor(
+        [0.1] * 8,
+        0.05,
+        discs=[fem.Disc(4, 30.0)],
+        supports=[fem.Support(1, 5e7, damping), fem.Support(9, ((5e7, 0.0), (0.0, 4.8e7)), damping)],
+        stations={"disc": 4},
+    )
+    write_rotor(tmp_path / "r.toml", rotor)
+    write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], ["disc", 100, 0]])
+    found, said = [], []
+    for step in ("0.37", "7", "90"):
+        command = (
+            "response",
+            tmp_path / "r.toml",
+            "--unbalance",
+            tmp_path / "u.csv",
+            "--speeds",
+            f"50:700:{step}",
+        )
+        found.append(cli(*command, "--json").json)
+        said.append(cli(*command).out)
+    fine = found[0]
+    assert len(fine["peaks"]) >= 1
+    for other, text in zip(found, said, strict=True):
+        for key in ("speed_rad_s", "amplitude", "amplification_factor"):
+            np.testing.assert_allclose(
+                [peak[key] for peak in other["peaks"]], [peak[key] for peak in fine["peaks"]], rtol=1e-4
+            )
+        top = max(peak["amplitude"] for peak in other["peaks"])
+        assert other["largest"][0]["amplitude_m"] == pytest.approx(top, rel=1e-3)
+        np.testing.assert_allclose(
+            other["bearing_forces"]["largest_N"], fine["bearing_forces"]["largest_N"], rtol=0.02
+        )
+        assert "smaller steps" not in text
+        assert "amplitude, µm" in text
+
+
+def test_an_undamped_rotor_has_peaks_without_amplitude(cli, tmp_path):
+    rotor = fem.Rotor([0.1] * 8, 0.05, supports=[fem.Support(1, 5e7), fem.Support(9, 5e7)])
+    write_rotor(tmp_path / "r.csv", rotor)
+    write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], ["4", 100, 0]])
+    command = ("response", tmp_path / "r.csv", "--unbalance", tmp_path / "u.csv", "--speeds", "100:1100:9")
+    outcome = cli(*command)
+    assert "practically undamped" in outcome.out
+    document = cli(*command, "--sensors", "4", "--json").json
+    assert [peak["amplification_factor"] for peak in document["peaks"]] == [None]
+    assert [peak["amplitude"] for peak in document["peaks"]] == [None]
+    assert document["peaks"][0]["speed_rad_s"] == pytest.approx(
+        fem.critical_speeds(rotor, 1).frequencies[0], rel=1e-5
+    )
+
+
+def test_a_free_rotor_at_rest_does_not_move(cli, tmp_path):
+    write_rotor(tmp_path / "r.csv", fem.Rotor([0.1] * 8, 0.05))
+    write_csv(tmp_path / "u.csv", [["plane", "unbalance_g_mm", "angle_deg"], ["4", 100, 0]])
+    document = cli(
+        "response", tmp_path / "r.csv", "--unbalance", tmp_path / "u.csv", "--speeds", "0,50,100",
+        "--sensors", "1,4", "--json",
+    ).json  # fmt: skip
+    assert [row[0] for row in document["amplitude_m"]] == [0.0, 0.0]
+    assert min(row[1] for row in document["amplitude_m"]) > 0
+
+
+def test_criticals_in_the_operating_range_are_listed(cli, files):
+    first, second = cli("critical", files[0], "-n", 2, "--json").json["critical_speeds_rad_s"]
+    band = f"{0.9 * first}:{first + 0.5 * (second - first)}"
+    command = ("critical", files[0], "-n", 2, "--operating", band)
+    operating = cli(*command, "--json").json["operating"]
+    assert operating["range_rad_s"] == pytest.approx([0.9 * first, (first + second) / 2])
+    inside, outside = operating["critical_speeds"]
+    assert (inside["inside"], inside["separation_percent"]) == (True, 0.0)
+    assert outside["inside"] is False
+    assert outside["separation_percent"] == pytest.approx(100 * (second / ((first + second) / 2) - 1))
+    assert "INSIDE" in cli(*command).out
+    command = ("campbell", files[0], "--speeds", "50:800:50", "--operating", "50:800")
+    document = cli(*command, "--json").json
+    assert len(document["operating"]["critical_speeds"]) == len(document["damped_critical_speeds"]) > 0
+    assert all(item["inside"] for item in document["operating"]["critical_speeds"])
+    assert "operating range" in cli(*command).out
+
+
+def test_the_map_says_what_it_leaves_out(cli, tmp_path):
+    rotor = fem.Rotor(
+        [0.1] * 8,
+        0.05,
+        supports=[
+            fem.Support(1, 5e7, name="front"),
+            fem.Support(9, 5e7, name="rear", pedestal=fem.Pedestal(50.0, 2e8)),
+            fem.Support(5, -1e4, kind="seal", name="labyrinth"),
+        ],
+    )
+    write_rotor(tmp_path / "r.toml", rotor)
+    said = " ".join(cli("critical", tmp_path / "r.toml", "-n", 1, "--map", "--json").json["warnings"])
+    assert "'labyrinth' is left out" in said
+    assert "'rear'" in said
+    assert "pedestal" in said
+    assert "front" not in said
 
 
 OK_SPEEDS = ("--speeds", "100:200:50")
@@ -170,7 +288,7 @@ BAD = [
     (("campbell", "R", *OK_SPEEDS, "-n", "0"), "-n"),
     (("campbell", "R", *OK_SPEEDS, "-n", "500"), "500 modes cannot be found"),
     (("campbell", "R", *OK_SPEEDS, "--operating", "9:5"), "--operating '9:5' is not a range"),
-    (("campbell", "R", "--speeds", "200,100"), "ascend"),
+    (("reduce", "R", "--nodes", "2,4", "--speed", "20"), "'rear' at node 7: its table holds 50 to 2000"),
     (("response", "R", "--unbalance", "U", "--speeds", "100:2500:100"), "'rear' at node 7"),
     (("response", "R", "--unbalance", "none.csv", *OK_SPEEDS), "none.csv"),
     (("response", "R", "--unbalance", "U", *OK_SPEEDS, "--sensors", "prope"), "no station is called 'prope'"),
@@ -243,7 +361,9 @@ def test_unbalance_of_one_node_adds_up(model, tmp_path):
 
 def test_nodes_sensors_and_ranges_of_the_command_line():
     assert nodes("7, impeller 3,12", "--planes") == [7, "impeller 3", 12]
-    assert sensors("2:45,probe DE:-30.5,22,a:b") == [(2, 45.0), ("probe DE", -30.5), 22, "a:b"]
+    assert sensors("2:45,probe DE:-30.5,22") == [(2, 45.0), ("probe DE", -30.5), 22]
+    with pytest.raises(ValueError, match=r"--sensors: 'abc' is no angle"):
+        sensors("disc:abc")
     assert band("60:120rpm") == pytest.approx((2 * np.pi, 4 * np.pi))
     assert band(None) is None
 

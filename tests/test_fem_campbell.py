@@ -169,3 +169,71 @@ def test_results_speak():
 def test_bad_input(speeds, n, message):
     with pytest.raises(ValueError, match=message):
         fem.campbell(rotor23(), speeds, n)
+
+
+def isotropic():
+    """An ordinary machine on round bearings, whose pairs of modes coincide at rest."""
+    return fem.Rotor(
+        np.full(14, 0.1),
+        0.08,
+        discs=[fem.Disc(7, 80.0, 1.0, 0.6)],
+        supports=[fem.Support(2, 5e7, 2e3), fem.Support(13, 5e7, 2e3)],
+        model=fem.Model(True, True, True),
+    )
+
+
+@pytest.mark.parametrize("n", [4, 5, 6])
+def test_pairs_that_coincide_at_rest_are_not_cut(n):
+    found = fem.campbell(isotropic(), np.linspace(0.0, 20000.0, 201), n)
+    assert np.isfinite(found.frequencies).all()
+    assert found.warnings == ()
+    assert found.direction[0].tolist() == [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0][:n]
+    assert (found.direction == found.direction[0]).all()
+    # All damped critical speeds from the bottom up: those of many more modes begin with them.
+    more = fem.campbell(isotropic(), np.linspace(0.0, 20000.0, 201), 10)
+    np.testing.assert_allclose(found.critical_speeds, more.critical_speeds[: found.critical_speeds.size])
+    assert found.critical_speeds.size == n
+
+
+def test_numbers_do_not_depend_on_the_grid():
+    grids = [np.linspace(0.0, 20000.0, 201), np.linspace(0.0, 20000.0, 21), np.arange(10.0, 20000.0, 370.0)]
+    first, *others = [fem.campbell(isotropic(), grid) for grid in grids]
+    for other in others:
+        np.testing.assert_allclose(other.critical_speeds, first.critical_speeds, rtol=1e-9)
+        assert other.critical_modes.tolist() == first.critical_modes.tolist()
+        assert other.warnings == first.warnings == ()
+
+
+def test_a_mode_that_grows_is_said_from_its_threshold_on():
+    rotor = dataclasses.replace(symmetric(), material_damping=np.full(23, 2e-4))
+    threshold = fem.stability_threshold(rotor, 3000.0)
+    found = fem.campbell(rotor, np.linspace(0.0, 3000.0, 31), 4)
+    assert found.unstable[0].speed == pytest.approx(threshold.threshold, rel=1e-6)
+    assert found.unstable[0].mode == threshold.mode
+    assert found.unstable[0].frequency == pytest.approx(threshold.frequency, rel=1e-6)
+    assert found.unstable[0].log_decrement == found.log_decrements[:, threshold.mode - 1].min() < 0
+    assert f"mode {threshold.mode} (forward whirl" in found.warnings[0]
+    assert f"grows above {threshold.threshold:.6g} rad/s" in found.warnings[0]
+    document = found.to_dict()["unstable"]
+    assert document[0]["speed_rad_s"] == found.unstable[0].speed
+    assert not document[0]["from_start"]
+    below = fem.campbell(rotor, np.linspace(0.0, 0.99 * threshold.threshold, 11), 4)
+    assert below.unstable == ()
+    assert below.warnings == ()
+    above = fem.campbell(rotor, np.linspace(1.01 * threshold.threshold, 3000.0, 11), 4)
+    assert above.unstable[0].from_start
+    assert "grows already at" in above.warnings[0]
+
+
+def test_a_rotor_that_is_pushed_aside_is_refused():
+    base = machine()
+    pushed = dataclasses.replace(base, supports=[*base.supports, fem.Support(12, -1e9, kind="seal")])
+    with pytest.raises(ValueError, match="statically unstable"):
+        fem.campbell(pushed, [0.0, 100.0])
+
+
+def test_undamped_decrements_have_no_sign():
+    text = fem.campbell(symmetric(damping=0.0), np.linspace(0.0, 1300.0, 20), 8).summary()
+    assert "0.0000" in text
+    assert "-0.0000" not in text
+    assert "-0.0000" not in fem.whirl_modes(symmetric(damping=0.0), 300.0, 8).summary()

@@ -28,7 +28,11 @@ def test_jeffcott_whatever_the_step(steps, zeta):
     assert peak.speed == pytest.approx(speed, rel=1e-7)
     assert peak.below == pytest.approx(below, rel=1e-8)
     assert peak.above == pytest.approx(above, rel=1e-8)
-    assert peak.amplification == pytest.approx(speed / (above - below), rel=1e-7)
+    if np.count_nonzero((speeds >= below) & (speeds <= above)) >= 3:
+        assert peak.amplification == pytest.approx(speed / (above - below), rel=1e-7)
+    else:  # for other curves than this one the interpolation would not be sure
+        assert peak.amplification is None
+        assert "smaller steps" in peak.note
     assert peak.amplitude == pytest.approx(1 / (2 * zeta * math.sqrt(1 - zeta**2)), rel=1e-8)
 
 
@@ -39,7 +43,27 @@ def test_a_given_function_replaces_interpolation():
     speed, below, above = closed_form(0.02)
     assert peak.speed == pytest.approx(speed, rel=1e-6)
     assert peak.amplification == pytest.approx(speed / (above - below), rel=1e-6)
-    assert "fewer than three speeds" in peak.note
+    assert peak.note == ""
+
+
+def test_what_the_steps_do_not_show_is_not_said():
+    speeds = np.linspace(60.0, 140.0, 9)
+    (peak,) = fem.find_peaks(speeds, jeffcott(speeds, 0.001), operating=(120.0, 130.0)).peaks
+    assert peak.amplification is None
+    assert peak.required is None
+    assert not peak.undamped
+    assert "take smaller steps" in peak.note
+
+
+def test_an_undamped_peak_has_no_amplitude():
+    speeds = np.sort(np.concatenate([np.linspace(60.0, 140.0, 50), 100 + 1e-5 * np.arange(-9.5, 10)]))
+    found = fem.find_peaks(speeds, jeffcott(speeds, 1e-12), operating=(120.0, 130.0))
+    (peak,) = found.peaks
+    assert peak.undamped
+    assert peak.amplification is None
+    assert peak.required == 16.0
+    assert "practically undamped" in found.summary()
+    assert found.to_dict()["peaks"][0]["amplitude"] is None
 
 
 def test_peaks_of_a_rotor_do_not_depend_on_the_step():
@@ -146,6 +170,8 @@ def test_results_speak():
     speeds = np.linspace(3.0, 400.0, 300)
     found = fem.find_peaks(speeds, jeffcott(speeds, 0.05), operating=(110.0, 150.0))
     assert "NOT ENOUGH" in found.summary()
+    assert "amplitude, µm" in found.summary("µm", 1e6)
+    assert f"{1e6 * found.peaks[0].amplitude:.5g}" in found.summary("µm", 1e6)
     assert len(found.to_frame()) == 1
     assert found.to_dict()["peaks"][0]["enough"] is False
 

@@ -183,3 +183,46 @@ def test_wrong_shapes_are_refused():
         equivalent_masses(np.eye(2), [0.0], np.ones((2, 1)))
     with pytest.raises(ValueError, match="node at the first mass"):
         equivalent_masses(np.eye(2), [1.0], [[0.0], [1.0]])
+
+
+def test_the_plane_at_rest_of_an_anisotropic_gyroscopic_rotor():
+    parts = {"discs": [fem.Disc(4, 30.0, 2.0, 1.0), fem.Disc(8, 20.0, 1.0, 0.6)]}
+    stand = fem.Pedestal(5.0, (3e8, 1e8), 1e3)
+    turning = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        **parts,
+        supports=[
+            fem.Support(1, ((2e7, 3e6), (-3e6, 5e7)), 2e3),
+            fem.Support(11, [1e7, 3e7], 1e3, speeds=(100.0, 500.0), pedestal=stand),
+        ],
+        model=fem.Model(shear=True, rotary_inertia=True, gyroscopic=True),
+    )
+    still = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        **parts,
+        supports=[fem.Support(1, 2e7), fem.Support(11, 1e7, pedestal=fem.Pedestal(5.0, 3e8))],
+        model=fem.Model(shear=True, rotary_inertia=True),
+    )
+    a, b = reduce(turning, [4, 8], 2), reduce(still, [4, 8], 2)
+    np.testing.assert_allclose(a.masses.solution, b.masses.solution, rtol=1e-9)
+    np.testing.assert_allclose(a.rotor_frequencies, b.rotor_frequencies, rtol=1e-9)
+    assert "plane x of the rotor at rest" in a.warnings[0]
+    assert "100 rad/s, the lowest of their tables" in a.warnings[1]
+    assert not any("gyroscopic" in text for text in a.warnings[1:])
+    assert not any("at rest" in text for text in b.warnings)
+    stiffer = reduce(turning, [4, 8], 2, speed=500.0)
+    assert (stiffer.rotor_frequencies > a.rotor_frequencies).all()
+    assert "500 rad/s, chosen in their tables" in stiffer.warnings[1]
+    with pytest.raises(ValueError, match="its table holds 100 to 500"):
+        reduce(turning, [4, 8], 2, speed=50.0)
+
+
+def test_a_mode_of_another_shape_is_said(rotor):
+    result = reduce(rotor, [7, 12, 18], 2)
+    assert not any("MAC" in text for text in result.warnings)
+    clumsy = reduce(rotor, [3, 4, 5], 3)
+    low = clumsy.mac < 0.9
+    assert low.any()
+    assert [f"mode {k + 1} of the model" in " ".join(clumsy.warnings) for k in range(3)] == low.tolist()

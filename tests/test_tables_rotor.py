@@ -259,7 +259,6 @@ BAD_FILES = [
         "3",
         "did you mean 'damping_N_s_per_m'?",
     ),
-    ("stiffness_N_per_m = 1e7", "", "bearing[1].stiffness_N_per_m", None, "the stiffness of the bearing"),
     ('shaft = "shaft.csv"', "", "shaft", None, "the file of the shaft"),
     ('shaft = "shaft.csv"', "shaft = 3", "shaft", "3", "a text in quotes"),
 ]

@@ -133,7 +133,7 @@ BAD_BEARINGS = [
     ((SCALAR, "kxx = 1e7", "kyy = 1e7"), "kxx", "10000000.0", "either stiffness_N_per_m or kxx_N_per_m, "),
     ((SCALAR, "damping_N_s_per_m = 1", "cxx = 3", "cyy = 3"), "cxx", "3", "not some of both"),
     (("kxx = 1e7",), "kyy_N_per_m", None, "kyy too, as kxx is given"),
-    (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "cxx_N_s_per_m", None, "cxx too, as cxy is given"),
+    (("kxx = 1e7", "kyy = 1e7", "cxy = 3", "cyy = 3"), "cxx_N_s_per_m", None, "cxx too, as cyy is given"),
     (("kxx = 1e7", "kyy = 1e7", "kxx_N_per_m = 1e7"), "kxx", "10000000.0", "the coefficient once, kxx"),
     ((SCALAR, "kyz = 3"), "kyz", "3", "a known key (did you mean 'k"),
     ((SCALAR, "pedestal_mass_kg = 3"), "pedestal_stiffness_N_per_m", None, "the stiffness of the pedestal"),
@@ -142,7 +142,9 @@ BAD_BEARINGS = [
     (("kxx = nan", "kyy = 1"), "kxx", "nan", "a finite number"),
     ((SCALAR, 'kind = "bearings"'), "kind", "bearings", "did you mean 'bearing'?"),
     ((SCALAR, "tilting_stiffness_N_m_per_rad = -1"), "tilting_stiffness_N_m_per_rad", "-1", "0 or more"),
-    (("damping_N_s_per_m = 3",), "stiffness_N_per_m", None, "the stiffness of the bearing"),
+    (("tilting_stiffness_N_m_per_rad = 3",), "stiffness_N_per_m", None, "the stiffness of the bearing, or"),
+    (("kxx = -5e7", "kyy = 5e7"), "kxx", "-50000000.0", "a finite number, 0 or more"),
+    ((SCALAR, "cxx = 1", "cyy_N_s_per_m = -1"), "cyy_N_s_per_m", "-1", "a finite number, 0 or more"),
     (("table = 3",), "table", "3", "a text in quotes"),
     (('table = "b.csv"', SCALAR), "kxx_N_per_m", "kxx_N_per_m", "either stiffness_N_per_m or"),
     (('table = "b.csv"', "kxx = 3"), "kxx", "3", "has a column kxx_N_per_m"),
@@ -191,7 +193,7 @@ def test_bad_tables_of_bearings(file, table, row, column, value, words):
 def test_a_table_of_one_speed_or_of_none_at_all(file):
     write_csv(file.folder / "b.csv", TABLE[:2])
     problems = complaints(file, bearing('table = "b.csv"'))
-    the_only(problems, "rotor.toml", None, "bearing[1]", None, "speeds must be at least two")
+    the_only(problems, "b.csv", 2, "speed_rad_s", str(TABLE[1][TABLE[0].index("speed_rad_s")]), "two speeds")
     problems = complaints(file, bearing('table = "c.csv"'))
     the_only(problems, "c.csv", None, None, None, "did you mean 'b.csv'?")
 
@@ -203,6 +205,30 @@ def test_a_negative_stiffness_is_for_seals(file):
     assert seal.stiffness == (-1e5, -2e5)
     problems = complaints(file, bearing('table = "s.csv"'))
     assert [(p.row, p.expected) for p in problems] == [(2, "0 or more"), (3, "0 or more")]
+    write_csv(
+        file.folder / "s.csv", [["speed_Hz", "kxx_N_per_m", "kyy_N_per_m"], [1, 1e5, 1e5], [2, 1e5, -1]]
+    )
+    assert the_support(file, 'table = "s.csv"', kind="seal").stiffness == (1e5, ((1e5, 0.0), (0.0, -1.0)))
+    (problem,) = complaints(file, bearing('table = "s.csv"'))
+    assert (problem.row, problem.column, problem.expected) == (3, "kyy_N_per_m", "0 or more")
+    assert the_support(file, "kxx = -1", "kyy = -2", kind="seal").stiffness == ((-1.0, 0.0), (0.0, -2.0))
+
+
+def test_dampers_and_cross_coupling_alone_are_supports(file):
+    assert the_support(file, "damping_N_s_per_m = 3").damping == 3
+    seal = the_support(file, "cxx = 3", "cyy = 4", kind="seal")
+    assert (seal.stiffness, seal.damping) == (0.0, ((3.0, 0.0), (0.0, 4.0)))
+    seal = the_support(file, "kxy = 1e6", "kyx = -1e6", kind="seal")
+    assert (seal.stiffness, seal.damping) == (((0.0, 1e6), (-1e6, 0.0)), 0.0)
+    write_csv(file.folder / "d.csv", [["speed_Hz", "damping_N_s_per_m"], [1, 5], [2, 6]])
+    assert the_support(file, 'table = "d.csv"').damping == (5.0, 6.0)
+
+
+@pytest.mark.parametrize("name", ["disc:a", "left, right"])
+def test_names_that_a_command_line_would_take_apart_are_refused(file, name):
+    (problem,) = complaints(file, f'[[station]]\nname = "{name}"\nnode = 2\n{bearing(SCALAR)}')
+    assert problem.value == name
+    assert "without ':' and ','" in problem.expected
 
 
 BAD_DISCS = [
@@ -260,7 +286,7 @@ SIZE = st.floats(1e-6, 1e12) | st.floats(1e-30, 1e30)
 ANY = SIZE | st.just(0.0)
 SIGNED = ANY | SIZE.map(lambda value: -value)
 NAME = st.text(st.characters(exclude_categories=["Cs"]), max_size=6)
-STATION = NAME.filter(lambda name: name.strip() and not name.strip().isdecimal())
+STATION = NAME.filter(lambda name: name.strip() and not name.strip().isdecimal() and not {*name} & {*":,"})
 
 
 def per_element(n, numbers):
@@ -271,7 +297,7 @@ def per_element(n, numbers):
 def supports(draw, n):
     kind = draw(st.sampled_from(["bearing", "seal"]))
     scalar = SIGNED if kind == "seal" else ANY
-    matrix = st.tuples(st.tuples(SIGNED, SIGNED), st.tuples(SIGNED, SIGNED))
+    matrix = st.tuples(st.tuples(scalar, SIGNED), st.tuples(SIGNED, scalar))
     entry = scalar | matrix
     speeds = tuple(sorted(draw(st.sets(ANY, min_size=2, max_size=4)))) if draw(st.booleans()) else ()
     values = [

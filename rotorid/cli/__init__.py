@@ -9,7 +9,7 @@ import warnings
 
 import typer
 
-from rotorid.cli import balance, campbell, critical, demo, identify, influence, reduce, response
+from rotorid.cli import balance, campbell, critical, demo, fit, identify, influence, reduce, response
 
 app = typer.Typer(
     name="rotorid",
@@ -26,6 +26,7 @@ app.command("influence")(influence.influence)
 app.command("balance")(balance.balance)
 app.command("reduce")(reduce.reduce)
 app.command("identify")(identify.identify)
+app.command("fit")(fit.fit)
 
 
 def _version(show: bool) -> None:

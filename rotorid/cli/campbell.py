@@ -15,7 +15,9 @@ from rotorid.cli.common import (
     band,
     check_targets,
     emit,
-    speeds,
+    rising_speeds,
+    separation,
+    separation_text,
 )
 from rotorid.cli.progress import busy
 
@@ -49,16 +51,20 @@ def campbell(
 
     check_targets(plot, output)
     service = band(operating)
-    model, omega = read_rotor(rotor), speeds(speed)
+    model, omega = read_rotor(rotor), rising_speeds(speed)
     with busy(f"whirl at {len(omega)} speeds"):
         result = fem.campbell(model, omega, n)
 
     def picture() -> Figure:
         return campbell_figure(result, result.criticals, operating=service)
 
+    document = result.to_dict()
+    inside = None if service is None else separation([float(c[0]) for c in result.criticals], service)
+    if inside is not None:
+        document["operating"] = inside
     emit(
-        result.to_dict(),
-        result.summary,
+        document,
+        lambda: "\n".join([result.summary(), *([] if inside is None else [separation_text(inside)])]),
         as_json=json,
         files=rotor_files(rotor),
         options={"speeds": speed, "number": n, "operating": operating},

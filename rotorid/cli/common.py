@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
@@ -165,21 +166,21 @@ def sensors(text: str) -> list[str | int | tuple[str | int, float]]:
     """Read "2,22:45,probe DE:-30" as nodes with angles in degrees from x, with the rotation; 0 without."""
     found: list[str | int | tuple[str | int, float]] = []
     for part in text.split(","):
-        head, colon, tail = part.rpartition(":")
+        head, colon, tail = part.partition(":")
         angle = _angle(tail) if colon else None
-        (node,) = nodes(part if angle is None else head, "--sensors")
+        (node,) = nodes(head, "--sensors")
         found.append(node if angle is None else (node, angle))
     return found
 
 
-def _angle(text: str) -> float | None:
-    """Degrees; None for what is no number, which belongs to the name of a station."""
+def _angle(text: str) -> float:
+    """Degrees; names of stations hold no colon, so this can be nothing else."""
     try:
         angle = float(text)
     except ValueError:
-        return None
+        angle = float("nan")
     if not -360 <= angle <= 360:
-        raise ValueError(f"--sensors: {text} is no angle from -360 to 360 degrees")
+        raise ValueError(f"--sensors: {text.strip()!r} is no angle from -360 to 360 degrees")
     return angle
 
 
@@ -205,6 +206,35 @@ def band(text: str | None) -> tuple[float, float] | None:
             f"--operating {text!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
         )
     return low * factor, high * factor
+
+
+def separation(criticals: Iterable[float], operating: tuple[float, float]) -> dict[str, Any]:
+    """Which critical speeds, rad/s, lie in the operating range, and how far off the others are.
+
+    The distance is in percent of the nearest end of the range (API 684).
+    """
+    low, high = operating
+    rows = []
+    for speed in criticals:
+        below = 100 * (low - speed) / low if low > 0 else 0.0
+        margin = 100 * (speed - high) / high if speed > high else max(0.0, below)
+        rows.append(
+            {"speed_rad_s": float(speed), "inside": low <= speed <= high, "separation_percent": float(margin)}
+        )
+    return {"range_rad_s": [low, high], "critical_speeds": rows}
+
+
+def separation_text(operating: Mapping[str, Any]) -> str:
+    """The result of `separation` for an engineer."""
+    low, high = operating["range_rad_s"]
+    rpm = 60 / (2 * math.pi)
+    lines = [f"operating range {low:.6g} to {high:.6g} rad/s ({low * rpm:.6g} to {high * rpm:.6g} rpm)"]
+    for row in operating["critical_speeds"]:
+        where = "INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} % away"
+        lines.append(f"{row['speed_rad_s']:14.4f} rad/s {row['speed_rad_s'] * rpm:14.2f} rpm   {where}")
+    if not operating["critical_speeds"]:
+        lines.append("no critical speed was found")
+    return "\n".join(lines)
 
 
 def _unit(text: str) -> tuple[str, float]:
@@ -254,6 +284,19 @@ def speeds(text: str, unit: str = "rad_s") -> list[float]:
     if min(values) < 0:
         raise ValueError(f"--speeds {text!r}: speeds must be finite and not negative")
     return [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+
+
+def rising_speeds(text: str) -> list[float]:
+    """`speeds` in ascending order, each once."""
+    return sorted(set(speeds(text)))
+
+
+def one_speed(text: str, what: str) -> float:
+    """Read "9000rpm" as one speed, rad/s."""
+    values = speeds(text)
+    if len(values) != 1:
+        raise ValueError(f"{what} takes one speed, such as 9000rpm; got {text!r}")
+    return values[0]
 
 
 def _speed(text: str) -> tuple[float, str] | None:

@@ -17,6 +17,8 @@ from rotorid.cli.common import (
     check_targets,
     emit,
     picture,
+    separation,
+    separation_text,
 )
 from rotorid.cli.progress import busy
 
@@ -55,14 +57,18 @@ def critical(
     with busy("critical speeds"):
         modes = fem.critical_speeds(model, n)
         mesh = fem.mesh_check(model, n) if mesh_check else None
-        chart = _map(model, n) if speed_map else None
+        chart, left_out = _map(model, n) if speed_map else (None, [])
 
+    modes = dataclasses.replace(modes, warnings=(*modes.warnings, *left_out))
     document: dict[str, Any] = modes.to_dict()
+    inside = None if service is None else separation(modes.frequencies.tolist(), service)
+    if inside is not None:
+        document["operating"] = inside
     if mesh is not None:
         document["mesh_check"] = mesh.to_dict()
     if chart is not None:
         document["map"] = chart.to_dict()
-    parts = [part for part in (modes, mesh, chart) if part is not None]
+    parts = [part for part in (mesh, chart) if part is not None]
 
     def draw(ax: Any) -> object:  # noqa: ANN401
         if chart is None:
@@ -71,7 +77,13 @@ def critical(
 
     emit(
         document,
-        lambda: "\n\n".join(part.summary() for part in parts),
+        lambda: "\n\n".join(
+            [
+                modes.summary(),
+                *([] if inside is None else [separation_text(inside)]),
+                *(part.summary() for part in parts),
+            ]
+        ),
         as_json=json,
         files=rotor_files(rotor),
         options={"number": n, "mesh_check": mesh_check, "map": speed_map, "operating": operating},
@@ -80,8 +92,8 @@ def critical(
     )
 
 
-def _map(model: Rotor, n: int) -> SpeedMap:
-    """The map of the bearings, two decades around the stiffness they have.
+def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
+    """The map of the bearings, two decades around the stiffness they have, and what it leaves out.
 
     What a seal adds is not known when the stiffness of the bearings is chosen: seals are left out.
     """
@@ -95,4 +107,22 @@ def _map(model: Rotor, n: int) -> SpeedMap:
     )
     own = own[own > 0]
     stiffness = np.geomspace(own.min() / 100, own.max() * 100, 49) if own.size else None
-    return fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
+    chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
+    met = {item.support for item in chart.intersections}
+    said = []
+    for i, support in enumerate(model.supports, start=1):
+        name = repr(support.name) if support.name else f"{i} at node {support.node}"
+        if support.kind == "seal":
+            said.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
+        elif support.pedestal is not None:
+            said.append(
+                f"map: bearing {name} stands on the ground there; of its pedestal the stiffness counts in "
+                "the bearing's own line, mass and damping are left out"
+            )
+    for i, bearing in enumerate(bearings, start=1):
+        if (bearing.name or f"support {i}") not in met:
+            said.append(
+                f"map: no critical speed meets the stiffness of bearing {bearing.name or i!r}: it has "
+                "none, or its table ends before"
+            )
+    return chart, said

@@ -14,7 +14,7 @@ from rotorid.cli.common import (
     check_targets,
     emit,
     nodes,
-    speeds,
+    rising_speeds,
 )
 from rotorid.cli.common import sensors as parse_sensors
 from rotorid.cli.progress import busy
@@ -53,7 +53,7 @@ def influence(
 
     check_targets(plot, output)
     model = read_rotor(rotor)
-    at, read, omega = nodes(planes, "--planes"), parse_sensors(sensors), speeds(speed)
+    at, read, omega = nodes(planes, "--planes"), parse_sensors(sensors), rising_speeds(speed)
     with busy(f"influence coefficients at {len(omega)} speeds"):
         result = fem.influence(model, at, read, omega)
     emit(

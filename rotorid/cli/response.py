@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,11 +19,13 @@ from rotorid.cli.common import (
     band,
     check_targets,
     emit,
+    one_speed,
     picture,
-    speeds,
+    rising_speeds,
 )
 from rotorid.cli.common import sensors as parse_sensors
 from rotorid.cli.progress import busy
+from rotorid.cli.refine import refine, response_from_rest, settle
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,29 +89,40 @@ def response(
     model = read_rotor(rotor)
     service = band(operating)
     places = _places(model, sensors)
-    omega = sorted(set(speeds(speed)))
+    omega = rising_speeds(speed)
     mounted = read_unbalance(unbalance, model)
     with busy(f"response at {len(omega)} speeds"):
-        result = fem.unbalance_response(model, mounted, omega)
-    Z = np.stack([result.at(place) for place in places], axis=1)
+        result = response_from_rest(model, mounted, omega)
     labels = [str(fem.sensors.label(place)) for place in places]
-    with busy("peaks"):
-        peaks = _peaks(result, places, Z, service)
+    finer, peaks = result, []
+    if np.count_nonzero(result.speeds) >= 3:  # rest is no part of a peak
+        with busy("peaks"):
+            finer = refine(result, places)
+            moving = finer.speeds > 0
+            peaks = [
+                fem.find_peaks(finer.speeds[moving], np.abs(finer.at(place))[moving], operating=service)
+                for place in places
+            ]
+            finer = settle(finer, peaks, result.speeds)
+    if any(peak.undamped for found in peaks for peak in found.peaks):
+        text = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
+        result, finer = (dataclasses.replace(r, warnings=(*r.warnings, text)) for r in (result, finer))
+    Z = np.stack([finer.at(place) for place in places], axis=1)
     drawn = {
-        View.BODE: lambda: _bode(result, Z, labels, peaks, service),
-        View.POLAR: lambda: _polar(result, Z, labels),
-        View.ORBITS: picture(lambda ax: _orbits(result, places, at, Z, ax), 7.5, 7.0),
+        View.BODE: lambda: _bode(finer, Z, labels, peaks, service),
+        View.POLAR: lambda: _polar(finer, Z, labels),
+        View.ORBITS: picture(lambda ax: _orbits(finer, places, at, Z, ax), 7.5, 7.0),
     }
     if at is not None:
         _index(result, at)
     emit(
-        _document(result, places, labels, peaks),
-        lambda: _summary(result, Z, labels, peaks),
+        _document(result, finer, places, labels, peaks),
+        lambda: _summary(result, finer, Z, labels, peaks),
         as_json=json,
         files=[*rotor_files(rotor), unbalance],
         options={"speeds": speed, "sensors": sensors, "operating": operating},
         figure=(plot, drawn[view]),
-        table=(output, lambda: _frame(result, Z, labels)),
+        table=(output, lambda: _frame(result, places, labels)),
     )
 
 
@@ -123,32 +137,6 @@ def _places(rotor: Rotor, sensors: str | None) -> list[SensorLike]:
         return places
     nodes = dict.fromkeys(support.node for support in rotor.supports)
     return [*rotor.stations] or [*nodes] or [*range(1, rotor.n_nodes + 1)]
-
-
-def _peaks(
-    result: Response,
-    places: list[SensorLike],
-    Z: np.ndarray[Any, Any],
-    operating: tuple[float, float] | None,
-) -> list[Peaks]:
-    """Peaks of each reading, with more speeds around each, so that the steps asked for do not matter."""
-    import fem
-
-    omega = result.speeds
-    if omega.size < 3:
-        return []
-    for _ in range(2):
-        size = np.abs(Z)
-        summits = np.flatnonzero(((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])).any(axis=1)) + 1
-        if not summits.size:
-            break
-        closer = [np.linspace(omega[k - 1], omega[k + 1], 41) for k in summits]
-        omega = np.unique(np.concatenate([omega, *closer]))
-        # speeds that differ by rounding alone would make summits of rounding
-        omega = omega[np.diff(omega, prepend=-np.inf) > 1e-7 * omega]
-        finer = fem.unbalance_response(result.rotor, result.unbalance, omega)
-        Z = np.stack([finer.at(place) for place in places], axis=1)
-    return [fem.find_peaks(omega, np.abs(reading), operating=operating) for reading in Z.T]
 
 
 def _orbit_data(result: Response, places: list[SensorLike]) -> dict[str, Any]:
@@ -170,14 +158,25 @@ def _orbit_data(result: Response, places: list[SensorLike]) -> dict[str, Any]:
 
 
 def _document(
-    result: Response, places: list[SensorLike], labels: list[str], peaks: list[Peaks]
+    result: Response, finer: Response, places: list[SensorLike], labels: list[str], peaks: list[Peaks]
 ) -> dict[str, Any]:
+    """At the speeds asked for; what is largest, and the peaks, with the speeds between them."""
     document = result.to_dict(places)
     warnings = document.pop("warnings")
+    sizes = [np.abs(finer.at(place)) for place in places]
+    forces = finer.bearing_forces().largest
     return {
         **document,
         "orbits": _orbit_data(result, places),
-        "bearing_forces": result.bearing_forces().to_dict(),
+        "largest": [
+            {"sensor": name, "amplitude_m": float(A.max()), "speed_rad_s": float(finer.speeds[A.argmax()])}
+            for name, A in zip(labels, sizes, strict=True)
+        ],
+        "bearing_forces": {
+            **result.bearing_forces().to_dict(),
+            "largest_N": forces.max(axis=0).tolist(),
+            "largest_at_rad_s": finer.speeds[forces.argmax(axis=0)].tolist(),
+        },
         "peaks": [
             {"sensor": label, **peak}
             for label, found in zip(labels, peaks, strict=False)
@@ -187,25 +186,34 @@ def _document(
     }
 
 
-def _summary(result: Response, Z: np.ndarray[Any, Any], labels: list[str], peaks: list[Peaks]) -> str:
-    lines = [result.summary(), "", f"{'sensor':>20}{'largest, µm':>14}{'at rpm':>10}"]
+def _summary(
+    result: Response, finer: Response, Z: np.ndarray[Any, Any], labels: list[str], peaks: list[Peaks]
+) -> str:
+    # How many speeds were asked for, and what is largest with those between.
+    lines = [
+        *result.summary().splitlines()[:1],
+        *finer.summary().splitlines()[1:],
+        "",
+        f"{'sensor':>20} {'largest, µm':>14} {'at rpm':>11}",
+    ]
     for k, label in enumerate(labels):
         size = np.abs(Z[:, k])
         i = int(np.argmax(size))
-        lines.append(f"{label:>20}{1e6 * size[i]:14.4g}{result.speeds[i] * 30 / np.pi:10.0f}")
+        lines.append(f"{label:>20} {1e6 * size[i]:14.4g} {finer.speeds[i] * 30 / np.pi:11.1f}")
     if result.rotor.supports:
-        lines += ["", result.bearing_forces().summary()]
+        lines += ["", finer.bearing_forces().summary()]
     for label, found in zip(labels, peaks, strict=False):
-        lines += ["", f"peaks at {label}", found.summary()]
+        lines += ["", f"peaks at {label}", found.summary("µm", 1e6)]
     return "\n".join(lines)
 
 
-def _frame(result: Response, Z: np.ndarray[Any, Any], labels: list[str]) -> pd.DataFrame:
+def _frame(result: Response, places: list[SensorLike], labels: list[str]) -> pd.DataFrame:
     """One row per speed and sensor."""
     import pandas as pd
 
     from fem.response import phase_degrees
 
+    Z = np.stack([result.at(place) for place in places], axis=1)
     S, C = Z.shape
     return pd.DataFrame(
         {
@@ -271,10 +279,8 @@ def _orbits(
 
 def _index(result: Response, at: str) -> int:
     """The speed nearest to one asked for, which must lie among them."""
-    wanted = speeds(at)
-    if len(wanted) != 1:
-        raise ValueError(f"--at takes one speed, such as 9000rpm; got {at!r}")
+    wanted = one_speed(at, "--at")
     low, high = result.speeds[0], result.speeds[-1]
-    if not low * (1 - 1e-9) <= wanted[0] <= high * (1 + 1e-9):
+    if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
         raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
-    return int(np.argmin(np.abs(result.speeds - wanted[0])))
+    return int(np.argmin(np.abs(result.speeds - wanted)))

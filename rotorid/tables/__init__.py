@@ -9,7 +9,9 @@ from rotorid.tables.harmonicfile import HarmonicFile, read_harmonic_model
 from rotorid.tables.influence import influence_frame, read_influence, write_influence
 from rotorid.tables.job import Job, job_from_files, read_job
 from rotorid.tables.measurements import read_measurements
+from rotorid.tables.odefile import read_ode_model
 from rotorid.tables.problems import InputError, Problem, TableWarning
+from rotorid.tables.records import read_record
 from rotorid.tables.rotor import read_rotor
 from rotorid.tables.rotorfile import rotor_files
 from rotorid.tables.rotorwriting import write_rotor
@@ -31,6 +33,8 @@ __all__ = [
     "read_influence",
     "read_job",
     "read_measurements",
+    "read_ode_model",
+    "read_record",
     "read_rotor",
     "read_trials",
     "read_unbalance",

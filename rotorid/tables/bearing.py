@@ -24,6 +24,8 @@ ENTRIES = {
     "stiffness": {name: f"{name}_N_per_m" for name in ("kxx", "kxy", "kyx", "kyy")},
     "damping": {name: f"{name}_N_s_per_m" for name in ("cxx", "cxy", "cyx", "cyy")},
 }
+DIAGONAL = ("kxx", "kyy", "cxx", "cyy")
+"""What pushes back, or brakes, in a bearing; the others may have either sign."""
 TILTING = "tilting_stiffness_N_m_per_rad"
 PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_N_s_per_m")
 _STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)
@@ -81,9 +83,10 @@ def read_support(
     stiffness = _quantity("stiffness", coefficients)
     damping = _quantity("damping", coefficients)
     if stiffness is None:
-        if len(problems) == settled:
-            coefficients.missing(SCALARS["stiffness"], f"the stiffness of the {kind}")
-        return None
+        if len(problems) == settled and damping is None:
+            coefficients.missing(SCALARS["stiffness"], f"the stiffness of the {kind}, or its damping")
+            return None
+        stiffness = 0.0  # a damper
     if where is None or len(problems) > before:
         return None
     try:
@@ -121,7 +124,7 @@ def _coefficients(section: Section, folder: Path, kind: Kind, problems: Problems
     for quantity, scalar in SCALARS.items():
         _take(section, quantity, (scalar,), low, values, complain)
         for name, full in ENTRIES[quantity].items():
-            _take(section, name, (full, name), -math.inf, values, complain)
+            _take(section, name, (full, name), low if name in DIAGONAL else -math.inf, values, complain)
     file = section.text("table")
     if file is None:
         return None if "table" in section else _Coefficients(values, complain, section.missing)
@@ -134,8 +137,10 @@ def _coefficients(section: Section, folder: Path, kind: Kind, problems: Problems
         expected = f"a column of coefficients, such as {listing(c.names[0] for c in COLUMNS[1:4])}"
         problems.add(table.source, table.header_row, COLUMNS[1].names[0], None, expected)
         return None
-    for name in SCALARS:
+    for name in (*SCALARS, *DIAGONAL):
         must_be(table, name, table.numbers(name) >= low, "0 or more", problems)
+    if len(table) == 1:
+        table.complain(problems, 0, "speed", "two speeds at least: a table says how coefficients change")
     for name in present:
         if name in values:
             complain[name](f"nothing: {table.source} has a column {table.fields[name].name}")
@@ -192,12 +197,10 @@ def _quantity(quantity: str, given: _Coefficients) -> Coefficient | tuple[Coeffi
     if not used:
         return None
     first, *_, last = entries
-    complete = True
-    for name in (first, last):
-        if name not in used:
-            given.missing(entries[name], f"{name} too, as {used[0]} is given")
-            complete = False
-    if not complete:
+    diagonal = [name for name in (first, last) if name in used]
+    if len(diagonal) == 1:  # none is cross-coupling alone
+        (name,) = {first, last} - {*diagonal}
+        given.missing(entries[name], f"{name} too, as {diagonal[0]} is given")
         return None
     xx, xy, yx, yy = entries
     return _over_speed(given, lambda at: ((at(xx), at(xy)), (at(yx), at(yy))))

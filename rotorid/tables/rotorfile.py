@@ -103,6 +103,8 @@ def _stations(sections: list[Section], n_nodes: int) -> dict[str, int]:
             section.complain("name", "a name that no other station has")
         elif name.strip().isdecimal():
             section.complain("name", "a name, not a number, which would read as a node")
+        elif ":" in name or "," in name:
+            section.complain("name", "a name without ':' and ',', which separate names on the command line")
         elif name.strip() and node is not None:
             names[name] = node
     return names

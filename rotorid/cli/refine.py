@@ -1,0 +1,166 @@
+"""More speeds around the peaks of a response, so that the steps asked for do not matter."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from fem import Peaks, Response, Rotor
+    from fem.sensors import SensorLike
+
+FloatArray = NDArray[np.float64]
+
+_INSIDE = 2  # speeds within the half-power band on either side of a summit: five with the summit
+_FINEST = 2e-7  # relative step; finer ones would show rounding
+_ROUNDS = 14
+_MOST = 30_000  # speeds
+_AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
+_CRITICALS = 32
+
+
+def response_from_rest(
+    model: Rotor, unbalance: Mapping[int, complex], speeds: Sequence[float] | FloatArray
+) -> Response:
+    """`fem.unbalance_response`, also of a free rotor at rest: without rotation there is no force.
+
+    Parameters
+    ----------
+    model, unbalance
+        As there.
+    speeds
+        rad/s, ascending.
+    """
+    import fem
+
+    omega = np.asarray(speeds, dtype=float)
+    known = all(not support.speeds or support.speeds[0] == 0 for support in model.supports)
+    if omega[0] > 0 or omega.size < 2 or not known:
+        return fem.unbalance_response(model, unbalance, omega)
+    moving = fem.unbalance_response(model, unbalance, omega[1:])
+    rest = np.zeros((1, model.n_nodes), dtype=complex)
+    return dataclasses.replace(
+        moving,
+        speeds=omega,
+        amplitudes=np.concatenate((rest, moving.amplitudes)),
+        backward=np.concatenate((rest, moving.backward)),
+    )
+
+
+def refine(result: Response, places: Iterable[SensorLike]) -> Response:
+    """The response with at least five speeds in the half-power band of each peak of each reading.
+
+    Speeds near the undamped critical speeds come first, as a sharp peak between two steps may not show at
+    all. Bounded: what is not resolved with steps of 2e-7 of the speed counts as undamped.
+
+    Parameters
+    ----------
+    result
+        At three speeds or more; its speeds stay among those returned.
+    places
+        Where it is read.
+    """
+    places = list(places)
+    omega = result.speeds
+    near = np.add.outer(_criticals(result), np.zeros(_AROUND.size)) * (1 + _AROUND)
+    extra = near[(near > omega[0]) & (near < omega[-1])]
+    for _ in range(_ROUNDS):
+        merged = _with(result, extra)
+        if merged is None:
+            break
+        result = merged
+        moving = result.speeds > 0
+        readings = [np.abs(result.at(place))[moving] for place in places]
+        extra = np.array([speed for A in readings for speed in _closer(result.speeds[moving], A)])
+        if not extra.size or result.speeds.size + extra.size > _MOST:
+            break
+    return result
+
+
+def settle(result: Response, peaks: Iterable[Peaks], asked: FloatArray) -> Response:
+    """With the speeds of the peaks, but without those added beside undamped peaks.
+
+    There the amplitude has no limit and no meaning.
+    """
+    tops = []
+    keep = np.ones(result.speeds.size, dtype=bool)
+    for found in peaks:
+        for peak in found.peaks:
+            if peak.undamped:
+                keep &= np.abs(result.speeds - peak.speed) > 1e-2 * peak.speed
+            else:
+                tops.append(peak.speed)
+    kept = _at(result, keep | np.isin(result.speeds, asked))
+    return _with(kept, np.array(tops)) or kept
+
+
+def _criticals(result: Response) -> FloatArray:
+    """Undamped critical speeds up to the highest speed; none where they cannot be found."""
+    import fem
+
+    n, found = 4, np.zeros(0)
+    while n <= _CRITICALS:
+        try:
+            found = fem.critical_speeds(result.rotor, n).frequencies
+        except ValueError:
+            break  # fewer modes than that, or none inside the tables
+        if found.size < n or found[-1] > result.speeds[-1]:
+            break
+        n *= 2
+    return found
+
+
+def _with(result: Response, extra: FloatArray) -> Response | None:
+    """The response at more speeds; None where the rotor cannot run at one of them (undamped, critical)."""
+    import fem
+
+    omega = result.speeds
+    # Speeds that differ by rounding alone would make summits of rounding.
+    extra = np.unique(extra)
+    extra = extra[np.diff(extra, prepend=-np.inf) > _FINEST / 2 * extra]
+    if extra.size:
+        right = np.searchsorted(omega, extra)
+        gaps = np.minimum(
+            np.abs(extra - omega[right - 1]), np.abs(omega[np.minimum(right, omega.size - 1)] - extra)
+        )
+        extra = extra[gaps > _FINEST / 2 * extra]
+    if not extra.size:
+        return result
+    try:
+        more = fem.unbalance_response(result.rotor, result.unbalance, extra)
+    except ValueError:
+        return None
+    order = np.argsort(np.concatenate((omega, extra)), kind="stable")
+
+    def both(name: str) -> NDArray[Any]:
+        return np.asarray(np.concatenate((getattr(result, name), getattr(more, name)))[order])
+
+    return dataclasses.replace(
+        result, speeds=both("speeds"), amplitudes=both("amplitudes"), backward=both("backward")
+    )
+
+
+def _closer(omega: FloatArray, A: FloatArray) -> list[float]:
+    """Speeds beside each summit of one reading whose half-power band holds too few."""
+    wanted: list[float] = []
+    for k in np.flatnonzero((A[1:-1] > A[:-2]) & (A[1:-1] >= A[2:])) + 1:
+        high = A[k - _INSIDE if k >= _INSIDE else 0 : k + _INSIDE + 1] >= np.sqrt(0.5) * A[k]
+        if high.all() and high.size == 2 * _INSIDE + 1:
+            continue
+        for a, b in ((omega[k - 1], omega[k]), (omega[k], omega[k + 1])):
+            if b - a > _FINEST * b:
+                wanted += np.linspace(a, b, 10)[1:-1].tolist()
+    return wanted
+
+
+def _at(result: Response, keep: NDArray[np.bool_]) -> Response:
+    return dataclasses.replace(
+        result,
+        speeds=result.speeds[keep],
+        amplitudes=result.amplitudes[keep],
+        backward=result.backward[keep],
+    )

@@ -1,0 +1,240 @@
+"""Model files for identification from time records: states, outputs, what to estimate."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid import expressions
+from rotorid.expressions import ExpressionError, is_name
+from rotorid.tables.harmonicfile import pair
+from rotorid.tables.matrixform import read_matrices
+from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.tomlfile import Section, read_toml
+
+if TYPE_CHECKING:
+    from rotorid.timedomain.model import OdeModel
+
+_KEYS = (
+    "M",
+    "C",
+    "K",
+    "coordinates",
+    "force",
+    "inputs",
+    "states",
+    "initial",
+    "outputs",
+    "estimate",
+    "known",
+    "bounds",
+)
+_A_NAME = "names: a letter, then letters, digits and _; not t and no function"
+
+
+def read_ode_model(path: str | Path) -> OdeModel:
+    """Read a model file (`ode.toml`).
+
+    Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number, or an
+    expression of parameters), `[outputs]` (name = "expression"; default: the states), `[estimate]` (name =
+    starting value), optional `[known]` (name = number) and `[bounds]` (name = [lowest, highest]), and
+    `inputs`, a list of measured inputs (columns of the record). Without states the outputs are functions of
+    the time.
+
+    Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
+    parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
+    velocity of y1 is v_y1) and `[force]` (y1 = "expression"). Initial values are 0 then where none is given.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    OdeModel
+
+    Raises
+    ------
+    InputError
+        With all problems of the file, each with its key.
+    """
+    path = Path(path)
+    problems = Problems()
+    data = read_toml(path, problems)
+    if data is None:
+        problems.stop()
+        raise AssertionError("no file and no problem")
+    section = Section(str(path), data, problems)
+    inputs = _inputs(section)
+    known = _numbers(section, "known")
+    estimate = _numbers(section, "estimate")
+    others = [key for key in section.keys if key not in _KEYS]
+    if not estimate and not any(did_you_mean(key, ["estimate"]) for key in others):
+        section.missing("estimate", "[estimate] with name = starting value for at least one parameter")
+    matrices = read_matrices(section)
+    states = _texts(section, "states") if matrices is None else matrices.rates
+    outputs = _texts(section, "outputs")
+    if not states and not outputs and not len(problems):
+        section.missing("states", '[states] with name = "rate of change", such as x = "-a*x", or [outputs]')
+    _once(section, {"states": states, "estimate": estimate, "known": known, "inputs": inputs})
+    constants = [*estimate, *known]
+    everything = ["t", *states, *constants, *inputs]
+    _readable(section, "states", states, everything, problems)
+    _readable(section, "outputs", outputs, everything, problems)
+    initial = _initial(section, states, constants, problems, complete=matrices is None)
+    force = {} if matrices is None else _texts(section, "force")
+    _readable(section, "force", force, everything, problems)
+    bounds = _bounds(section, estimate)
+    section.finish()
+    model = None
+    if not len(problems):
+        from rotorid.timedomain.model import ode_model
+        from rotorid.timedomain.second_order import second_order
+
+        given: dict[str, Any] = {
+            "initial": initial,
+            "outputs": outputs or None,
+            "estimate": estimate,
+            "known": known,
+            "inputs": inputs,
+            "bounds": bounds,
+        }
+        try:
+            if matrices is None:
+                model = ode_model(states, **given)
+            else:
+                form = (matrices.M, matrices.C, matrices.K)
+                model = second_order(*form, names=matrices.coordinates, force=force, **given)
+        except ValueError as error:
+            problems.add(str(path), None, None, None, f"a usable model: {error}")
+    problems.stop()
+    if model is None:
+        raise AssertionError("no model and no problem")
+    return model
+
+
+def _named(inner: Section, key: str) -> bool:
+    """Whether a key is a name; otherwise a complaint."""
+    if is_name(key) and key != "t":
+        return True
+    inner.take(key)
+    inner.complain(key, _A_NAME, value=False)
+    return False
+
+
+def _numbers(section: Section, table: str) -> dict[str, float]:
+    inner = section.section(table)
+    found: dict[str, float] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is not None and _named(inner, name):
+            # zero stands for a value that has been complained about: its name stays known
+            found[name] = inner.number(name, 0.0) or 0.0
+    return found
+
+
+def _texts(section: Section, table: str) -> dict[str, str]:
+    """Expressions by name; a plain number is one, too."""
+    inner = section.section(table)
+    found: dict[str, str] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None or not _named(inner, name):
+            continue
+        value = inner.take(name)
+        if isinstance(value, str) and value.strip():
+            found[name] = value
+        elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            found[name] = repr(float(value))
+        else:
+            inner.complain(name, 'an expression in quotes, such as "-a*x"')
+            found[name] = "0"
+    return found
+
+
+def _inputs(section: Section) -> list[str]:
+    value = section.take("inputs")
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        section.complain("inputs", 'a list of names, such as inputs = ["u"], at the top of the file')
+        return []
+    for item in value:
+        if not is_name(item) or item == "t":
+            section.complain("inputs", f"{_A_NAME}; {item!r} is none", value=False)
+    return [item for item in value if is_name(item) and item != "t"]
+
+
+def _once(section: Section, groups: dict[str, dict[str, str] | dict[str, float] | list[str]]) -> None:
+    """Complain about a name that means two things."""
+    seen: dict[str, str] = {}
+    for table, names in groups.items():
+        for name in names:
+            if name in seen:
+                place = table if table == "inputs" else f"{table}.{name}"
+                section.complain(place, f"another name: {name} stands in {seen[name]} already", value=False)
+            seen.setdefault(name, table)
+
+
+def _readable(
+    section: Section, table: str, texts: dict[str, str], allowed: list[str], problems: Problems
+) -> None:
+    """Complain about expressions that cannot be read or use unknown names."""
+    for name, text in texts.items():
+        key = f"{table}.{name}"
+        try:
+            used = expressions.names(expressions.parse(text, where=key))
+        except ExpressionError as error:
+            problems.add(section.source, None, key, None, f"an expression that can be read: {error}")
+            continue
+        for other in sorted(used - set(allowed)):
+            hint = did_you_mean(other, allowed)
+            expected = (
+                f"names of the model only, and {other} is none{hint}; they are {listing(allowed, 'and')}"
+            )
+            problems.add(section.source, None, key, text, expected)
+
+
+def _initial(
+    section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
+) -> dict[str, float | str]:
+    """Initial values, `complete` if those of all states must be given."""
+    inner = section.section("initial")
+    found: dict[str, float | str] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None:
+            continue
+        value = inner.take(name)
+        if name not in states:
+            inner.complain(name, f"a name of [states]{did_you_mean(name, states)}", value=False)
+        elif isinstance(value, str) and value.strip():
+            found[name] = value
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            found[name] = inner.number(name, 0.0) or 0.0
+        else:
+            inner.complain(name, "a number, or an expression of parameters in quotes")
+    texts = {name: value for name, value in found.items() if isinstance(value, str)}
+    _readable(section, "initial", texts, constants, problems)
+    given = () if inner is None else inner.keys
+    for name in states if complete else ():
+        if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
+            section.missing(f"initial.{name}", f"the value of {name} at the first time of the record")
+    return found
+
+
+def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:
+    inner = section.section("bounds")
+    found: dict[str, tuple[float, float]] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None:
+            continue
+        limits = pair(inner.take(name))
+        if name not in estimate:
+            inner.complain(name, f"a name of [estimate]{did_you_mean(name, estimate)}", value=False)
+        elif limits is None:
+            inner.complain(name, "two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
+        elif not limits[0] <= estimate[name] <= limits[1]:
+            inner.complain(name, f"limits that hold the starting value {estimate[name]:g}")
+        else:
+            found[name] = limits
+    return found

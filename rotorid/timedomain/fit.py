@@ -1,0 +1,251 @@
+"""Fit a model in time to records: the methods behind one function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rotorid.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.search import inside
+from rotorid.timedomain.gauss_newton import gauss_newton
+from rotorid.timedomain.honesty import judge
+from rotorid.timedomain.model import OdeModel
+from rotorid.timedomain.path import Path
+from rotorid.timedomain.problem import RTOL, Problem
+from rotorid.timedomain.quasilinearization import quasilinearization
+from rotorid.timedomain.record import Record
+from rotorid.timedomain.result import Fit, Minimum
+from rotorid.timedomain.shooting import shoot
+from rotorid.timedomain.simulate import SimulationError
+from rotorid.timedomain.starts import merge, spread_starts
+from rotorid.timedomain.trajectory import Curve, given_trajectory, measured_trajectory, own_trajectory
+
+FloatArray = NDArray[np.float64]
+METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
+Searching = Callable[[FloatArray], Path]
+Trajectories = str | Mapping[str, str | float | ArrayLike]
+
+
+def fit(
+    model: OdeModel,
+    records: Record | Sequence[Record],
+    *,
+    method: str = "levenberg-marquardt",
+    integrator: str = "auto",
+    start: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    loss: str = "linear",
+    starts: int = 1,
+    trajectory: Trajectories | None = None,
+    pieces: int | None = None,
+    max_iterations: int = 100,
+    tolerance: float = 1e-9,
+    rtol: float = RTOL,
+    seed: int = 0,
+) -> Fit:
+    """Estimate the parameters of a model from time records.
+
+    Parameters
+    ----------
+    model
+        Of `ode_model` or `second_order`.
+    records
+        One, or several that share the parameters.
+    method
+        "levenberg-marquardt": safeguarded, with bounds and robust losses; "gauss-newton": as [F];
+        "quasilinearization": as [Q]; "multiple-shooting": for long or oscillating records and bad starts,
+        then Levenberg–Marquardt.
+    integrator
+        Of `simulate`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
+    start
+        Starting values by name, instead of the model's.
+    bounds
+        {name: (lower, upper)}, instead of the model's; not for Gauss–Newton and quasilinearization.
+    loss
+        "linear" (least squares), or "huber", "soft_l1", "cauchy" against gross errors.
+    starts
+        Number of starts: the first is `start`, the others spread over the bounds, or around it.
+    trajectory
+        First trajectory of quasilinearization and multiple shooting: "model" (its own solution), "data" (from
+        the measured outputs), or {state: expression of t, number, or one value per time}. Default: "model"
+        for quasilinearization, "data" for multiple shooting.
+    pieces
+        Of a record in multiple shooting; default: at most 12.
+    max_iterations
+        At most.
+    tolerance
+        Relative change of the parameters below which Gauss–Newton and quasilinearization stop.
+    rtol
+        Of the integration.
+    seed
+        Of the other starts.
+
+    Raises
+    ------
+    ValueError
+        Unknown names or methods, records that do not suit the model.
+    SimulationError
+        The states diverge with the starting values.
+
+    Examples
+    --------
+    >>> from rotorid.timedomain import ode_model
+    >>> model = ode_model({"x": "-a*x"}, initial={"x": 1.0}, estimate={"a": 0.5})
+    >>> found = fit(model, Record(np.array([0.0, 1, 2, 3]), {"x": np.array([1.0, 0.37, 0.13, 0.05])}))
+    >>> print(found.values.round(3), found.converged)
+    [1.003] True
+    """
+    if method not in METHODS:
+        raise ValueError(f"no method {method!r}; methods are {', '.join(METHODS)}")
+    plain = method in ("gauss-newton", "quasilinearization")
+    if plain and loss != "linear":
+        raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
+    if plain and bounds:
+        raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
+    if method == "quasilinearization" and integrator == "rk4":
+        raise ValueError("quasilinearization integrates with heun, or with error control (auto)")
+    if starts < 1 or max_iterations < 1:
+        raise ValueError("starts and max_iterations must be at least 1")
+    several = (records,) if isinstance(records, Record) else tuple(records)
+    problem = Problem(model, several, integrator, rtol)
+    limits = _bounds(model, bounds)
+    first = inside(_start(model, start), limits[:, 0], limits[:, 1])
+    kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
+
+    def search(theta: FloatArray) -> Path:
+        if method == "gauss-newton":
+            return gauss_newton(problem, theta, max_iterations=max_iterations, tolerance=tolerance)
+        if method == "quasilinearization":
+            curves = _curves(problem, theta, kind)
+            return quasilinearization(
+                problem, theta, curves, max_iterations=max_iterations, tolerance=tolerance
+            )
+        begin = theta
+        if method == "multiple-shooting":
+            curves = _curves(problem, theta, kind)
+            begin = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=pieces)
+        path = _levenberg_marquardt(problem, begin, limits, loss, max_iterations)
+        if begin is theta:
+            return path
+        costs = np.append(np.nan, path.costs)
+        return replace(path, history=np.vstack((theta, path.history)), costs=costs)
+
+    path, minima = search_all(search, spread_starts(first, limits, starts, seed), model.parameters)
+    judged = judge(problem, path, loss)
+    simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
+    warnings = judged.warnings
+    if len(minima) > 1:
+        warnings = (*warnings, f"{len(minima)} different minima were found; the best is given, see minima")
+    if plain and _outside(path.estimate.solution, model.bounds):
+        warnings = (*warnings, f"{method} knows no bounds, and the result lies outside those of the model")
+    return Fit(
+        model=model,
+        records=several,
+        method=method,
+        integrator=simulations[0].method if simulations else integrator,
+        loss=loss,
+        estimate=judged.estimate,
+        history=path.history,
+        costs=path.costs,
+        converged=path.converged,
+        message=path.message,
+        at_bounds=path.at_bounds,
+        reliable=judged.reliable,
+        warnings=warnings,
+        simulations=simulations,
+        minima=minima,
+        integration_change=judged.integration_change,
+        autocorrelation=judged.autocorrelation,
+        residual_rms=_rms(problem, path.estimate.residuals),
+        trajectories=path.trajectories,
+    )
+
+
+def search_all(
+    search: Searching, begins: Sequence[FloatArray], names: tuple[str, ...]
+) -> tuple[Path, tuple[Minimum, ...]]:
+    """The best of several searches, and all minima; a start from which the states diverge is left out."""
+    paths: list[Path] = []
+    failure: SimulationError | None = None
+    for begin in begins:
+        try:
+            paths.append(search(begin))
+        except SimulationError as error:
+            failure = failure or error
+    if not paths:
+        assert failure is not None
+        raise failure
+    # one that did not converge is no minimum, but is given if nothing else is better than nothing
+    best = min(paths, key=lambda p: (not p.converged, float(p.estimate.residuals @ p.estimate.residuals)))
+    return best, merge([p for p in paths if p.converged], names) if len(begins) > 1 else ()
+
+
+def _levenberg_marquardt(
+    problem: Problem, start: FloatArray, limits: FloatArray, loss: str, max_iterations: int
+) -> Path:
+    problem.evaluate(start)  # says why, where the states diverge
+    names = problem.model.parameters
+
+    def search(near: bool) -> NonlinearEstimate:
+        return nonlinear_least_squares(
+            problem.residual,
+            problem.jacobian,
+            start,
+            names=names,
+            sigma_stated=problem.stated,
+            bounds={name: (low, high) for name, (low, high) in zip(names, limits.tolist(), strict=True)},
+            loss=loss,
+            max_iterations=max_iterations,
+            near=near,
+        )
+
+    found = search(near=loss == "linear")
+    if loss == "linear" and not found.estimate.full_rank:
+        found = search(near=False)  # Gauss–Newton alone does not see how far the combinations still are
+    return Path(found.estimate, found.history, found.costs, found.converged, found.message, found.at_bounds)
+
+
+def _curves(problem: Problem, theta: FloatArray, kind: Trajectories) -> list[Curve]:
+    if isinstance(kind, Mapping):
+        return [given_trajectory(problem.model, kind, record) for record in problem.records]
+    if kind == "data":
+        return [measured_trajectory(problem.model, theta, record) for record in problem.records]
+    if kind != "model":
+        raise ValueError(f"no starting trajectory {kind!r}: it is 'model', 'data', or given by state")
+    return [own_trajectory(problem, theta, record) for record in problem.records]
+
+
+def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:
+    values = dict(zip(model.parameters, model.start.tolist(), strict=True))
+    for name, value in (start or {}).items():
+        if name not in values:
+            raise ValueError(f"start: {name} is no parameter; parameters are {', '.join(values)}")
+        values[name] = float(value)
+    found = np.array(list(values.values()))
+    if not np.isfinite(found).all():
+        raise ValueError("starting values must be finite numbers")
+    return found
+
+
+def _bounds(model: OdeModel, bounds: Mapping[str, tuple[float, float]] | None) -> FloatArray:
+    table = model.bounds.copy()
+    for name, (low, high) in (bounds or {}).items():
+        if name not in model.parameters:
+            raise ValueError(f"bounds: {name} is no parameter; parameters are {', '.join(model.parameters)}")
+        if not low < high:
+            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low}, {high}")
+        table[model.parameters.index(name)] = low, high
+    return table
+
+
+def _outside(theta: FloatArray, limits: FloatArray) -> bool:
+    return bool(((theta < limits[:, 0]) | (theta > limits[:, 1])).any())
+
+
+def _rms(problem: Problem, r: FloatArray) -> float:
+    """Of the residuals in the unit of the outputs, without the weights."""
+    plain = problem.vector([np.ones_like(data) for data in problem.measured])
+    return float(np.sqrt(np.mean((r / plain) ** 2)))

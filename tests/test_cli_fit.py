@@ -1,0 +1,158 @@
+"""`rotorid fit`: documents, tables, pictures, and one message for everything that cannot be fitted."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.samples import sample_data
+
+FOLDER = sample_data() / "fit"
+KEYS = {
+    "parameters", "rank", "condition_number", "identifiable", "unidentifiable", "combinations", "solutions",
+    "residual_rms", "warnings", "method", "iterations", "history", "provenance",
+}  # fmt: skip
+MODEL = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[estimate]\na = 0.5\n'
+
+
+def files(folder, record="record.csv"):
+    return FOLDER / folder / "model.toml", FOLDER / folder / record
+
+
+def saved(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def decay(t, a=1.3):
+    return "t_s,x\n" + "".join(f"{s:.3f},{np.exp(-a * s) + 1e-3 * (-1) ** i:.6f}\n" for i, s in enumerate(t))
+
+
+@pytest.mark.parametrize(
+    ("folder", "truth"),
+    [
+        ("quasilinearization", {"theta1": 1, "theta2": -1, "theta3": -1}),
+        ("three_masses", {"c1": 0.14, "m1": 12, "m2": 28}),
+        ("run_down", {"c1": 1.4e6, "c4": 1.2e6, "d1": 60, "d2": 40, "d3": 90, "blow": 0.05}),
+        ("limit_cycle", {"lambda": 3, "x0": 0.1}),
+    ],
+)
+def test_samples_give_the_truth_within_their_intervals(cli, folder, truth):
+    outcome = cli("fit", *files(folder), "--json")
+    assert outcome.code == 0, outcome.err
+    found = outcome.json
+    assert set(found) >= KEYS
+    assert found["identifiable"] is True
+    assert set(found["parameters"]) == set(truth)
+    for name, value in truth.items():
+        entry = found["parameters"][name]
+        assert abs(entry["value"] - value) < 4 * entry["std"] + 1e-9, name
+
+
+def test_history_begins_at_the_start_and_ends_at_the_result(cli):
+    found = cli("fit", *files("three_masses"), "--json").json
+    history = found["history"]
+    assert history[0]["parameters"] == {"c1": 0.1, "m1": 11.0, "m2": 23.0}
+    assert len(history) == found["iterations"] + 1
+    for name, entry in found["parameters"].items():
+        assert history[-1]["parameters"][name] == pytest.approx(entry["value"], rel=1e-9)
+    assert history[-1]["cost"] < 1e-6 * history[0]["cost"]
+
+
+def test_noisy_record_has_errors_of_the_size_of_its_noise(cli):
+    found = cli("fit", *files("quasilinearization", "record_noisy.csv"), "--json").json
+    assert 0.016 < found["residual_rms"] < 0.024
+    for name, truth in {"theta1": 1, "theta2": -1, "theta3": -1}.items():
+        entry = found["parameters"][name]
+        assert abs(entry["value"] - truth) < 4 * entry["std"]
+        assert entry["std"] < 0.01
+
+
+def test_stated_errors_scale_the_intervals(cli):
+    one, two = (
+        cli("fit", *files("limit_cycle"), "--sigma", s, "--json").json["parameters"]["lambda"]
+        for s in ("0.05", "x=0.1")
+    )
+    assert one["value"] == pytest.approx(two["value"], rel=1e-7)
+    assert 2 * one["std"] == pytest.approx(two["std"], rel=1e-5)
+
+
+def test_picture_and_table(cli, tmp_path):
+    picture, table = tmp_path / "fit.png", tmp_path / "fit.csv"
+    outcome = cli("fit", *files("three_masses"), "--plot", picture, "--output", table)
+    assert outcome.code == 0, outcome.err
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "c1" in outcome.out
+    frame = pd.read_csv(table)
+    assert list(frame.iloc[:, 0]) == ["c1", "m1", "m2"]
+
+
+def test_several_records_share_the_parameters(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", MODEL)
+    first = saved(tmp_path, "a.csv", decay(np.arange(20) / 10))
+    second = saved(tmp_path, "b.csv", decay(np.arange(30) / 20))
+    alone = cli("fit", model, first, "--json").json["parameters"]["a"]
+    both = cli("fit", model, first, second, "--json", "--plot", tmp_path / "p.svg").json
+    assert both["parameters"]["a"]["value"] == pytest.approx(1.3, rel=2e-3)
+    assert both["parameters"]["a"]["std"] < alone["std"]
+    assert len(both["provenance"]["inputs"]) == 3
+
+
+def test_missing_samples(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", MODEL)
+    lines = decay(np.arange(30) / 10).splitlines()
+    lines[5], lines[9] = "0.400,", "0.800,NaN"
+    record = saved(tmp_path, "r.csv", "\n".join(lines))
+    refused = cli("fit", model, record)
+    assert refused.code == 2
+    assert "--allow-missing" in refused.err
+    found = cli("fit", model, record, "--allow-missing", "--json").json
+    assert found["parameters"]["a"]["value"] == pytest.approx(1.3, rel=2e-3)
+
+
+def test_a_combination_is_named(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", MODEL.replace("-a*x", "-a*b*x") + "b = 2\n")
+    outcome = cli("fit", model, saved(tmp_path, "r.csv", decay(np.arange(20) / 10)), "--json")
+    assert outcome.code == 0
+    found = outcome.json
+    assert found["identifiable"] is False
+    assert found["parameters"]["a"]["value"] is None
+    assert found["unidentifiable"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--method", "newton"), "--method 'newton' is not known"),
+        (("--integrator", "euler"), "--integrator 'euler' is not known"),
+        (("--loss", "square"), "--loss 'square' is not known"),
+        (("--sigma", "y=1"), "no output of the model"),
+        (("--plot", "fit.txt"), "cannot write this kind of file"),
+        (("--method", "gauss-newton", "--loss", "huber"), "robust loss"),
+    ],
+)
+def test_bad_options_end_with_one_message(cli, arguments, said):
+    outcome = cli("fit", *files("limit_cycle"), *arguments)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert said in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_a_state_that_diverges_is_one_message(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", MODEL.replace("-a*x", "a*x**2").replace("a = 0.5", "a = 2.0"))
+    outcome = cli("fit", model, saved(tmp_path, "r.csv", decay(np.arange(30) / 10)))
+    assert outcome.code == 2
+    assert "t = " in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_json_has_no_nan(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", MODEL)
+    record = saved(tmp_path, "r.csv", "t_s,x\n1,1\n2,0.5\n")
+    outcome = cli("fit", model, record, "--json")
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["rank"] == 1
+    assert "NaN" not in outcome.out

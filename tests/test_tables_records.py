@@ -1,0 +1,263 @@
+"""Model files and time records: what is read, and what is said about everything that cannot be used."""
+
+import itertools
+import re
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rotorid.samples import sample_data
+from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
+from rotorid.tables.records import read_sigma
+
+FOLDER = sample_data() / "fit"
+MODEL = """
+inputs = ["u"]
+[states]
+x = "v"
+v = "-k*x - c*v + u"
+[initial]
+x = "x0"
+v = 0
+[outputs]
+y = "x"
+z = "2*v"
+[estimate]
+k = 2
+c = 0.1
+x0 = 1.0
+[known]
+g = 9.81
+[bounds]
+c = [0, inf]
+"""
+GOOD = "t_s,y,z,u\n0,1,2,3\n0.1,1.5,2.5,3.5\n0.2,2,3,4\n"
+
+
+@pytest.fixture
+def model(tmp_path):
+    return read_ode_model(saved(tmp_path, "model.toml", MODEL))
+
+
+def saved(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(read):
+    with pytest.raises(InputError) as caught:
+        read()
+    return str(caught.value)
+
+
+def test_a_model_file_with_everything(model):
+    assert model.states == ("x", "v")
+    assert model.parameters == ("k", "c", "x0")
+    assert model.outputs == ("y", "z")
+    assert model.inputs == ("u",)
+    np.testing.assert_array_equal(model.start, [2.0, 0.1, 1.0])
+    np.testing.assert_array_equal(model.bounds[1], [0.0, np.inf])
+    np.testing.assert_allclose(model.f(0.0, [1.0, 2.0], [2.0, 0.1, 1.0], [3.0]), [2.0, 0.8])
+    np.testing.assert_allclose(model.x0([2.0, 0.1, 7.0]), [7.0, 0.0])
+
+
+@pytest.mark.parametrize("folder", sorted(p.name for p in FOLDER.iterdir() if (p / "model.toml").exists()))
+def test_sample_files_can_be_read(folder):
+    model = read_ode_model(FOLDER / folder / "model.toml")
+    for path in sorted((FOLDER / folder).glob("record*.csv")):
+        record = read_record(path, model)
+        assert set(record.outputs) == set(model.outputs)
+        assert len(record.t) > 30
+
+
+def test_without_states_the_outputs_are_functions_of_time(tmp_path):
+    text = '[outputs]\ny = "a*exp(-b*t)"\n[estimate]\na = 1\nb = 2\n'
+    assert read_ode_model(saved(tmp_path, "m.toml", text)).states == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("-k*x - c*v + u", "-k*x - c*v + w", "key states.v: .*w is none"),
+        ("-k*x - c*v + u", "-kk*x - c*v + u", "kk is none .did you mean 'k'"),
+        ("-k*x - c*v + u", "-k*x - (c*v", "key states.v: expected an expression that can be read"),
+        ("-k*x - c*v + u", "__import__('os')", "key states.v"),
+        ("[outputs]", "[output]", r"key output: .*did you mean 'outputs'"),
+        ('x = "x0"\n', "", "key initial.x: expected the value of x"),
+        ('x = "x0"\n', 'x = "u"\n', "key initial.x: .*u is none"),
+        ("v = 0\n", "vv = 0\n", "key initial.vv: expected a name of .states."),
+        ("k = 2\n", 'k = "2"\n', "key estimate.k: .*without quotes"),
+        ("k = 2\n", "k = nan\n", "key estimate.k: .*finite"),
+        ("c = [0, inf]", "c = [1, 2]", "key bounds.c: .*starting value 0.1"),
+        ("c = [0, inf]", "d = [1, 2]", "key bounds.d: expected a name of .estimate."),
+        ("c = [0, inf]", "c = [2, 1]", "key bounds.c: .*lowest, highest"),
+        ('inputs = ["u"]', 'inputs = "u"', "key inputs: .*a list of names"),
+        ('inputs = ["u"]', 'inputs = ["u", "x"]', "another name: x stands in states"),
+        ("g = 9.81", "k = 9.81", "key known.k: expected another name: k stands in estimate"),
+        ("g = 9.81", "t = 9.81", "key known.t: expected names"),
+        ('y = "x"', "y = true", "key outputs.y: .*in quotes"),
+    ],
+)
+def test_complaints_about_a_model_file_name_the_key(tmp_path, old, new, said):
+    assert old in MODEL
+    path = saved(tmp_path, "m.toml", MODEL.replace(old, new, 1))
+    message = refusal(lambda: read_ode_model(path))
+    assert re.search(said, message), message
+    assert str(path) in message
+
+
+def test_all_problems_of_a_model_file_at_once(tmp_path):
+    text = MODEL.replace("k = 2", "k = true").replace('"2*v"', '"2*w"')
+    message = refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", text)))
+    assert "estimate.k" in message
+    assert "outputs.z" in message
+
+
+def test_a_model_file_without_parameters_or_states(tmp_path):
+    assert "estimate" in refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", '[states]\nx = "-x"\n')))
+    assert "states" in refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", "[estimate]\na = 1\n")))
+
+
+def test_a_record(tmp_path, model):
+    record = read_record(saved(tmp_path, "r.csv", GOOD), model)
+    np.testing.assert_array_equal(record.t, [0, 0.1, 0.2])
+    np.testing.assert_array_equal(record.outputs["z"], [2, 2.5, 3])
+    np.testing.assert_array_equal(record.inputs["u"], [3, 3.5, 4])
+    assert record.name == str(tmp_path / "r.csv")
+
+
+def test_milliseconds_and_european_excel(tmp_path, model):
+    text = "t_ms;u;z;y\n0;1,5;2;3\n100;1,25;2;3\n"
+    record = read_record(saved(tmp_path, "r.csv", text), model)
+    np.testing.assert_array_equal(record.t, [0, 0.1])
+    np.testing.assert_array_equal(record.inputs["u"], [1.5, 1.25])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.2,2,3,4", "0.1,2,3,4", r"row 4, column t_s: found '0.1', expected each time once, and row 3"),
+        ("0.2,2,3,4", "0.05,2,3,4", r"row 4, column t_s: found '0.05', expected times that increase.*sort"),
+        ("0.2,2,3,4", ",2,3,4", r"row 4, column t_s: found nothing"),
+        ("0.2,2,3,4", "0.2,,3,4", r"row 4, column y: found nothing .*--allow-missing"),
+        ("0.2,2,3,4", "0.2,nan,3,4", r"row 4, column y: found 'nan', expected a finite number"),
+        ("0.2,2,3,4", "0.2,2,3,", r"row 4, column u: found nothing"),
+        ("t_s,y,z,u", "t_s,y,zz,u", r"column zz: .*did you mean 'z'"),
+        ("t_s,y,z,u", "t,y,z,u", r"column t:"),
+        ("t_s,y,z,u", "t_s,y_mm,z,u", r"column y_mm: .*without a unit"),
+        ("t_s,y,z,u", "t_s,v,z,u", r'write v = "v" into \[outputs\]'),
+    ],
+)
+def test_complaints_about_a_record_name_row_and_column(tmp_path, model, old, new, said):
+    message = refusal(lambda: read_record(saved(tmp_path, "r.csv", GOOD.replace(old, new)), model))
+    assert re.search(said, message), message
+
+
+def test_a_missing_column_is_named(tmp_path, model):
+    path = saved(tmp_path, "r.csv", "t_s,y,u\n0,1,2\n1,2,3\n")
+    assert "column z" in refusal(lambda: read_record(path, model))
+    record = read_record(path, model, allow_missing=True)
+    assert set(record.outputs) == {"y"}
+
+
+def test_missing_samples_are_honoured_where_the_user_says_so(tmp_path, model):
+    text = GOOD.replace("0.2,2,3,4", "0.2,,NaN,4")
+    record = read_record(saved(tmp_path, "r.csv", text), model, allow_missing=True)
+    np.testing.assert_array_equal(np.isnan(record.outputs["y"]), [False, False, True])
+    np.testing.assert_array_equal(np.isnan(record.outputs["z"]), [False, False, True])
+    broken = saved(tmp_path, "s.csv", GOOD.replace("0.2,2,3,4", "0.2,2,3,nan"))
+    assert "column u" in refusal(lambda: read_record(broken, model, allow_missing=True))
+    empty = saved(tmp_path, "e.csv", "t_s,y,z,u\n0,,1,2\n1,,2,3\n")
+    assert "column y" in refusal(lambda: read_record(empty, model, allow_missing=True))
+
+
+def test_nothing_measured_at_all(tmp_path, model):
+    path = saved(tmp_path, "r.csv", "t_s,u\n0,1\n1,2\n")
+    assert "at least one output" in refusal(lambda: read_record(path, model, allow_missing=True))
+
+
+def test_a_gap_in_an_even_record_is_said(tmp_path, model):
+    rows = [f"{k / 10},1,2,3" for k in range(20) if k not in (7, 8)]
+    path = saved(tmp_path, "r.csv", "\n".join(["t_s,y,z,u", *rows]) + "\n")
+    with pytest.warns(TableWarning, match=r"a gap of 0.3 s after row 8, .* nothing is filled in"):
+        assert len(read_record(path, model).t) == 18
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_record(path, model, allow_missing=True)
+
+
+@given(st.lists(st.integers(-(10**6), 10**6), min_size=2, max_size=12))
+def test_exactly_the_increasing_times_are_accepted(tmp_path_factory, times):
+    folder = tmp_path_factory.mktemp("times")
+    model = read_ode_model(FOLDER / "limit_cycle" / "model.toml")
+    path = saved(folder, "r.csv", "t_s,x\n" + "".join(f"{t},1\n" for t in times))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TableWarning)
+        if all(a < b for a, b in itertools.pairwise(times)):
+            np.testing.assert_array_equal(read_record(path, model).t, times)
+        else:
+            assert "column t_s" in refusal(lambda: read_record(path, model))
+
+
+def test_standard_deviations(model):
+    assert read_sigma(None, model) is None
+    assert read_sigma("0.5", model) == {"y": 0.5, "z": 0.5}
+    assert read_sigma("y=1, z=2e-3", model) == {"y": 1.0, "z": 0.002}
+    for text, said in [
+        ("y=1", "of z is missing"),
+        ("q=1,z=1", "'q' is no output"),
+        ("y=-1,z=1", "no number above 0"),
+        ("much", "no number above 0"),
+        ("1,2", "name each output"),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            read_sigma(text, model)
+
+
+MATRICES = """
+M = [["m1", 0], [0, 2.0]]
+K = [["k + 1", -1], [-1, 3]]
+coordinates = ["a", "b"]
+[force]
+b = "cos(t)"
+[initial]
+a = 0.5
+[estimate]
+m1 = 4.0
+k = 1.0
+"""
+
+
+def test_a_model_of_matrices(tmp_path):
+    model = read_ode_model(saved(tmp_path, "m.toml", MATRICES))
+    assert model.states == ("a", "v_a", "b", "v_b")
+    assert model.outputs == ("a", "b")
+    rates = model.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)
+    np.testing.assert_allclose(rates, [0.3, (-2 + 2) / 4, 0.4, (1 + 1 - 6) / 2], atol=1e-15)
+    np.testing.assert_array_equal(model.x0(model.start), [0.5, 0, 0, 0])
+    damped = read_ode_model(saved(tmp_path, "d.toml", 'C = [["m1", 0], [0, 0]]' + MATRICES))
+    assert damped.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)[1] == pytest.approx(-0.3)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('M = [["m1", 0], [0, 2.0]]', "M = [[1, 2]]", "key M: .*square matrix"),
+        ('M = [["m1", 0], [0, 2.0]]', "", "key M: expected a square matrix"),
+        ('M = [["m1", 0], [0, 2.0]]', "M = [[1]]", "key K: expected 1 rows as in M"),
+        ("[-1, 3]]", "[-1, true]]", "key K: .*numbers and expressions"),
+        ('["a", "b"]', '["a"]', "key coordinates: .*2 names"),
+        ('b = "cos(t)"', 'b = "cos(w)"', "key force.b: .*w is none"),
+        ('["k + 1", -1]', '["q + 1", -1]', "a usable model: .*q"),
+        ("a = 0.5", "c = 0.5", "key initial.c"),
+        ("[force]", "[states]\nx = 1\n[force]", "either .states. or M, C and K"),
+    ],
+)
+def test_complaints_about_matrices(tmp_path, old, new, said):
+    assert old in MATRICES
+    message = refusal(lambda: read_ode_model(saved(tmp_path, "m.toml", MATRICES.replace(old, new, 1))))
+    assert re.search(said, message), message

@@ -1,0 +1,120 @@
+"""All methods on [F], starts far off, options."""
+
+import json
+
+import numpy as np
+import pytest
+from timedomain_cases import (
+    CHAIN_ERRORS,
+    CHAIN_OPTIMUM,
+    chain,
+    chain_record,
+    decay,
+    decay_record,
+    fitzhugh_nagumo,
+    fitzhugh_nagumo_record,
+)
+
+from rotorid.timedomain.fit import METHODS, fit
+from rotorid.timedomain.model import ode_model
+from rotorid.timedomain.record import Record
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_three_masses_with_each_method(method):
+    found = fit(chain(), chain_record(), method=method)
+    assert found.converged
+    assert found.values == pytest.approx(CHAIN_OPTIMUM, rel=1e-7)
+    assert found.std == pytest.approx(CHAIN_ERRORS, rel=0.05)
+    if method in ("gauss-newton", "quasilinearization"):
+        assert found.iterations <= 6
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "lsoda"])
+def test_three_masses_with_error_control(integrator):
+    found = fit(chain(), chain_record(), integrator=integrator)
+    assert found.integrator == integrator
+    assert found.values == pytest.approx(CHAIN_OPTIMUM, rel=1e-7)
+    assert np.abs(found.integration_change).max() < 1e-7
+
+
+@pytest.mark.parametrize("start", [{"a": 0.5, "b": 0.5, "c": 5.0}, {"a": 0.0, "b": 1.5, "c": 0.5}])
+def test_multiple_shooting_finds_a_limit_cycle(start):
+    found = fit(fitzhugh_nagumo(), fitzhugh_nagumo_record(), method="multiple-shooting", start=start)
+    assert found.reliable
+    assert np.abs(found.values - [0.2, 0.2, 3.0]).max() < 0.02
+    assert (np.abs(found.values - [0.2, 0.2, 3.0]) < 4 * found.std).all()
+
+
+def test_several_starts_report_minima():
+    t = np.linspace(0, 10, 101)
+    model = ode_model({}, outputs={"y": "sin(w*t)"}, estimate={"w": 5.0})
+    record = Record(t, {"y": np.sin(2 * t)})
+    one = fit(model, record, bounds={"w": (0.5, 8.0)})
+    assert not one.reliable
+    found = fit(model, record, starts=12, bounds={"w": (0.5, 8.0)})
+    assert found.values == pytest.approx([2.0], abs=1e-8)
+    assert len(found.minima) > 1
+    assert found.minima[0].cost <= found.minima[1].cost
+    assert any("different minima" in text for text in found.warnings)
+
+
+def test_robust_loss_resists_gross_errors():
+    record = decay_record()
+    x = record.outputs["x"].copy()
+    x[[5, 17, 30]] += 3.0
+    bad = Record(record.t, {"x": x})
+    assert np.abs(fit(decay(), bad).values - [0.8, 2.0]).max() > 0.05
+    assert np.abs(fit(decay(), bad, loss="cauchy").values - [0.8, 2.0]).max() < 0.02
+
+
+def test_measured_input():
+    model = ode_model({"x": "-a*x + b*u"}, initial={"x": 0.0}, inputs=["u"], estimate={"a": 1.0, "b": 1.0})
+    t = np.linspace(0, 5, 51)
+    record = Record(t, {"x": 1.5 / 4 * (2 * t - 1 + np.exp(-2 * t))}, {"u": t})
+    for method in METHODS:
+        assert fit(model, record, method=method).values == pytest.approx([2.0, 1.5], rel=1e-6)
+
+
+def test_json_and_text():
+    found = fit(chain(), chain_record())
+    data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert set(data) >= {
+        "parameters", "rank", "condition_number", "identifiable", "unidentifiable", "combinations",
+        "solutions", "residual_rms", "warnings", "method", "iterations", "history",
+    }  # fmt: skip
+    assert len(data["history"]) == data["iterations"] + 1
+    assert "levenberg-marquardt" in found.summary()
+    assert list(found.to_frame()["parameter"]) == ["c1", "m1", "m2"]
+    assert list(found.history_frame()) == ["iteration", "c1", "m1", "m2", "cost"]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"method": "newton"}, "no method"),
+        ({"start": {"z": 1.0}}, "z is no parameter"),
+        ({"bounds": {"z": (0.0, 1.0)}}, "z is no parameter"),
+        ({"bounds": {"a": (1.0, 0.0)}}, "below the upper"),
+        ({"starts": 0}, "at least 1"),
+        ({"loss": "square"}, "unknown loss"),
+    ],
+)
+def test_bad_options(options, words):
+    with pytest.raises(ValueError, match=words):
+        fit(decay(), decay_record(), **options)
+
+
+def test_bad_records():
+    t = np.arange(3.0)
+    with pytest.raises(ValueError, match="no output of the model"):
+        fit(decay(), Record(t, {"z": t}))
+    with pytest.raises(ValueError, match="no column"):
+        fit(decay(), Record(t))
+    with pytest.raises(ValueError, match="no samples"):
+        fit(decay(), Record(t, {"x": np.full(3, np.nan)}))
+    with pytest.raises(ValueError, match="at least one record"):
+        fit(decay(), [])
+    with pytest.raises(ValueError, match="for all measured outputs, or for none"):
+        fit(decay(), [Record(t, {"x": t}), Record(t, {"x": t}, sigma={"x": 1.0})])

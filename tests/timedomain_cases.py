@@ -1,0 +1,96 @@
+"""Models and records of [Q] and [F], and oscillators, for tests of fits."""
+
+import numpy as np
+
+from rotorid.timedomain.model import ode_model
+from rotorid.timedomain.record import Record
+from rotorid.timedomain.simulate import simulate
+
+CHAIN_STATES = {
+    "y1": "v1",
+    "v1": "(-(c1 + c2)*y1 + c2*y2)/m1",
+    "y2": "v2",
+    "v2": "(c2*y1 - (c2 + c3)*y2 + c3*y3)/m2",
+    "y3": "v3",
+    "v3": "(c3*y2 - (c3 + c4)*y3)/m3",
+}
+CHAIN_INITIAL = dict(zip(CHAIN_STATES, (0.5, 0.1, -0.2, -0.1, 0.3, 0.1), strict=True))
+CHAIN_OPTIMUM = np.array([0.13999975, 11.99998962, 28.00000273])
+CHAIN_ERRORS = np.array([5.6e-7, 1.2e-5, 1.0e-5])
+
+
+def chain():
+    """[F]: three masses, c1, m1 and m2 unknown."""
+    return ode_model(
+        CHAIN_STATES,
+        initial=CHAIN_INITIAL,
+        known={"c2": 0.3, "c3": 0.2, "c4": 0.12, "m3": 18.0},
+        estimate={"c1": 0.1, "m1": 11.0, "m2": 23.0},
+    )
+
+
+def chain_record():
+    """The exact record of (0.14, 12, 28), rounded to five significant digits."""
+    model, t = chain(), np.round(0.2 * np.arange(251), 10)
+    exact = simulate(model, [0.14, 12.0, 28.0], t, sensitivities=False).y
+    rounded = np.array([[float(f"{v:.4e}") for v in row] for row in exact])
+    return Record(t, dict(zip(model.outputs, rounded.T, strict=True)))
+
+
+def book_model():
+    """[Q]."""
+    return ode_model(
+        {"x1": "theta1*x2", "x2": "theta2*x1 + theta3*x2 + cos(t)"},
+        initial={"x1": 1.5, "x2": 1.0},
+        outputs={"y1": "x1 + 2*x2", "y2": "2*x1 + x2"},
+        estimate={"theta1": 0.0, "theta2": 0.0, "theta3": 0.0},
+    )
+
+
+def book_record():
+    """The closed form of [Q] at truth (1, −1, −1)."""
+    t, w = np.linspace(0.0, np.pi, 31), np.sqrt(3) / 2
+    decay, c, s = np.exp(-t / 2), np.cos(w * t), np.sin(w * t)
+    x1 = np.sin(t) + decay * (1.5 * c + w * s)
+    x2 = np.cos(t) + decay * (-0.75 * c - w / 2 * s - 1.5 * w * s + w**2 * c)
+    return Record(t, {"y1": x1 + 2 * x2, "y2": 2 * x1 + x2})
+
+
+def decay(**options):
+    return ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0}, **options)
+
+
+def decay_record(n=41, error=0.01, seed=0, **options):
+    t = np.linspace(0.0, 4.0, n)
+    noise = error * np.random.default_rng(seed).standard_normal(n)
+    return Record(t, {"x": 2.0 * np.exp(-0.8 * t) + noise}, **options)
+
+
+def fitzhugh_nagumo():
+    return ode_model(
+        {"V": "c*(V - V**3/3 + R)", "R": "-(V - a + b*R)/c"},
+        initial={"V": -1.0, "R": 1.0},
+        estimate={"a": 0.5, "b": 0.5, "c": 5.0},
+    )
+
+
+def fitzhugh_nagumo_record():
+    t, rng = np.linspace(0.0, 20.0, 201), np.random.default_rng(1)
+    y = simulate(fitzhugh_nagumo(), [0.2, 0.2, 3.0], t, sensitivities=False).y
+    y = y + 0.05 * rng.standard_normal(y.shape)
+    return Record(t, {"V": y[:, 0], "R": y[:, 1]})
+
+
+def van_der_pol():
+    return ode_model(
+        {"x": "v", "v": "lam*(1 - x**2)*v - x"},
+        initial={"x": 2.0, "v": 0.0},
+        outputs={"x": "x"},
+        estimate={"lam": 1.0},
+    )
+
+
+def van_der_pol_record(**options):
+    t, rng = np.linspace(0.0, 25.0, 126), np.random.default_rng(1)
+    x = simulate(van_der_pol(), [10.0], t, sensitivities=False).y[:, 0]
+    return Record(t, {"x": x + 0.05 * rng.standard_normal(len(t))}, **options)
