@@ -13,6 +13,7 @@ from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.mesh import MeshCheck, mesh_check, refined
 from fem.modes import Modes
+from fem.motion import Motion, equations_of_motion
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
@@ -37,6 +38,7 @@ __all__ = [
     "MeshCheck",
     "Model",
     "Modes",
+    "Motion",
     "Orbits",
     "Peak",
     "Peaks",
@@ -53,6 +55,7 @@ __all__ = [
     "compliance",
     "critical_speeds",
     "draw_rotor",
+    "equations_of_motion",
     "find_peaks",
     "influence",
     "mesh_check",

@@ -68,6 +68,9 @@ class Estimate:
         residuals (Student's t).
     chi_square
         Weighted sum of squared residuals over the stated variances; None without stated errors.
+    curved
+        What a nonlinear model determines instead of its parameters, such as products; None: linear
+        combinations.
     """
 
     names: tuple[str, ...]
@@ -83,6 +86,7 @@ class Estimate:
     chi_square: float | None
     row_space: FloatArray
     solution_covariance: FloatArray | None
+    curved: tuple[Combination, ...] | None = None
 
     @property
     def full_rank(self) -> bool:
@@ -122,11 +126,14 @@ class Estimate:
     def combinations(self) -> tuple[Combination, ...]:
         """What the data determine instead, where they do not determine every parameter (else empty).
 
-        A basis of the row space of K in reduced echelon form; combinations of a single parameter are left
-        out, for that parameter is determined.
+        Those of a nonlinear model, where they have been found (`curved`). Otherwise a basis of the row space
+        of K in reduced echelon form; combinations of a single parameter are left out, for that parameter is
+        determined.
         """
         if self.full_rank:
             return ()
+        if self.curved is not None:
+            return self.curved
         rows = echelon(self.row_space)
         return tuple(self._combination(row) for row in rows if np.count_nonzero(row) > 1)
 
@@ -139,13 +146,15 @@ class Estimate:
         """Say in words what the data determine."""
         if self.full_rank:
             n, condition = len(self.names), self.condition_number
-            return f"all {n} parameters are determined (condition number {condition:.3g})"
+            who = "the parameter is" if n == 1 else f"all {n} parameters are"
+            return f"{who} determined (condition number {condition:.3g})"
         known = [n for n in self.names if n not in self.undetermined]
         known += [c.words for c in self.combinations]
         verb = "is" if len(known) == 1 else "are"
         seen = f"only {' and '.join(known)} {verb} determined" if known else "nothing is determined"
         missing = ", ".join(self.undetermined)
-        return f"{seen}; {missing} by themselves are not (rank {self.rank} of {len(self.names)})"
+        one = "itself is" if len(self.undetermined) == 1 else "themselves are"
+        return f"{seen}; {missing} by {one} not (rank {self.rank} of {len(self.names)})"
 
     def _combination(self, row: FloatArray) -> Combination:
         cov = self.solution_covariance
@@ -205,12 +214,13 @@ class Estimate:
         name, std, ci95 = self.names[i], self.std, self.ci95
         if np.isnan(self.values[i]):
             return f"{name:<{width}} = not determined by these data"
-        text = f"{name:<{width}} = {self.values[i]:.6g}"
+        digits = _digits(self.values[i], None if std is None else std[i])
+        text = f"{name:<{width}} = {self.values[i]:.{digits}g}"
         if std is not None:
             share = f" ({100 * std[i] / abs(self.values[i]):.2g} %)" if self.values[i] else ""
             text += f" ± {std[i]:.2g}{share}"
         if ci95 is not None:
-            text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
+            text += f"   95 %: {ci95[i, 0]:.{digits}g} … {ci95[i, 1]:.{digits}g}"
         return text
 
 
@@ -272,6 +282,13 @@ def _snap(row: FloatArray) -> FloatArray:
     """Whole and half numbers that rounding has blurred become exact again."""
     near = np.round(2 * row) / 2
     return np.where(np.abs(row - near) <= WORD_TOLERANCE * np.maximum(1.0, np.abs(row)), near, row)
+
+
+def _digits(value: float, std: float | None) -> int:
+    """Significant digits of a value that show two of its standard deviation, six at least."""
+    if std is None or not (std > 0 and np.isfinite(std)) or value == 0:
+        return 6
+    return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 15))
 
 
 def _number(value: float) -> float | None:

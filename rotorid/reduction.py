@@ -248,6 +248,18 @@ class Reduction:
         """MAC of each mode with the rotor's mode of the same number, shape (n,)."""
         return np.asarray(np.diag(self.mac_matrix))
 
+    @property
+    def equations_of_motion(self) -> fem.Motion:
+        """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
+
+        The displacement of the mass at node 7 is `x7`. There is no damping: what a rotor's bearings and its
+        surroundings take out is for the user to add, or to estimate (`rotorid.timedomain.second_order`).
+        """
+        K = np.linalg.inv(self.compliance)
+        n = len(self.nodes)
+        names = tuple(f"x{node}" for node in self.nodes)
+        return fem.Motion(np.diag(self.masses.solution), np.zeros((n, n)), (K + K.T) / 2, names, 0.0)
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
         return {

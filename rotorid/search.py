@@ -177,9 +177,13 @@ def _embed(covariance: FloatArray | None, free: NDArray[np.bool_]) -> FloatArray
 
 
 def _size(step: FloatArray, x: FloatArray, judged: Estimate) -> float:
-    """Largest relative change by a step, of the parameters that the data determine."""
+    """Largest relative change by a step, of the parameters and combinations that the data determine."""
+    smallest = np.finfo(float).tiny ** 0.5
     known = ~np.isnan(judged.values)
-    change = np.abs(step[known]) / np.maximum(np.abs(x[known]), np.finfo(float).tiny ** 0.5)
+    change = np.abs(step[known]) / np.maximum(np.abs(x[known]), smallest)
+    if not known.all():
+        rows = judged.row_space
+        change = np.append(change, np.abs(rows @ step) / np.maximum(np.abs(rows) @ np.abs(x), smallest))
     return float(change.max()) if change.size else 0.0
 
 

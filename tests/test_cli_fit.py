@@ -27,7 +27,8 @@ def saved(folder, name, text):
 
 
 def decay(t, a=1.3):
-    return "t_s,x\n" + "".join(f"{s:.3f},{np.exp(-a * s) + 1e-3 * (-1) ** i:.6f}\n" for i, s in enumerate(t))
+    x = np.exp(-a * t) + 1e-3 * np.random.default_rng(1).standard_normal(len(t))
+    return "t_s,x\n" + "".join(f"{s:.3f},{v:.6f}\n" for s, v in zip(t, x, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -35,7 +36,7 @@ def decay(t, a=1.3):
     [
         ("quasilinearization", {"theta1": 1, "theta2": -1, "theta3": -1}),
         ("three_masses", {"c1": 0.14, "m1": 12, "m2": 28}),
-        ("run_down", {"c1": 1.4e6, "c4": 1.2e6, "d1": 60, "d2": 40, "d3": 90, "blow": 0.05}),
+        ("run_down", {"d_x7": 900, "d_x12": 1600, "d_x18": 1300, "m_x12": 196.6167587206449, "blow": 0.05}),
         ("limit_cycle", {"lambda": 3, "x0": 0.1}),
     ],
 )

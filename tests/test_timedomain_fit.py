@@ -28,7 +28,9 @@ def test_three_masses_with_each_method(method):
     assert found.std == pytest.approx(CHAIN_ERRORS, rel=0.05)
     if method in ("gauss-newton", "quasilinearization"):
         assert found.iterations <= 6
-    assert found.warnings == ()
+    # the record is rounded to five digits, whatever the size of a value
+    assert len(found.warnings) == 1
+    assert "the outputs have different errors" in found.warnings[0]
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "lsoda"])

@@ -54,14 +54,18 @@ def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hashlib.sha256(f.read_bytes()).hexdigest()} for f in files],
         "options": {
-            k: str(v) if isinstance(v, Path) else v for k, v in options.items() if v not in (None, False)
+            k: str(v) if isinstance(v, Path) else v
+            for k, v in options.items()
+            if v is not None and v is not False
         },
     }
 
 
-def check_targets(plot: Path | None, output: Path | None, *more: Path | None) -> None:
+def check_targets(
+    plot: Path | None, output: Path | None, *more: Path | None, model: Path | None = None
+) -> None:
     """Refuse files that could not be written, before any work is done; `more` are tables, too."""
-    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more)]
+    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more), (model, (".toml",))]
     asked: list[Path] = []
     for path, endings in targets:
         if path is None:

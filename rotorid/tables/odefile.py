@@ -23,6 +23,7 @@ _KEYS = (
     "coordinates",
     "force",
     "inputs",
+    "per_record",
     "states",
     "initial",
     "outputs",
@@ -39,8 +40,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number, or an
     expression of parameters), `[outputs]` (name = "expression"; default: the states), `[estimate]` (name =
     starting value), optional `[known]` (name = number) and `[bounds]` (name = [lowest, highest]), and
-    `inputs`, a list of measured inputs (columns of the record). Without states the outputs are functions of
-    the time.
+    `inputs`, a list of measured inputs (columns of the record), and `per_record`, a list of parameters (such
+    as unknown initial values) that every one of several records has for itself. Without states the outputs
+    are functions of the time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
@@ -68,11 +70,13 @@ def read_ode_model(path: str | Path) -> OdeModel:
         raise AssertionError("no file and no problem")
     section = Section(str(path), data, problems)
     inputs = _inputs(section)
+    own = section.take("per_record")
     known = _numbers(section, "known")
     estimate = _numbers(section, "estimate")
     others = [key for key in section.keys if key not in _KEYS]
     if not estimate and not any(did_you_mean(key, ["estimate"]) for key in others):
         section.missing("estimate", "[estimate] with name = starting value for at least one parameter")
+    own = _per_record(section, own, estimate)
     matrices = read_matrices(section)
     states = _texts(section, "states") if matrices is None else matrices.rates
     outputs = _texts(section, "outputs")
@@ -100,6 +104,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
             "known": known,
             "inputs": inputs,
             "bounds": bounds,
+            "per_record": own,
         }
         try:
             if matrices is None:
@@ -163,6 +168,20 @@ def _inputs(section: Section) -> list[str]:
         if not is_name(item) or item == "t":
             section.complain("inputs", f"{_A_NAME}; {item!r} is none", value=False)
     return [item for item in value if is_name(item) and item != "t"]
+
+
+def _per_record(section: Section, value: object, estimate: dict[str, float]) -> list[str]:
+    """Parameters that every record has for itself."""
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        section.complain("per_record", 'a list of names of [estimate], such as per_record = ["x0"]')
+        return []
+    for item in value:
+        if item not in estimate:
+            hint = did_you_mean(item, estimate)
+            section.complain("per_record", f"names of [estimate]{hint}; {item!r} is none", value=False)
+    return [item for item in value if item in estimate]
 
 
 def _once(section: Section, groups: dict[str, dict[str, str] | dict[str, float] | list[str]]) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.tables.columns import Column, Table, make_table, read_grid
+from rotorid.tables.columns import Column, FloatArray, Table, make_table, read_grid
 from rotorid.tables.grid import Cell, Grid
 from rotorid.tables.problems import Problems, TableWarning, did_you_mean, listing
 from rotorid.tables.units import Unit, UnitError, one_of
@@ -26,6 +26,8 @@ TIME = {
     "min": Unit("min", "time", 60.0),
 }
 MISSING = {"nan", "na", "n/a", "#n/a", "null", "none", "-", "--"}
+STD = "_std"
+"""At the end of the name of a column: standard deviations of the samples of an output."""
 GAP = 1.5
 """Times the usual step; a longer one in an otherwise even record is worth a word."""
 
@@ -40,7 +42,8 @@ def read_record(
     """Read a time record.
 
     Its columns are `t_s` (or `_ms`, `_us`, `_min`), increasing, and one for each output and each input of the
-    model, named exactly as there and in the units of the model.
+    model, named exactly as there and in the units of the model. Beside an output `y` there may be `y_std`,
+    the standard deviation of each of its samples, in the same unit: for all outputs or for none.
 
     Parameters
     ----------
@@ -51,7 +54,7 @@ def read_record(
     allow_missing
         Whether blank cells, NaN and absent columns of outputs mean "not measured". Inputs never may.
     sigma
-        Standard deviations of outputs by name.
+        Standard deviations of outputs by name, for a record that has none of its own.
 
     Returns
     -------
@@ -75,23 +78,23 @@ def read_record(
     table = None
     if grid is not None:
         _explain_states(grid, model, problems)
-        grid = _blank(grid, model.outputs) if allow_missing else grid
+        grid = _blank(grid, (*model.outputs, *_deviations(model).values())) if allow_missing else grid
         table = make_table(grid, _columns(model, allow_missing=allow_missing), problems)
     if table is None:
         problems.stop()
         raise AssertionError("no table and no problem")
     _complain_about_times(table, problems)
     _complain_about_outputs(table, model, problems, allow_missing=allow_missing)
+    _complain_about_deviations(table, model, problems, stated=sigma is not None)
     problems.stop()
     t = table.numbers("t")
     if not allow_missing:
         _warn_of_gaps(table)
-    deviations = None if sigma is None else {k: v for k, v in sigma.items() if k in table}
     return Record(
         t,
         {name: table.numbers(name) for name in model.outputs if name in table},
         {name: table.numbers(name) for name in model.inputs},
-        deviations,
+        _sigma(table, model, sigma),
         str(path),
     )
 
@@ -100,13 +103,33 @@ def _columns(model: OdeModel, *, allow_missing: bool) -> tuple[Column, ...]:
     return (
         Column("t", one_of(TIME), ("t_s",)),
         *(Column(name, _no_unit, (name,), not allow_missing, blank=True) for name in model.outputs),
+        *(Column(name, _no_unit, (name,), False, blank=True) for name in _deviations(model).values()),
         *(Column(name, _no_unit, (name,)) for name in model.inputs if name not in model.outputs),
     )
 
 
+def _deviations(model: OdeModel) -> dict[str, str]:
+    """Column of the standard deviations of each output, where the model means nothing else by its name."""
+    taken = {*model.outputs, *model.inputs}
+    return {name: name + STD for name in model.outputs if name + STD not in taken}
+
+
+def _sigma(
+    table: Table, model: OdeModel, sigma: Mapping[str, float] | None
+) -> Mapping[str, float | FloatArray] | None:
+    """Standard deviations of the record's own columns, or else the given ones."""
+    if sigma is not None:
+        return {name: value for name, value in sigma.items() if name in table}
+    own = {name: table.numbers(column) for name, column in _deviations(model).items() if column in table}
+    return own or None
+
+
 def _no_unit(name: str) -> Unit:
     if name:
-        raise UnitError("the name of the model alone, without a unit: values are in the units of the model")
+        raise UnitError(
+            "the name of the model alone, without a unit: values are in the units of the model (and standard "
+            f"deviations of an output NAME in a column NAME{STD})"
+        )
     return Unit("", "model")
 
 
@@ -118,9 +141,9 @@ def _explain_states(grid: Grid, model: OdeModel, problems: Problems) -> None:
             problems.add(grid.source, grid.header_row, name, None, expected)
 
 
-def _blank(grid: Grid, outputs: tuple[str, ...]) -> Grid:
-    """Words for "missing" in the columns of outputs become blanks."""
-    places = {i for i, name in enumerate(grid.header) if name in outputs}
+def _blank(grid: Grid, columns: tuple[str, ...]) -> Grid:
+    """Words for "missing" in these columns become blanks."""
+    places = {i for i, name in enumerate(grid.header) if name in columns}
 
     def emptied(cells: tuple[Cell, ...]) -> tuple[Cell, ...]:
         return tuple(
@@ -158,6 +181,39 @@ def _complain_about_outputs(
             continue
         for i in np.flatnonzero(blank):
             table.complain(problems, int(i), name, "a number (--allow-missing: blanks were not measured)")
+
+
+def _complain_about_deviations(table: Table, model: OdeModel, problems: Problems, *, stated: bool) -> None:
+    """Standard deviations of all outputs or of none, above 0 wherever something was measured."""
+    clear = not len(problems)  # otherwise a misspelt column would be called missing
+    columns = _deviations(model)
+    found = [column for column in columns.values() if column in table]
+    if found and stated:
+        expected = "no such column together with --sigma: leave out one of the two"
+        problems.add(table.source, table.header_row, found[0], None, expected)
+        return
+    for name in model.outputs if found else ():
+        column = columns.get(name, name + STD)
+        if column not in found:
+            if name in table and clear:
+                expected = (
+                    f"such a column, as {found[0]} is there: standard deviations of all outputs or none"
+                )
+                problems.add(table.source, table.header_row, column, None, expected)
+            continue
+        if name not in table:
+            expected = f"a column {name} beside it, whose standard deviations these are"
+            problems.add(table.source, table.header_row, column, None, expected)
+            continue
+        _complain_about_sizes(table, name, column, problems)
+
+
+def _complain_about_sizes(table: Table, name: str, column: str, problems: Problems) -> None:
+    sizes, blank = table.numbers(column), np.array([cell == "" for cell in table.fields[column].cells])
+    unreadable = np.isnan(sizes) & ~blank  # has been reported
+    for i in np.flatnonzero(~np.isnan(table.numbers(name)) & ~(sizes > 0) & ~unreadable):
+        expected = f"a standard deviation above 0 wherever {name} was measured"
+        table.complain(problems, int(i), column, expected)
 
 
 def _warn_of_gaps(table: Table) -> None:

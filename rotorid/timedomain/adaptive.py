@@ -21,8 +21,8 @@ SMALL = 0.1
 """Absolute tolerance of a state, as a share of rtol times its largest size so far."""
 
 
-Options = tuple[float, float | None]
-"""Relative tolerance and first step."""
+Options = tuple[float, float | None, float]
+"""Relative tolerance, first step, longest step."""
 
 
 class _TooManySteps(SimulationError):
@@ -98,7 +98,8 @@ def _segment(
     rtol, atol = tolerances
     first = None if first is None else min(first, span)
     limits = _atol(system, scale if method == "dop853" else _levelled(system, scale), rtol, atol)
-    solver = _solver(system, method, float(t[begin]), table[begin], float(t[end]), limits, (rtol, first))
+    options = (rtol, first, longest_step(t) if system.model.timed else np.inf)
+    solver = _solver(system, method, float(t[begin]), table[begin], float(t[end]), limits, options)
     row, steps, longest = begin + 1, 0, 0.0
     while row <= end:
         if steps >= budget:
@@ -126,6 +127,11 @@ def _segment(
     return steps, longest
 
 
+def longest_step(t: FloatArray) -> float:
+    """Of a model that depends on the time itself: a pulse must not be stepped over."""
+    return max(float(np.diff(t).min()), float(t[-1] - t[0]) / 1000)
+
+
 def _solver(
     system: Augmented,
     method: str,
@@ -137,13 +143,15 @@ def _solver(
 ) -> Any:  # noqa: ANN401  scipy has no types
     from scipy.integrate import DOP853, LSODA
 
-    rtol, first = options
+    rtol, first, longest = options
     if method == "dop853":
-        solver = DOP853(system, begin, z, end, rtol=rtol, atol=atol, first_step=first)
+        solver = DOP853(system, begin, z, end, rtol=rtol, atol=atol, first_step=first, max_step=longest)
         if not np.isfinite(solver.h_abs):  # of rates that are not finite; it would be tried for ever
             solver.h_abs = 1e-6 * (end - begin)
         return solver
-    return LSODA(system, begin, z, end, rtol=rtol, atol=atol, first_step=first, jac=system.jacobian)
+    return LSODA(
+        system, begin, z, end, rtol=rtol, atol=atol, first_step=first, max_step=longest, jac=system.jacobian
+    )
 
 
 def _atol(system: Augmented, scale: FloatArray, rtol: float, atol: float | None) -> FloatArray:

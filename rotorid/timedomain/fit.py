@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotorid.nonlinear import NonlinearEstimate, nonlinear_least_squares
+from rotorid.nonlinear import nonlinear_least_squares
 from rotorid.search import inside
 from rotorid.timedomain.gauss_newton import gauss_newton
 from rotorid.timedomain.honesty import judge
@@ -17,7 +16,9 @@ from rotorid.timedomain.path import Path
 from rotorid.timedomain.problem import RTOL, Problem
 from rotorid.timedomain.quasilinearization import quasilinearization
 from rotorid.timedomain.record import Record
+from rotorid.timedomain.residuals import output_errors, settled
 from rotorid.timedomain.result import Fit, Minimum
+from rotorid.timedomain.several import for_copies
 from rotorid.timedomain.shooting import shoot
 from rotorid.timedomain.simulate import SimulationError
 from rotorid.timedomain.starts import merge, spread_starts
@@ -25,6 +26,8 @@ from rotorid.timedomain.trajectory import Curve, given_trajectory, measured_traj
 
 FloatArray = NDArray[np.float64]
 METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
+WEIGHINGS = 20
+"""Fits at most with weights from the residuals of the last one."""
 Searching = Callable[[FloatArray], Path]
 Trajectories = str | Mapping[str, str | float | ArrayLike]
 
@@ -45,6 +48,7 @@ def fit(
     tolerance: float = 1e-9,
     rtol: float = RTOL,
     seed: int = 0,
+    weigh: bool = False,
 ) -> Fit:
     """Estimate the parameters of a model from time records.
 
@@ -82,6 +86,9 @@ def fit(
         Of the integration.
     seed
         Of the other starts.
+    weigh
+        Estimate the standard deviation of each output from its residuals and weigh by it, until it stays.
+        Without stated errors all samples count alike otherwise, whatever their unit.
 
     Raises
     ------
@@ -110,9 +117,13 @@ def fit(
     if starts < 1 or max_iterations < 1:
         raise ValueError("starts and max_iterations must be at least 1")
     several = (records,) if isinstance(records, Record) else tuple(records)
+    if weigh and any(record.sigma is not None for record in several):
+        raise ValueError("standard deviations are stated: there is nothing to estimate them for")
     problem = Problem(model, several, integrator, rtol)
-    limits = _bounds(model, bounds)
-    first = inside(_start(model, start), limits[:, 0], limits[:, 1])
+    names = problem.model.parameters
+    limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
+    begin = _start(problem.model, for_copies(model, len(several), start or {}))
+    begin = inside(begin, limits[:, 0], limits[:, 1])
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
     def search(theta: FloatArray) -> Path:
@@ -123,26 +134,29 @@ def fit(
             return quasilinearization(
                 problem, theta, curves, max_iterations=max_iterations, tolerance=tolerance
             )
-        begin = theta
+        first = theta
         if method == "multiple-shooting":
             curves = _curves(problem, theta, kind)
-            begin = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=pieces)
-        path = _levenberg_marquardt(problem, begin, limits, loss, max_iterations)
-        if begin is theta:
-            return path
-        costs = np.append(np.nan, path.costs)
-        return replace(path, history=np.vstack((theta, path.history)), costs=costs)
+            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=pieces)
+        path = _levenberg_marquardt(problem, first, limits, loss, max_iterations)
+        return path if first is theta else path.after(theta[None])
 
-    path, minima = search_all(search, spread_starts(first, limits, starts, seed), model.parameters)
+    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), names)
+    for _ in range(WEIGHINGS if weigh else 0):
+        errors = output_errors(problem, path.estimate.residuals, len(names))
+        if errors is None or settled(errors, problem.errors):
+            break
+        problem = Problem(model, several, integrator, rtol, errors)
+        path = search(path.estimate.solution).after(path.history)
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
     warnings = judged.warnings
     if len(minima) > 1:
         warnings = (*warnings, f"{len(minima)} different minima were found; the best is given, see minima")
-    if plain and _outside(path.estimate.solution, model.bounds):
+    if plain and _outside(path.estimate.solution, limits):
         warnings = (*warnings, f"{method} knows no bounds, and the result lies outside those of the model")
     return Fit(
-        model=model,
+        models=problem.models,
         records=several,
         method=method,
         integrator=simulations[0].method if simulations else integrator,
@@ -159,8 +173,9 @@ def fit(
         minima=minima,
         integration_change=judged.integration_change,
         autocorrelation=judged.autocorrelation,
-        residual_rms=_rms(problem, path.estimate.residuals),
+        residual_rms=float(np.sqrt(np.mean(problem.plain(path.estimate.residuals) ** 2))),
         trajectories=path.trajectories,
+        errors=problem.errors or None,
     )
 
 
@@ -178,8 +193,8 @@ def search_all(
     if not paths:
         assert failure is not None
         raise failure
-    # one that did not converge is no minimum, but is given if nothing else is better than nothing
-    best = min(paths, key=lambda p: (not p.converged, float(p.estimate.residuals @ p.estimate.residuals)))
+    # one that did not converge is no minimum; where it describes the record better, it is given, and said
+    best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
     return best, merge([p for p in paths if p.converged], names) if len(begins) > 1 else ()
 
 
@@ -189,22 +204,17 @@ def _levenberg_marquardt(
     problem.evaluate(start)  # says why, where the states diverge
     names = problem.model.parameters
 
-    def search(near: bool) -> NonlinearEstimate:
-        return nonlinear_least_squares(
-            problem.residual,
-            problem.jacobian,
-            start,
-            names=names,
-            sigma_stated=problem.stated,
-            bounds={name: (low, high) for name, (low, high) in zip(names, limits.tolist(), strict=True)},
-            loss=loss,
-            max_iterations=max_iterations,
-            near=near,
-        )
-
-    found = search(near=loss == "linear")
-    if loss == "linear" and not found.estimate.full_rank:
-        found = search(near=False)  # Gauss–Newton alone does not see how far the combinations still are
+    found = nonlinear_least_squares(
+        problem.residual,
+        problem.jacobian,
+        start,
+        names=names,
+        sigma_stated=problem.stated,
+        bounds={name: (low, high) for name, (low, high) in zip(names, limits.tolist(), strict=True)},
+        loss=loss,
+        max_iterations=max_iterations,
+        near=loss == "linear",
+    )
     return Path(found.estimate, found.history, found.costs, found.converged, found.message, found.at_bounds)
 
 
@@ -212,10 +222,11 @@ def _curves(problem: Problem, theta: FloatArray, kind: Trajectories) -> list[Cur
     if isinstance(kind, Mapping):
         return [given_trajectory(problem.model, kind, record) for record in problem.records]
     if kind == "data":
-        return [measured_trajectory(problem.model, theta, record) for record in problem.records]
+        both = zip(problem.models, problem.records, strict=True)
+        return [measured_trajectory(model, theta, record) for model, record in both]
     if kind != "model":
         raise ValueError(f"no starting trajectory {kind!r}: it is 'model', 'data', or given by state")
-    return [own_trajectory(problem, theta, record) for record in problem.records]
+    return [own_trajectory(problem, theta, number) for number in range(len(problem.records))]
 
 
 def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:
@@ -243,9 +254,3 @@ def _bounds(model: OdeModel, bounds: Mapping[str, tuple[float, float]] | None) -
 
 def _outside(theta: FloatArray, limits: FloatArray) -> bool:
     return bool(((theta < limits[:, 0]) | (theta > limits[:, 1])).any())
-
-
-def _rms(problem: Problem, r: FloatArray) -> float:
-    """Of the residuals in the unit of the outputs, without the weights."""
-    plain = problem.vector([np.ones_like(data) for data in problem.measured])
-    return float(np.sqrt(np.mean((r / plain) ** 2)))

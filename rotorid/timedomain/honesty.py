@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from rotorid.estimate import Estimate
 from rotorid.regression import least_squares
 from rotorid.search import RCOND
+from rotorid.timedomain.adaptive import longest_step
+from rotorid.timedomain.combined import combined
 from rotorid.timedomain.path import Path
-from rotorid.timedomain.problem import Problem
-from rotorid.timedomain.simulate import SimulationError
+from rotorid.timedomain.problem import RTOL, Problem
+from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
+from rotorid.timedomain.simulate import SimulationError, inputs_of
 
 FloatArray = NDArray[np.float64]
 
-UNEXPLAINED = 0.05
-"""Share of the variance in residuals that are not white above which a model does not describe a record."""
-MISFIT = 4.0
-"""χ² per degree of freedom above which stated errors do not explain the residuals."""
+PROBES = 100_001
+"""Times at which pulses are looked for."""
 INSENSITIVE = 1e-7
 """Change of the outputs, relative to their size, by a parameter changing by all of itself."""
 
@@ -48,8 +49,6 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
             f"{', '.join(path.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: no "
             "standard deviation is given, and those of the others hold it fixed"
         )
-    if not found.full_rank:
-        warnings.append(found.describe_rank())
     r = found.residuals
     change = None
     try:
@@ -57,29 +56,39 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
         weak = _insensitive(problem, J, found)
         if weak:
             warnings.append(f"the record hardly depends on {', '.join(weak)}")
+        if path.converged:
+            found, local = combined(problem, found)
+            warnings += [local] if local else []
+        spread = None if problem.stated or loss != "linear" else unequal(problem, len(names), r)
+        if spread is not None:
+            warnings.append(_unequal_words(problem, found, J, spread))
         change = _integration_change(problem, found, J)
     except SimulationError as error:
         warnings.append(f"the model cannot be simulated with the result: {error}")
         reliable = False
+    if not found.full_rank:
+        warnings.append(found.describe_rank())
+    if not problem.data.any():
+        warnings.append("the record is zero throughout: a sensor without a signal?")
     if change is not None:
         warnings += _integration_words(found, change, names)
-    lag = _autocorrelation(problem, r)
-    misfit = _misfit(problem, found, r, loss)
-    if misfit:
-        warnings.append(misfit)
+    seen = correlation(problem, r)
+    poor = misfit(problem, found.dof, r, loss)
+    if poor:
+        warnings.append(poor)
         reliable = False
-    elif lag is not None and abs(lag) > max(0.2, 3 / np.sqrt(len(r))):
-        factor = np.sqrt((1 + lag) / (1 - lag)) if 0 < lag < 1 else 1.0
-        longer = f": intervals should be about {factor:.2g} times as wide" if factor > 1.2 else ""
-        warnings.append(
-            f"residuals of neighbouring samples are correlated ({lag:.2f}, Durbin–Watson "
-            f"{2 - 2 * lag:.2f}){longer}"
-        )
-    if found.errors_stated and not misfit and found.dof > 0 and found.chi_square is not None:
+    elif seen is not None and seen.words():
+        warnings.append(seen.words())
+    if found.errors_stated and not poor and found.dof > 0 and found.chi_square is not None:
         warnings += _chi_words(found.chi_square, found.dof)
+    warnings += _aliases(problem, found.solution)
+    missed = _pulses(problem, found.solution) if reliable else []
+    if missed:
+        warnings += missed
+        reliable = False
     if not reliable:
         found = replace(found, covariance=None, solution_covariance=None)
-    return Judgement(found, reliable, tuple(warnings), change, lag)
+    return Judgement(found, reliable, tuple(warnings), change, None if seen is None else seen.neighbours)
 
 
 def _insensitive(problem: Problem, J: FloatArray, found: Estimate) -> list[str]:
@@ -96,9 +105,9 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
         return None
     r = problem.residual(found.solution)
     if used in ("heun", "rk4"):
-        finer = Problem(problem.model, problem.records, "auto")
+        finer = problem.again("auto", RTOL)
     else:
-        finer = Problem(problem.model, problem.records, problem.integrator, max(problem.rtol / 100, 1e-13))
+        finer = problem.again(problem.integrator, max(problem.rtol / 100, 1e-13))
     exact = finer.evaluate(found.solution)[0]
     return least_squares(J, r - exact, rcond=RCOND).solution
 
@@ -117,68 +126,68 @@ def _integration_words(found: Estimate, change: FloatArray, names: tuple[str, ..
     return [f"a more accurate integration would change {', '.join(words)}"] if words else []
 
 
-def _series(problem: Problem, r: FloatArray) -> list[FloatArray]:
-    return np.split(r, np.cumsum(problem.groups)[:-1])
+def _aliases(problem: Problem, theta: FloatArray) -> list[str]:
+    """Words where a linear model vibrates faster than evenly spaced samples can tell."""
+    for model, record in zip(problem.models, problem.records, strict=True):
+        steps = np.diff(record.t)
+        if not model.linear_driven or len(steps) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
+            continue
+        fastest = float(np.abs(np.linalg.eigvals(model.matrices(theta)[0]).imag).max())
+        if fastest * steps.mean() > np.pi:
+            return [
+                f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
+                f"({np.pi / steps.mean():.4g} rad/s): slower vibrations may describe the record as well"
+            ]
+    return []
 
 
-def _numerical(problem: Problem, r: FloatArray) -> bool:
-    """Whether nothing but rounding is left."""
-    return bool(np.linalg.norm(r) < 1e-7 * np.linalg.norm(problem.data))
+def _pulses(problem: Problem, theta: FloatArray) -> list[str]:
+    """Words where the rates change with the time so fast that an integration may miss it."""
+    for model, record, run in zip(problem.models, problem.records, problem.runs, strict=True):
+        t = record.t
+        if not model.timed or run.method not in ("dop853", "lsoda") or len(t) < 2:
+            continue
+        u, x = inputs_of(model, record)[:1], run.x[:1]
+        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / longest_step(t))) + 1)
+        fine = np.linspace(t[0], t[-1], PROBES)
+        at_coarse, at_fine = (
+            model.f(times, np.repeat(x, len(times), 0), theta, np.repeat(u, len(times), 0))
+            for times in (coarse, fine)
+        )
+        straight = np.stack([np.interp(fine, coarse, column) for column in at_coarse.T], axis=-1)
+        away = np.abs(at_fine - straight).max(axis=0)
+        if (away > 0.05 * np.maximum(np.ptp(at_fine, axis=0), 1e-300)).any():
+            return [
+                f"the rates change within {coarse[1] - coarse[0]:.2g} s of time or less: the integration may "
+                "step over that; give the record more times there. No intervals are given"
+            ]
+    return []
 
 
-def _autocorrelation(problem: Problem, r: FloatArray) -> float | None:
-    """Of neighbouring samples, over all series; None where there is nothing to say."""
-    if len(r) < 20 or _numerical(problem, r):
-        return None
-    pairs = r[1:] * r[:-1]
-    pairs[np.cumsum(problem.groups)[:-1] - 1] = 0.0  # last of one series, first of the next
-    return float(pairs.sum()) / float(r @ r)
-
-
-def _misfit(problem: Problem, found: Estimate, r: FloatArray, loss: str) -> str:
-    """Words where the model does not describe the record: intervals would be wrong."""
-    if loss != "linear" or found.dof <= 0 or _numerical(problem, r):
-        return ""
-    hint = (
-        "a local minimum or an unsuitable model; try other starting values, several starts or multiple "
-        "shooting. No intervals are given"
+def _unequal_words(problem: Problem, found: Estimate, J: FloatArray, variances: FloatArray) -> str:
+    """Plain least squares with errors s_g of each series: the covariance would be Σ s_g² G_g G_gᵀ, G = J⁺."""
+    first = np.cumsum([0, *problem.groups[:-1]])
+    own = np.repeat(np.sqrt(variances), problem.groups)
+    sizes = ", ".join(
+        f"{name} {s:.2g}" for name, s in zip(problem.series, problem.plain(own)[first], strict=True)
     )
-    if problem.stated:
-        ratio = float(r @ r) / found.dof
-        if ratio > MISFIT and _chance(float(r @ r), found.dof) < 1e-6:
-            return f"residuals are {np.sqrt(ratio):.2g} times as large as the stated errors explain: {hint}"
-        return ""
-    if len(r) < 20:
-        return ""
-    counts = np.array(problem.groups)
-    sums = np.add.reduceat(problem.data, np.append(0, np.cumsum(counts)[:-1]))
-    spread = float(problem.data @ problem.data - np.sum(sums**2 / counts))
-    share = float(r @ r) / spread if spread > 0 else 0.0
-    if share > UNEXPLAINED and _whiteness(problem, r) < 1e-6:
-        return f"the model leaves {100 * share:.0f} % of the record's variance, and not as noise: {hint}"
-    return ""
-
-
-def _whiteness(problem: Problem, r: FloatArray) -> float:
-    """Probability of such correlations in white residuals (Box and Pierce 1970)."""
-    parts = _series(problem, r)
-    lags = range(1, 1 + min(10, max(1, min(len(part) for part in parts) // 5)))
-    total = float(r @ r)
-    q = sum((sum(float(part[k:] @ part[:-k]) for part in parts) / total) ** 2 for k in lags) * len(r)
-    return _chance(q, len(lags))
+    words = f"the outputs have different errors ({sizes}), but the intervals hold for equal ones"
+    if found.full_rank and found.std is not None and np.isfinite(found.std).all():
+        size = np.linalg.norm(J, axis=0)
+        G = np.linalg.pinv(J / size, rcond=RCOND) / size[:, None] * own
+        ratio = np.sqrt((G * G).sum(axis=1)) / found.std
+        words += f"; with their own they would be {ratio.min():.2g} to {ratio.max():.2g} times as wide"
+    return f"{words}. With --sigma auto precise outputs count for more"
 
 
 def _chi_words(chi_square: float, dof: int) -> list[str]:
-    if _chance(chi_square, dof) < 1e-3:
+    if chance(chi_square, dof) < 1e-3:
         ratio = np.sqrt(chi_square / dof)
         return [
             f"residuals are {ratio:.2g} times as large as the stated errors explain: intervals are too "
             "narrow, or the model does not quite describe the record"
         ]
+    if chance(chi_square, dof) > 1 - 1e-6 and chi_square < dof / 2:
+        ratio = np.sqrt(chi_square / dof)
+        return [f"residuals are only {ratio:.2g} times as large as the stated errors: these are too large"]
     return []
-
-
-def _chance(chi_square: float, dof: int) -> float:
-    from scipy.special import chdtrc
-
-    return float(chdtrc(dof, chi_square))

@@ -41,6 +41,8 @@ class OdeModel:
         Lower and upper bounds of the parameters, shape (n_p, 2), ±inf where there is none.
     texts
         The expressions as written, by place ("state x1").
+    per_record
+        Parameters that every one of several records has for itself.
     """
 
     states: tuple[str, ...]
@@ -54,6 +56,7 @@ class OdeModel:
     rates: tuple[Expression, ...] = field(repr=False)
     initial: tuple[Expression, ...] = field(repr=False)
     observed: tuple[Expression, ...] = field(repr=False)
+    per_record: tuple[str, ...] = ()
 
     def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Rates of the states, (*B, n_x)."""
@@ -121,6 +124,11 @@ class OdeModel:
         if any(expressions.names(e) & varying for e in slopes):
             return False
         return not any(expressions.names(e) & varying for e in self._b_exprs)
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether the rates depend on the time itself."""
+        return any("t" in expressions.names(e) for e in self.rates)
 
     @cached_property
     def driven(self) -> bool:
@@ -291,6 +299,7 @@ def ode_model(
     known: Mapping[str, float] | None = None,
     inputs: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    per_record: Sequence[str] = (),
 ) -> OdeModel:
     """Make a model of text.
 
@@ -312,6 +321,9 @@ def ode_model(
         Names of measured inputs (columns of the record).
     bounds
         Lower and upper bound of parameters, ±inf for none.
+    per_record
+        Parameters, usually initial states, of which every record has its own: x0 of the second record is then
+        called x0_2.
 
     Raises
     ------
@@ -337,6 +349,8 @@ def ode_model(
     for name in outputs:
         if not expressions.is_name(name) or name == "t":
             raise ValueError(f"output {name!r} is no name; names are letters, digits and _, but not t")
+    if lost := [name for name in per_record if name not in estimate]:
+        raise ValueError(f"per_record: {lost[0]} is no parameter; parameters are {', '.join(estimate)}")
     start = finite_numbers(estimate, "parameter", "starting value")
     numbers = finite_numbers(known, "known value", "value")
     exact = {name: Fraction(repr(float(v))) for name, v in zip(known, numbers, strict=True)}
@@ -354,4 +368,5 @@ def ode_model(
         initial=tuple(read(initial[name], f"initial {name}", set(estimate)) for name in states),
         observed=tuple(read(e, f"output {name}", everything) for name, e in outputs.items()),
         texts=read.texts,
+        per_record=tuple(dict.fromkeys(per_record)),
     )

@@ -45,6 +45,11 @@ class Path:
         """Number of steps."""
         return len(self.history) - 1
 
+    def after(self, before: FloatArray) -> Path:
+        """The same, as the continuation of earlier steps, (k, n)."""
+        costs = np.append(np.full(len(before), np.nan), self.costs)
+        return replace(self, history=np.vstack((before, self.history)), costs=costs)
+
 
 def at(found: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
     """The estimate of a step, as one of the parameters themselves."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.record import Record
+from rotorid.timedomain.several import models_of
 from rotorid.timedomain.simulate import SimulationError, Trajectory, simulate
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,8 @@ class Problem:
         Of `simulate`.
     rtol
         Its tolerance.
+    errors
+        Estimated standard deviation of each output, to weigh by; not stated ones.
 
     Raises
     ------
@@ -45,11 +48,16 @@ class Problem:
         records: Sequence[Record],
         integrator: str = "auto",
         rtol: float = RTOL,
+        errors: Mapping[str, float] | None = None,
     ) -> None:
-        self.model, self.records = model, tuple(records)
+        self.records, self._given = tuple(records), model
         self.integrator, self.rtol = integrator, rtol
+        self.errors = dict(errors or {})
         if not self.records:
             raise ValueError("a fit needs at least one record")
+        self.models = models_of(model, len(self.records))
+        """One per record, all with the same parameters."""
+        self.model = self.models[0]
         tables = [self._table(record) for record in self.records]
         known = {given for _, _, given in tables if given is not None}
         if len(known) > 1:
@@ -65,6 +73,10 @@ class Problem:
         """Of the last evaluation, one per record."""
         self.failure = ""
 
+    def again(self, integrator: str, rtol: float) -> Problem:
+        """The same problem, integrated otherwise."""
+        return Problem(self._given, self.records, integrator, rtol, self.errors)
+
     @cached_property
     def rows(self) -> int:
         """Number of samples."""
@@ -74,6 +86,21 @@ class Problem:
     def groups(self) -> list[int]:
         """Samples of each series (one output of one record), in the order of the rows."""
         return [int(count) for mask in self.masks for count in mask.sum(axis=1) if count]
+
+    @cached_property
+    def series(self) -> list[str]:
+        """Name of each series, in the order of the rows."""
+        several = len(self.records) > 1
+        return [
+            f"{name} in {record.name}" if several else name
+            for record, mask in zip(self.records, self.masks, strict=True)
+            for name, count in zip(self.model.outputs, mask.sum(axis=1), strict=True)
+            if count
+        ]
+
+    def plain(self, r: FloatArray) -> FloatArray:
+        """Weighted rows in the unit of the outputs."""
+        return np.asarray(r / self.vector([np.ones_like(data) for data in self.measured]))
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
         """Tables (n, n_y, …) of all records as weighted rows."""
@@ -99,8 +126,8 @@ class Problem:
         key = theta.tobytes()
         if self._last is None or self._last[0] != key:
             runs = [
-                simulate(self.model, theta, record, method=self.integrator, rtol=self.rtol)
-                for record in self.records
+                simulate(model, theta, record, method=self.integrator, rtol=self.rtol)
+                for model, record in zip(self.models, self.records, strict=True)
             ]
             r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
             J = self.vector([run.y_theta for run in runs])
@@ -149,5 +176,7 @@ class Problem:
             raise ValueError(
                 f"{record.name}: standard deviations must be stated for all measured outputs, or for none"
             )
+        if given and not any(given):
+            sigma = np.tile([self.errors.get(name, 1.0) for name in outputs], (len(record), 1))
         sigma[np.isnan(data)] = 1.0
         return data, sigma, given.pop() if given else None

@@ -116,6 +116,8 @@ def _distinct(steps: FloatArray, largest: float) -> tuple[FloatArray, NDArray[np
     """Distinct steps in order of appearance, and which one each step is."""
     if steps.size == 0:
         return steps, np.zeros(0, dtype=np.intp)
+    if np.ptp(steps) <= SAME_STEP * largest:
+        return np.array([steps.mean()]), np.zeros(len(steps), dtype=np.intp)
     order = np.argsort(steps, kind="stable")
     jumps = np.diff(steps[order]) > SAME_STEP * largest
     label = np.empty(len(steps), dtype=np.intp)
@@ -130,13 +132,14 @@ def _distinct(steps: FloatArray, largest: float) -> tuple[FloatArray, NDArray[np
 
 def _fill(table: FloatArray, p: FloatArray, d: FloatArray) -> None:
     """Equal steps from the first row on: with P, P², P⁴, … the rows known so far are doubled each time."""
-    known, n = 1, len(table)
+    known, (n, m), k = 1, table.shape[:2], len(d)
     while known < n:
+        bend = d.reshape(k * m, m)
         more = min(known, n - known)
         block = table[:more]
         new = table[known : known + more]
         new[:] = p @ block
-        new[:, :, 1:] += np.moveaxis(d @ block[:, None, :, :1], 1, -1)[:, :, 0, :]
+        new[:, :, 1:] += (bend @ block[:, :, 0].T).reshape(k, m, more).transpose(2, 1, 0)
         known += more
         if known < n:
             p, d = squared(p, d)

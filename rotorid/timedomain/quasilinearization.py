@@ -60,10 +60,7 @@ def quasilinearization(
         try:
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
-            parts = [
-                linear_solutions(problem, theta, curve, record)
-                for curve, record in zip(curves, problem.records, strict=True)
-            ]
+            parts = [linear_solutions(problem, theta, curve, i) for i, curve in enumerate(curves)]
             found = _solve(problem, theta, states, [table for table, _ in parts])
         except SimulationError as error:
             if found is None:
@@ -91,15 +88,16 @@ def quasilinearization(
 
 
 def linear_solutions(
-    problem: Problem, theta: FloatArray, curve: Curve, record: Record
+    problem: Problem, theta: FloatArray, curve: Curve, number: int
 ) -> tuple[FloatArray, Curve]:
-    """D and G of the equations linearised about a trajectory.
+    """D and G of the equations linearised about a trajectory of one of the records.
 
     Returns
     -------
     [D | G] at the times of the record, (n, n_x, 1 + n_p), and as a function of time.
     """
-    model, t = problem.model, record.t
+    model, record = problem.models[number], problem.records[number]
+    t = record.t
     shape = (len(model.states), 1 + len(theta))
     first = np.column_stack((model.x0(theta), model.x0_theta(theta))) if model.states else np.zeros(shape)
     if not model.states or len(t) == 1:
@@ -114,7 +112,7 @@ def linear_solutions(
             return np.stack(columns, axis=-1).reshape(*np.shape(at), *shape)
 
         return table, straight
-    return _adaptive(problem, theta, curve, record, first)
+    return _adaptive(model, theta, curve, record, first, problem.rtol)
 
 
 def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray) -> FloatArray:
@@ -137,11 +135,11 @@ def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, fir
 
 
 def _adaptive(
-    problem: Problem, theta: FloatArray, curve: Curve, record: Record, first: FloatArray
+    model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray, rtol: float
 ) -> tuple[FloatArray, Curve]:
     from scipy.integrate import solve_ivp
 
-    model, t = problem.model, record.t
+    t = record.t
     u, shape, n = inputs_of(model, record), first.shape, len(model.states)
 
     def slope(time: float, w: FloatArray) -> FloatArray:
@@ -155,10 +153,10 @@ def _adaptive(
         return out.ravel()
 
     size = np.maximum(np.abs(curve(t)).max(axis=0), np.abs(first[:, 0])).max()
-    atol = problem.rtol * max(float(size), 1e-300)
+    atol = rtol * max(float(size), 1e-300)
     with np.errstate(all="ignore"):
         run = solve_ivp(
-            slope, (t[0], t[-1]), first.ravel(), "DOP853", dense_output=True, rtol=problem.rtol, atol=atol
+            slope, (t[0], t[-1]), first.ravel(), "DOP853", dense_output=True, rtol=rtol, atol=atol
         )
     if not run.success or not np.isfinite(run.y).all():
         raise SimulationError(
@@ -177,8 +175,9 @@ def _solve(
     problem: Problem, theta: FloatArray, states: Sequence[FloatArray], tables: Sequence[FloatArray]
 ) -> Estimate:
     """Linear least squares for the change of the parameters."""
-    model, outputs, slopes = problem.model, [], []
-    for record, x, W, data in zip(problem.records, states, tables, problem.measured, strict=True):
+    outputs, slopes = [], []
+    parts = zip(problem.models, problem.records, states, tables, problem.measured, strict=True)
+    for model, record, x, W, data in parts:
         u = inputs_of(model, record)
         C = model.h_x(record.t, x, theta, u)
         y = model.h(record.t, x, theta, u) + np.einsum("tij,tj->ti", C, W[..., 0] - x)
@@ -188,7 +187,7 @@ def _solve(
     if not (np.isfinite(K).all() and np.isfinite(Y).all()):
         raise SimulationError("the linearised outputs are not finite; start from another trajectory")
     sigma = 1.0 if problem.stated else None
-    return least_squares(K, Y, names=model.parameters, sigma=sigma, rcond=RCOND)
+    return least_squares(K, Y, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
 
 
 def _next(curve: Curve, step: FloatArray) -> Curve:
@@ -199,8 +198,10 @@ def _next(curve: Curve, step: FloatArray) -> Curve:
 def _cost(problem: Problem, theta: FloatArray, states: Sequence[FloatArray]) -> float:
     """Of a trajectory that need not solve the equations."""
     tables = [
-        problem.model.h(record.t, x, theta, inputs_of(problem.model, record)) - data
-        for record, x, data in zip(problem.records, states, problem.measured, strict=True)
+        model.h(record.t, x, theta, inputs_of(model, record)) - data
+        for model, record, x, data in zip(
+            problem.models, problem.records, states, problem.measured, strict=True
+        )
     ]
     return half_square(problem.vector(tables))
 

@@ -45,8 +45,8 @@ class Fit:
 
     Attributes
     ----------
-    model, records
-        What was fitted to what.
+    models, records
+        What was fitted to what: one model for each record, all with the same parameters.
     method, integrator, loss
         How; the integrator is the one that was used ("none": the model has no states).
     estimate
@@ -76,9 +76,11 @@ class Fit:
         In the unit of the outputs.
     trajectories
         Quasilinearization: states of each record at the start and after each iteration.
+    errors
+        Standard deviation of each output as estimated from its residuals, where these were the weights.
     """
 
-    model: OdeModel
+    models: tuple[OdeModel, ...]
     records: tuple[Record, ...]
     method: str
     integrator: str
@@ -97,6 +99,12 @@ class Fit:
     autocorrelation: float | None
     residual_rms: float
     trajectories: tuple[tuple[FloatArray, ...], ...] = ()
+    errors: dict[str, float] | None = None
+
+    @property
+    def model(self) -> OdeModel:
+        """Of the first record."""
+        return self.models[0]
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -141,6 +149,7 @@ class Fit:
                 {"cost": _number(cost), "parameters": dict(zip(self.parameters, row.tolist(), strict=True))}
                 for row, cost in zip(self.history, self.costs, strict=True)
             ],
+            "errors": self.errors,
             "at_bounds": list(self.at_bounds),
             "minima": [
                 {"parameters": m.values, "cost": _number(m.cost), "starts": m.starts} for m in self.minima
@@ -178,6 +187,9 @@ class Fit:
             lines = [line for line in lines if not line.startswith("no intervals: ")]
         lines.insert(0, f"{self.method}, integrator {self.integrator}: {self.message}")
         lines.append(f"residual rms {self.residual_rms:.4g}")
+        if self.errors:
+            sizes = ", ".join(f"{name} {size:.3g}" for name, size in self.errors.items())
+            lines.append(f"estimated standard deviations, used as weights: {sizes}")
         for i, m in enumerate(self.minima if len(self.minima) > 1 else ()):
             values = ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
             lines.append(f"minimum {i + 1} ({m.starts} starts): {values}; cost {m.cost:.4g}")

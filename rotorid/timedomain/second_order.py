@@ -115,15 +115,23 @@ def second_order(
     known: Mapping[str, float] | None = None,
     inputs: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    per_record: Sequence[str] = (),
     names: Sequence[str] | None = None,
+    masses: Mapping[str, float | str] | None = None,
+    dampers: Mapping[str, float | str] | None = None,
+    springs: Mapping[str, float | str] | None = None,
 ) -> SecondOrderModel:
-    """Make a model M y'' + C y' + K y = f of matrices, such as those of `fem` or of a reduced model.
+    """Make a model M y'' + C y' + K y = f of matrices.
+
+    Those of a rotor come from `fem.equations_of_motion` (`motion.M, motion.C, motion.K`, with
+    `names=motion.coordinates`), those of a reduced model from `Reduction.equations_of_motion`; what is to be
+    estimated at a bearing or a disc is added by `masses`, `dampers` and `springs`.
 
     Parameters
     ----------
     mass, damping, stiffness
         M, C, K, (n, n): numbers, or expressions of parameters such as "c1 + c2".
-    estimate, known, inputs, bounds
+    estimate, known, inputs, bounds, per_record
         As in `ode_model`.
     initial
         Values of displacements and velocities at the first time; 0 where none is given.
@@ -134,6 +142,9 @@ def second_order(
     names
         Names of the displacements, y1, y2, … by default; the velocity of y1 is v_y1. The states are
         y1, v_y1, y2, v_y2, …
+    masses, dampers, springs
+        {displacement: number or expression}, added to the diagonals of M, C and K: what stands between this
+        displacement and the ground.
 
     Raises
     ------
@@ -145,6 +156,16 @@ def second_order(
     >>> model = second_order([["m"]], [[0.2]], [[4.0]], estimate={"m": 1.0}, initial={"y1": 1.0})
     >>> model.states, model.linear
     (('y1', 'v_y1'), True)
+
+    A rotor on two bearings of unknown stiffness:
+
+    >>> import fem
+    >>> shaft = fem.Rotor(length=[0.5, 0.5], outer_diameter=0.05)
+    >>> motion = fem.equations_of_motion(shaft, plane="x")
+    >>> model = second_order(motion.M, motion.C, motion.K, names=motion.coordinates,
+    ...                      springs={"x1": "k", "x3": "k"}, estimate={"k": 1e7}, initial={"x2": 1e-3})
+    >>> model.parameters
+    ('k',)
     """
     m, c, k = (_entries(x, w) for x, w in ((mass, "mass"), (damping, "damping"), (stiffness, "stiffness")))
     n = len(m)
@@ -153,6 +174,8 @@ def second_order(
     dofs = tuple(names) if names is not None else tuple(f"y{i + 1}" for i in range(n))
     if len(dofs) != n:
         raise ValueError(f"{n} names of displacements are needed, not {len(dofs)}")
+    for matrix, added, what in ((m, masses, "masses"), (c, dampers, "dampers"), (k, springs, "springs")):
+        _to_ground(matrix, added or {}, dofs, what)
     speeds = tuple(f"v_{name}" for name in dofs)
     force = dict(force or {})
     if extra := [name for name in force if name not in dofs]:
@@ -166,6 +189,7 @@ def second_order(
     start = dict.fromkeys(states, 0.0) | dict(initial or {})
     observed = dict(outputs) if outputs else {name: name for name in dofs}
     shared: dict[str, Any] = {"known": known, "estimate": estimate, "inputs": inputs, "bounds": bounds}
+    shared["per_record"] = per_record
     plain = ode_model(states, initial=start, outputs=observed, **shared)
     read = Reader({name: Fraction(repr(value)) for name, value in plain.known.items()})
     cells = [[read(m[i][j], f"mass matrix, row {i + 1}", set(estimate)) for j in range(n)] for i in range(n)]
@@ -177,6 +201,17 @@ def second_order(
     model = SecondOrderModel(**parts, inertia=tuple(e for row in table for e in row))
     model.f(0.0, np.zeros(2 * n), model.start, np.zeros(len(model.inputs)))  # a singular mass matrix
     return model
+
+
+def _to_ground(
+    matrix: list[list[str]], added: Mapping[str, float | str], dofs: tuple[str, ...], what: str
+) -> None:
+    """Add entries to the diagonal of a matrix."""
+    for name, value in added.items():
+        if name not in dofs:
+            raise ValueError(f"{what}: {name} is no displacement; displacements are {', '.join(dofs)}")
+        i = dofs.index(name)
+        matrix[i][i] = f"({matrix[i][i]}) + ({_entry(value, f'{what}, {name}')})"
 
 
 def _entries(matrix: Matrix, what: str) -> list[list[str]]:

@@ -82,7 +82,7 @@ def shoot(
     nodes = [curves[p.number](p.record.t[0]) for p in parts if p.first > 0]
     if not nodes or not model.states:
         return start
-    search = _Pieces(problem, parts, _free(model), np.array(nodes))
+    search = _Pieces(problem, parts, np.array(nodes))
     z = np.concatenate((start, np.ravel(nodes)))
     low, high = np.full(len(z), -np.inf), np.full(len(z), np.inf)
     low[:n], high[:n] = lower, upper
@@ -108,11 +108,12 @@ def shoot(
 class _Pieces:
     """Residuals of all pieces and joints, and their derivatives by the parameters and the states at nodes."""
 
-    def __init__(self, problem: Problem, parts: list[_Piece], free: OdeModel, nodes: FloatArray) -> None:
-        self.problem, self.parts, self.free = problem, parts, free
+    def __init__(self, problem: Problem, parts: list[_Piece], nodes: FloatArray) -> None:
+        self.problem, self.parts = problem, parts
+        self.free = [_free(model) for model in problem.models]
         self.weight = STRICTNESS[0]
         data = problem.data
-        self.unit = max(float(np.sqrt(np.mean(data**2))), 1e-300) * np.sqrt(len(data))
+        self.unit = (float(np.sqrt(np.mean(data**2))) or 1.0) * np.sqrt(len(data))
         size = np.abs(nodes).max(axis=0)
         self.scale = np.where(size > 0, size, 1.0)
         self.forget()
@@ -136,8 +137,8 @@ class _Pieces:
         return self.last[1], self.last[2]
 
     def _rows(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        problem, model = self.problem, self.problem.model
-        n, k = len(model.parameters), len(model.states)
+        problem = self.problem
+        n, k = len(problem.model.parameters), len(problem.model.states)
         ys = [np.empty_like(data) for data in problem.measured]
         slopes = [np.zeros((*data.shape, len(z))) for data in problem.measured]
         joints, joint_slopes = [], []
@@ -146,7 +147,11 @@ class _Pieces:
             begins = p.first > 0
             theta = np.concatenate((z[:n], z[own])) if begins else z[:n]
             run = simulate(
-                self.free if begins else model, theta, p.record, method=problem.integrator, rtol=RTOL
+                self.free[p.number] if begins else problem.models[p.number],
+                theta,
+                p.record,
+                method=problem.integrator,
+                rtol=RTOL,
             )
             count = p.last - p.first + p.final
             rows = slice(p.first, p.first + count)

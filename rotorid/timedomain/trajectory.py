@@ -56,15 +56,16 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
     return _straight(t, x)
 
 
-def own_trajectory(problem: Problem, theta: FloatArray, record: Record) -> Curve:
-    """The model's own solution; of "heun" at the samples, straight between them.
+def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
+    """The model's own solution over one of the records; of "heun" at the samples, straight between them.
 
     Raises
     ------
     SimulationError
         The states diverge.
     """
-    model, t = problem.model, record.t
+    model, record = problem.models[number], problem.records[number]
+    t = record.t
     if problem.integrator == "heun" or len(t) == 1 or not model.states:
         x = simulate(model, theta, record, method=problem.integrator, sensitivities=False).x
         return _straight(t, x)

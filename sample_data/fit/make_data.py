@@ -6,6 +6,7 @@ on every run.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,19 +68,12 @@ def three_masses() -> None:
 
 
 def run_down(rng: np.random.Generator) -> None:
-    """Decay of a three-mass rotor model after a blow on the middle mass; displacements in um."""
-    m, c, d = np.diag([12.0, 28.0, 18.0]), np.zeros((3, 3)), np.diag([60.0, 40.0, 90.0])
-    springs = [1.4e6, 3.0e6, 2.0e6, 1.2e6]
-    for i, k in enumerate(springs):
-        if i > 0:
-            c[i - 1, i - 1] += k
-        if i < 3:
-            c[i, i] += k
-        if 0 < i < 3:
-            c[i - 1, i] -= k
-            c[i, i - 1] -= k
+    """Decay of the rotor's three-mass model after a blow on the middle mass; displacements in um."""
+    given = tomllib.loads((HERE / "run_down" / "model.toml").read_text(encoding="utf-8"))
+    m = np.array([[196.6167587206449 if x == "m_x12" else x for x in row] for row in given["M"]], dtype=float)
+    c, d = np.array(given["K"], dtype=float), np.diag([900.0, 1600.0, 1300.0])
     a = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(m, c), -np.linalg.solve(m, d)]])
-    t = np.arange(401) / 400
+    t = np.arange(601) / 1000
     x = linear(a, np.array([0, 0, 0, 0, 0.05, 0]), t)
     y = 1e6 * x.T[:3] + 2.0 * rng.standard_normal((3, len(t)))
     write("run_down/record.csv", ["drive_end", "middle", "free_end"], [t, *y], lambda value: f"{value:.1f}")

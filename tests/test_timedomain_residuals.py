@@ -1,0 +1,190 @@
+"""Residuals that are not noise, outputs of unequal precision, and what nonlinear models determine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotorid.timedomain import Record, ode_model
+from rotorid.timedomain.fit import fit
+
+OSCILLATOR = {"x": "v", "v": "-w**2*x"}
+AT_REST = {"x": 1.0, "v": 0.0}
+
+
+def oscillator(start, samples, noise=0.02, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 8.0, samples)
+    model = ode_model(OSCILLATOR, initial=AT_REST, outputs={"x": "x"}, estimate={"w": start})
+    return model, Record(t, {"x": np.cos(3 * t) + noise * rng.standard_normal(samples)})
+
+
+def decays(seed, a_error=0.002, b_error=0.1):
+    """Two outputs of very unequal precision, the second one seldom measured."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, 4.0, 201)
+    x = np.exp(-0.8 * t) + a_error * rng.standard_normal(201)
+    q = np.full(201, np.nan)
+    q[::10] = np.exp(-0.4 * t[::10]) + b_error * rng.standard_normal(21)
+    model = ode_model({"x": "-a*x", "q": "-b*q"}, initial={"x": 1.0, "q": 1.0}, estimate={"a": 0.5, "b": 0.5})
+    return model, Record(t, {"x": x, "q": q})
+
+
+@pytest.mark.parametrize("samples", [12, 60])
+@pytest.mark.parametrize("loss", ["linear", "huber"])
+def test_local_minima_of_a_frequency_get_no_interval(samples, loss):
+    wrong = 0
+    for seed, start in enumerate(np.linspace(1.2, 5.8, 12)):
+        model, record = oscillator(start, samples, seed=seed)
+        found = fit(model, record, loss=loss)
+        right = found.std is not None and abs(found.values[0] - 3.0) < 5 * found.std[0]
+        # 12 samples cannot tell 3 from 2π/Δt − 3 = 5.64 rad/s
+        wrong += not right and found.reliable and "half the sampling rate" not in " ".join(found.warnings)
+    assert wrong == 0
+
+
+def test_sinusoid_left_over_below_a_large_trend():
+    t = 0.2 * np.arange(100)
+    y = np.cos(7.85398 * t) + 5 * t + 0.02 * np.random.default_rng(0).standard_normal(100)
+    model = ode_model(OSCILLATOR, initial=AT_REST, outputs={"y": "x + r*t"}, estimate={"w": 8.1, "r": 1.0})
+    found = fit(model, Record(t, {"y": y}))
+    assert not found.reliable
+    assert found.std is None
+    assert "at one frequency" in " ".join(found.warnings)
+    better = fit(model, Record(t, {"y": y}), start={"w": 7.84})
+    assert better.reliable
+    assert abs(better.values[0] - 7.85398) < 4 * better.std[0]
+
+
+def test_outputs_of_unequal_precision_are_said_and_weighed():
+    model, record = decays(0)
+    plain = fit(model, record)
+    assert "the outputs have different errors" in " ".join(plain.warnings)
+    weighed = fit(model, record, weigh=True)
+    assert weighed.errors == pytest.approx({"x": 0.002, "q": 0.1}, rel=0.35)
+    assert weighed.warnings == ()
+    assert weighed.std[0] < 0.2 * plain.std[0]
+    assert "used as weights" in weighed.summary()
+
+
+def test_intervals_of_weighed_outputs_hold_the_truth():
+    hits = np.zeros(2)
+    for seed in range(100):
+        found = fit(*decays(seed), weigh=True)
+        low, high = found.ci95.T
+        hits += (low < [0.8, 0.4]) & (high > [0.8, 0.4])
+    assert (hits >= 88).all()  # 95 expected, 88 is three standard deviations less
+
+
+def test_output_in_a_small_unit_that_the_model_does_not_describe():
+    t = np.linspace(0.0, 4.0, 41)
+    rng = np.random.default_rng(1)
+    record = Record(
+        t,
+        {"temp": 300 * np.exp(-0.8 * t) + 0.3 * rng.standard_normal(41), "disp": 1e-4 * np.sin(5 * t)},
+    )
+    model = ode_model(
+        {"x": "-a*x", "q": "-b*q"},
+        initial={"x": 1.0, "q": 1.0},
+        outputs={"temp": "300*x", "disp": "1e-4*q"},
+        estimate={"a": 0.5, "b": 0.5},
+    )
+    found = fit(model, record)
+    assert not found.reliable
+    assert "variance of disp" in " ".join(found.warnings)
+
+
+def decay_record(seed=0):
+    t = np.linspace(0.0, 4.0, 41)
+    return Record(t, {"x": 2 * np.exp(-0.8 * t) + 0.02 * np.random.default_rng(seed).standard_normal(41)})
+
+
+def test_product_is_what_the_record_determines():
+    for start in ({"a": 0.5, "b": 1.0}, {"a": 0.1, "b": 3.0}):
+        model = ode_model({"x": "-a*b*x"}, initial={"x": "x0"}, estimate={**start, "x0": 1.0})
+        found = fit(model, decay_record())
+        assert [c.words for c in found.estimate.combinations] == ["a·b"]
+        product = found.estimate.combinations[0]
+        assert product.value == pytest.approx(0.8, abs=4 * product.std)
+        assert product.std < 0.01
+        assert np.isnan(found.values[:2]).all()
+
+
+def test_ratio_and_sum_are_what_the_record_determines():
+    t = np.linspace(0.0, 8.0, 81)
+    record = Record(t, {"x": np.cos(2 * t) + 0.01 * np.random.default_rng(2).standard_normal(81)})
+    ratio = ode_model(
+        {"x": "v", "v": "-k*x/m"}, initial=AT_REST, outputs={"x": "x"}, estimate={"m": 2.0, "k": 7.5}
+    )
+    found = fit(ratio, record)
+    only = found.estimate.combinations[0]
+    assert only.words == "m/k"
+    assert only.value == pytest.approx(0.25, abs=4 * only.std)
+    total = ode_model(
+        {"x": "v", "v": "-(k + c)*x"}, initial=AT_REST, outputs={"x": "x"}, estimate={"k": 1.0, "c": 2.8}
+    )
+    only = fit(total, record).estimate.combinations[0]
+    assert only.words == "k + c"
+    assert only.value == pytest.approx(4.0, abs=4 * only.std)
+
+
+def test_combination_that_is_no_product_and_no_sum_has_no_error():
+    t = np.linspace(0.0, 3.0, 31)
+    model = ode_model({}, outputs={"y": "(a**2 + b)*t"}, estimate={"a": 1.0, "b": 2.0})
+    y = 3 * t + 0.01 * np.random.default_rng(3).standard_normal(31)
+    found = fit(model, Record(t, {"y": y}))
+    only = found.estimate.combinations[0]
+    assert only.words.startswith("(near these values)")
+    assert only.std is None
+
+
+def test_start_where_the_sensitivity_vanishes_is_said():
+    t = 0.5 * np.arange(15)
+    model = ode_model({}, outputs={"y": "A**2*t"}, estimate={"A": 0.0})
+    found = fit(model, Record(t, {"y": 4 * t}))
+    assert np.isnan(found.values[0])
+    assert not found.reliable
+    assert "start elsewhere" in " ".join(found.warnings)
+
+
+def test_pulse_between_the_samples_is_said():
+    t = np.linspace(0.0, 100.0, 41)
+    model = ode_model(
+        {"x": "-a*x + 250*exp(-((t - 47.1)/0.002)**2)"}, initial={"x": 1.0}, estimate={"a": 0.02}
+    )
+    found = fit(model, Record(t, {"x": np.exp(-0.03 * t)}))  # a record in which nothing shows
+    assert not found.reliable
+    assert "step over" in " ".join(found.warnings)
+
+
+def test_every_record_has_its_own_initial_state():
+    rng = np.random.default_rng(4)
+    records = [
+        Record(t, {"x": x0 * np.exp(-0.8 * (t - t[0])) + 0.01 * rng.standard_normal(len(t))}, name=f"run {i}")
+        for i, (t, x0) in enumerate([(np.linspace(0, 3, 31), 2.0), (np.linspace(1, 5, 21), 1.0)])
+    ]
+    model = ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.5}, per_record=["x0"])
+    for method in ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting"):
+        found = fit(model, records, method=method)
+        assert found.parameters == ("a", "x0_1", "x0_2")
+        assert found.converged
+        np.testing.assert_array_less(np.abs(found.values - [0.8, 2.0, 1.0]), 4 * found.std)
+    bounded = fit(model, records, bounds={"x0": (0.0, 1.9)}, start={"x0": 1.0})
+    assert bounded.at_bounds == ("x0_1",)
+    assert fit(model, records[0]).parameters == ("a", "x0")
+
+
+def test_dead_sensor():
+    model = ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0})
+    for method in ("levenberg-marquardt", "multiple-shooting"):
+        found = fit(model, Record(0.1 * np.arange(30), {"x": np.zeros(30)}), method=method)
+        assert "zero throughout" in " ".join(found.warnings)
+
+
+def test_stated_errors_that_are_far_too_large_are_said():
+    record = decay_record()
+    wide = Record(record.t, record.outputs, sigma={"x": 1.0})
+    model = ode_model({"x": "-a*x"}, initial={"x": "x0"}, estimate={"a": 0.5, "x0": 1.0})
+    assert "these are too large" in " ".join(fit(model, wide).warnings)
+    with pytest.raises(ValueError, match="nothing to estimate them for"):
+        fit(model, wide, weigh=True)
