@@ -197,10 +197,21 @@ class Estimate:
             }
         )
 
-    def summary(self) -> str:
-        """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
+    def summary(self, at_bounds: Sequence[str] = ()) -> str:
+        """Text for an engineer: values ± standard deviations, intervals, and what is not determined.
+
+        Parameters
+        ----------
+        at_bounds
+            Parameters that stand at a bound, which is said instead of an interval.
+        """
         width = max(len(n) for n in self.names)
-        lines = [self._line(i, width) for i in range(len(self.names))]
+        lines = [
+            f"{name:<{width}} = {self.values[i]:.6g}   at its bound"
+            if name in at_bounds
+            else self._line(i, width)
+            for i, name in enumerate(self.names)
+        ]
         lines += [c.line() for c in self.combinations]
         lines.append(self.describe_rank())
         if self.covariance is None:

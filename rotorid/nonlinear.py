@@ -97,12 +97,7 @@ class NonlinearEstimate:
 
     def summary(self) -> str:
         """Text: the estimate, parameters at bounds, convergence."""
-        width = max(len(name) for name in self.names)
-        lines = self.estimate.summary().splitlines()
-        for name in self.at_bounds:
-            i = self.names.index(name)
-            lines[i] = f"{name:<{width}} = {self.values[i]:.6g}   at its bound"
-        return "\n".join([*lines, self.message])
+        return f"{self.estimate.summary(self.at_bounds)}\n{self.message}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the keys of the estimate and those of the search."""

@@ -178,11 +178,7 @@ class Fit:
 
     def summary(self) -> str:
         """Text for an engineer: method, values ± standard deviations, intervals, and what to beware of."""
-        width = max(len(name) for name in self.parameters)
-        lines = self.estimate.summary().splitlines()
-        for name in self.at_bounds:
-            i = self.parameters.index(name)
-            lines[i] = f"{name:<{width}} = {self.values[i]:.6g}   at its bound"
+        lines = self.estimate.summary(self.at_bounds).splitlines()
         if self.estimate.covariance is None and self.estimate.dof > 0:
             lines = [line for line in lines if not line.startswith("no intervals: ")]
         lines.insert(0, f"{self.method}, integrator {self.integrator}: {self.message}")
