@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
+HSBALANCE_VENV ?= .venv-hsbalance
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
@@ -26,8 +27,8 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: $(BENCH_VENV)/.bench
-	$(BENCH_VENV)/bin/python -m benchmarks
+bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
+	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks
 
 build: $(VENV)/.dev
 	$(BIN)/python -m pip -q install build
@@ -53,5 +54,12 @@ $(BENCH_VENV)/.bench: pyproject.toml
 	$(BENCH_VENV)/bin/python -m pip -q install -e . --group bench
 	touch $@
 
+# hsbalance in its own environment, without XPRESS, whose free licence refuses all but small problems
+$(HSBALANCE_VENV)/.peer:
+	$(PYTHON) -m venv $(HSBALANCE_VENV)
+	$(HSBALANCE_VENV)/bin/python -m pip -q install 'hsbalance==0.5.5' clarabel
+	$(HSBALANCE_VENV)/bin/python -m pip -q uninstall -y xpress
+	touch $@
+
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.baseline import match_speeds, starting_point
-from balancing.determined import acting_alike, check_planes, check_resolution
+from balancing.cautions import amplitude_words, binding, cautions, left_out, reading_names, weight_words
+from balancing.conditioning import conditioning
+from balancing.determined import check_planes, check_resolution
 from balancing.errors import Source, reading_covariance
 from balancing.influence import Influence
 from balancing.labels import Labels
-from balancing.propagation import correction_covariance, prediction_covariance
+from balancing.limits import Limits
+from balancing.methods import Stack, fit_weights
+from balancing.optimism import optimism
+from balancing.propagation import prediction_covariance
 from balancing.trials import ReadingErrors, Trials
-from rotorid.regression import coverage_factor, least_squares, unstretch
+from rotorid.regression import coverage_factor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,11 +31,6 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-
-ILL_CONDITIONED = 30.0
-"""Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
-
-_RISES_NAMED = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +59,21 @@ class Correction:
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
-        "least-squares".
+        "least-squares", "weighted", "minmax", "ridge" or "truncated".
     mounted
         Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
     labels
         Units and conventions to print in.
     warnings
         What the user should know.
+    singular_values
+        Of the stacked, column-scaled W, largest first.
+    gap
+        Certified relative distance of the objective from its optimum; None for a closed form.
+    chi_square, fit_dof
+        Of the method "weighted": how well weights in these planes explain the readings.
+    limits, active
+        What the correction had to keep to, and the limits that bind, in words.
     """
 
     speeds: FloatArray
@@ -84,6 +93,12 @@ class Correction:
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
     labels: Labels
     warnings: tuple[str, ...]
+    singular_values: FloatArray
+    gap: float | None = None
+    chi_square: float | None = None
+    fit_dof: int | None = None
+    limits: Limits | None = None
+    active: tuple[str, ...] = ()
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -193,8 +208,13 @@ def correct(
     speeds: ArrayLike | None = None,
     *,
     refuse: bool = True,
+    method: str = "least-squares",
+    limits: Limits | None = None,
+    row_weights: ArrayLike | None = None,
+    strength: float | str | None = None,
+    keep: float | None = None,
 ) -> Correction:
-    """Correction weights by least squares over all chosen sensors and speeds.
+    """Correction weights over all chosen sensors and speeds.
 
     Parameters
     ----------
@@ -210,11 +230,25 @@ def correct(
     refuse
         Whether to refuse planes that the measured coefficients tell apart only by their errors; else that is
         a warning. Planes that act alike exactly are always refused.
+    method
+        "least-squares"; "weighted": each reading counts by the inverse of its error, that of the coefficients
+        included (`balancing.effective`); "minmax": the smallest largest amplitude.
+    limits
+        Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
+        influence coefficients.
+    row_weights
+        How much each reading counts, (S, C); default all alike.
+    strength
+        Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …), or "auto".
+    keep
+        Truncation instead: how many combinations of planes to keep (1, 2, …), or the smallest singular value
+        relative to the largest (below 1).
 
     Returns
     -------
     Correction
-        With first-order errors through both W and Y₀ (`balancing.propagation`) where errors are known.
+        With errors through both W and Y₀ where errors are known: of first order in closed form
+        (`balancing.propagation`), or from sampled readings where limits or a maximum decide.
 
     Raises
     ------
@@ -223,7 +257,7 @@ def correct(
         at 95 % (`balancing.resolution`); for coefficients from runs with unknown errors above a condition
         number of 1000, which no instrument supports.
     ValueError
-        For an unknown plane or speed, a missing or unfit baseline.
+        For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
     start = starting_point(influence, baseline)
     chosen = _plane_indices(influence, planes)
@@ -231,17 +265,38 @@ def correct(
     names = tuple(influence.planes[p] for p in chosen)
     W = influence.W[used][..., chosen].reshape(-1, len(chosen))
     Y = start.readings[used]
-    check_planes(W, names)
-    unclear = check_resolution(influence, W, _of_planes(influence, used, chosen), names, refuse=refuse)
-    estimate = least_squares(W, -Y.ravel(), names=names)
-    D = unstretch(estimate.solution)
-    after = Y + influence.W[used][..., chosen] @ D
-    covariance = after_covariance = None
-    errors = start.model.errors
+    soft = strength is not None or keep is not None
+    unclear: tuple[str, ...] = ()
+    unclear_regions: tuple[str, ...] = ()
+    if not soft:
+        check_planes(W, names)
+        coefficients = _of_planes(influence, used, chosen)
+        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
+        if coefficients is not None and start.covariance is not None and not unclear:
+            small = optimism(W, coefficients, names, method=method)
+            unclear_regions = (small,) if small else ()
+    planes_told = conditioning(W, names)
+    errors, channels = start.model.errors, None
     if start.covariance is not None and errors is not None:
         index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
         channels = start.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
-        covariance = correction_covariance(W, D, after.ravel(), channels)
+    kept = None if limits is None else limits.pick(used, chosen)
+    stack = Stack(
+        W,
+        Y.ravel(),
+        channels,
+        _rows(row_weights, influence.W.shape[:2], used),
+        kept if kept is not None and kept.any else None,
+        names,
+        reading_names(influence.sensors, influence.speeds[used]),
+        partial(amplitude_words, start.labels),
+        partial(weight_words, start.labels),
+    )
+    fitted = fit_weights(stack, method, strength=strength, keep=keep)
+    D = fitted.weights
+    after = Y + influence.W[used][..., chosen] @ D
+    after_covariance = None
+    if channels is not None and errors is not None:
         own = reading_covariance(after, errors)
         after_covariance = own + prediction_covariance(D, channels).reshape(own.shape)
     result = Correction(
@@ -251,21 +306,42 @@ def correct(
         weights=D,
         before=Y,
         after=after,
-        covariance=covariance,
+        covariance=fitted.covariance,
         after_covariance=after_covariance,
         dof=start.model.dof,
         errors=errors,
         error_source=start.model.source,
-        condition_number=estimate.condition_number,
-        rank=estimate.rank // 2,
-        method="least-squares",
+        condition_number=planes_told.condition_number,
+        rank=planes_told.rank,
+        method=method if not soft else "ridge" if strength is not None else "truncated",
         mounted=start.mounted,
         labels=start.labels,
         warnings=(),
+        singular_values=planes_told.singular_values,
+        gap=fitted.gap,
+        chi_square=fitted.chi_square,
+        fit_dof=fitted.dof,
+        limits=stack.limits,
+        active=binding(stack, fitted),
     )
-    warnings = influence.warnings + start.warnings + unclear + _cautions(result, W, alike=not unclear)
-    warnings += _left_out(influence, start.readings, chosen, used, D, start.labels)
+    warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
+    warnings += cautions(result, W, alike=not unclear)
+    warnings += left_out(influence, start.readings, chosen, used, D, start.labels)
     return _with_warnings(result, warnings)
+
+
+def _rows(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
+    if given is None:
+        return None
+    weights = np.asarray(given, dtype=np.float64)
+    if weights.shape != shape or not (np.isfinite(weights) & (weights >= 0)).all():
+        raise ValueError(
+            f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
+        )
+    chosen = weights[used].ravel()
+    if not chosen.any():
+        raise ValueError("all readings have the weight 0: nothing is left to be minimised")
+    return None if (chosen == 1).all() else chosen
 
 
 def region_radius(dof: int | None) -> float:
@@ -299,55 +375,6 @@ def _plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[i
     if not planes or len(set(planes)) < len(planes):
         raise ValueError("choose at least one plane, each once")
     return [influence.planes.index(p) for p in planes]
-
-
-def _cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, ...]:
-    out = []
-    if alike and result.condition_number > ILL_CONDITIONED:
-        planes = acting_alike(W)
-        out.append(
-            f"planes {', '.join(repr(result.planes[p]) for p in planes)} act nearly alike (condition number "
-            f"{result.condition_number:.3g}): small errors of the readings become large weights; "
-            "leave one out, or add sensors or speeds"
-        )
-    std = result.angle_std
-    if std is not None:
-        out += [
-            f"the weight in plane {p!r} lies within its own error: its angle is not determined"
-            for p, s in zip(result.planes, std, strict=True)
-            if np.isnan(s)
-        ]
-    return tuple(out) + _rises(result.speeds, result.sensors, result.before, result.after, result.labels, "")
-
-
-def _left_out(
-    influence: Influence, Y: ComplexArray, chosen: list[int], used: list[int], D: ComplexArray, labels: Labels
-) -> tuple[str, ...]:
-    rest = [s for s in range(len(influence.speeds)) if s not in used]
-    after = Y[rest] + influence.W[rest][..., chosen] @ D
-    words = ", a speed left out"
-    return _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, words)
-
-
-def _rises(
-    speeds: FloatArray,
-    sensors: tuple[str, ...],
-    before: ComplexArray,
-    after: ComplexArray,
-    labels: Labels,
-    where: str,
-) -> tuple[str, ...]:
-    old, new = labels.vibration(before)[0], labels.vibration(after)[0]
-    places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
-    places.sort(key=lambda place: old[place] - new[place])
-    words = [
-        f"the vibration of sensor {sensors[c]!r} at {speeds[s] * 30 / np.pi:.6g} rpm{where} is predicted "
-        f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_unit}".rstrip()
-        for s, c in places[:_RISES_NAMED]
-    ]
-    if len(places) > _RISES_NAMED:
-        words[-1] += f"; {len(places) - _RISES_NAMED} more readings{where} rise less"
-    return tuple(words)
 
 
 def _with_warnings(result: Correction, warnings: tuple[str, ...]) -> Correction:

@@ -55,14 +55,25 @@ def overview(c: Correction) -> Figure:
 
 
 def corrections(c: Correction, ax: Axes | None = None) -> Axes:
-    """Polar picture of the correction weights, one arrow per plane."""
+    """Polar picture of the correction weights, one arrow per plane, with 95 % regions and largest weights."""
     polar = _polar(ax, c.labels.angle_sign)
     mass, angle = c.labels.weight(c.weights)
+    regions = _regions(c)
     for p, plane in enumerate(c.planes):
         _arrow(polar, np.deg2rad(angle[p]), mass[p], COLOURS[p % len(COLOURS)], MARKERS[p % len(MARKERS)])
         label = f"{plane}: {figures(mass[p])} {c.labels.weight_unit} at {angle[p]:.1f}°"
         polar.plot([], [], color=COLOURS[p % len(COLOURS)], marker=MARKERS[p % len(MARKERS)], label=label)
-    polar.set_rlim(0, 1.15 * max(float(mass.max()), np.finfo(float).tiny))
+        if regions is not None:
+            size, around = c.labels.weight(regions[p])
+            colour = COLOURS[p % len(COLOURS)]
+            polar.plot(np.unwrap(np.deg2rad(around)), size, color=colour, lw=1.0, zorder=2)
+    largest = max(float(mass.max()), np.finfo(float).tiny)
+    if regions is not None:
+        # a region far larger than the weights would hide them: it may leave the picture
+        reach = float(np.abs(regions).max()) * c.labels.weight_scale
+        largest = max(largest, min(reach, 2.5 * largest))
+    _largest_weights(polar, c)
+    polar.set_rlim(0, 1.15 * largest)
     _quiet_radii(polar, angle, mass)
     polar.set_title(
         f"Correction weights on the bare rotor, {c.labels.weight_unit}", fontsize="medium", pad=14
@@ -72,10 +83,46 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
         loc="upper center",
         bbox_to_anchor=(0.5, -0.08),
         fontsize="small",
-        title=f"angles from the mark {turn} the rotation (↺)",
+        title=f"angles from the mark {turn} the rotation (↺)"
+        + ("" if regions is None else "; closed lines: 95 % regions"),
         title_fontsize="small",
     )
     return polar
+
+
+def _regions(c: Correction) -> ComplexArray | None:
+    """Boundary (P, n) of the 95 % region of each weight; None where errors are unknown."""
+    from balancing.correction import region_radius
+
+    covariance = c.plane_covariance
+    if covariance is None:
+        return None
+    values, axes = np.linalg.eigh(covariance)
+    turn = np.linspace(0.0, 2 * np.pi, 181)
+    circle = np.stack((np.cos(turn), np.sin(turn)))
+    reach = region_radius(c.dof) * np.sqrt(np.maximum(values, 0.0))
+    edge = (axes * reach[:, None, :]) @ circle
+    return np.asarray(c.weights[:, None] + edge[:, 0] + 1j * edge[:, 1])
+
+
+def _largest_weights(polar: PolarAxes, c: Correction) -> None:
+    """Dashed circles of the largest weights, where they are limited."""
+    if c.limits is None:
+        return
+    turn = np.linspace(0.0, 2 * np.pi, 181)
+    for p, limit in enumerate(c.limits.max_weight * c.labels.weight_scale):
+        if np.isfinite(limit):
+            polar.plot(turn, np.full_like(turn, limit), ls="--", lw=0.9, color=COLOURS[p % len(COLOURS)])
+
+
+def _amplitude_limits(ax: Axes, c: Correction, x: NDArray[np.float64]) -> None:
+    """A short line over each bar whose amplitude is limited."""
+    if c.limits is None:
+        return
+    limit = c.limits.residual.ravel() * c.labels.vibration_scale
+    there = np.isfinite(limit)
+    if there.any():
+        ax.hlines(limit[there], x[there] - 0.45, x[there] + 0.45, color="#D55E00", lw=1.8, label="limit")
 
 
 def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: bool = True) -> Axes:
@@ -118,6 +165,7 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
         reach = region_radius(c.dof) * spread
         error = [np.minimum(reach, new), reach]
         note += ", 95 % of a check run"
+    _amplitude_limits(ax, c, x)
     ax.errorbar(x, new, yerr=error, fmt="o", ms=4, color=COLOURS[0], capsize=2, lw=1.2, label=note)
     positive = old[old > 0]
     wide = (

@@ -20,6 +20,13 @@ WIDTH = 80
 DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 
+_METHODS = {
+    "least-squares": "Least squares: the sum of squared amplitudes is the smallest possible.",
+    "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
+    "minmax": "Min–max: the largest amplitude is the smallest possible.",
+    "ridge": "Ridge: small weights where planes act alike.",
+    "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
+}
 _SOURCES = {
     "stated": "as stated in the job",
     "repeats": "from repeated readings",
@@ -78,6 +85,12 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         "max_after": float(new.max()),
         "condition_number": _number(c.condition_number),
         "rank": c.rank,
+        "singular_values": c.singular_values.tolist(),
+        "duality_gap": c.gap,
+        "chi_square": c.chi_square,
+        "chi_square_dof": c.fit_dof,
+        "limits": _limits(c),
+        "limits_that_bind": list(c.active),
         "errors": _errors(c),
         "warnings": list(c.warnings),
     }
@@ -162,7 +175,22 @@ def _quality(c: Correction) -> str:
     planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
     unit, scale = c.labels.vibration_unit, c.labels.vibration_scale
     numbers = f"rank {c.rank} of {n}, condition number {c.condition_number:.3g}"
-    lines = [f"{planes.capitalize()} determined ({numbers})."]
+    lines = [_METHODS[c.method]]
+    if c.gap is not None:
+        lines[0] += f" The optimum is certified: at most {max(c.gap, 0.0):.1e} better is possible."
+    if c.active:
+        lines.append(f"Limits that bind: {'; '.join(c.active)}.")
+    soft = c.method in ("ridge", "truncated")
+    if not soft:
+        lines.append(f"{planes.capitalize()} determined ({numbers}).")
+    elif c.singular_values.size:
+        shown = ", ".join(f"{s:.3g}" for s in c.singular_values)
+        lines.append(f"{numbers.capitalize()}, singular values {shown}.")
+    if c.chi_square is not None and c.fit_dof:
+        lines.append(
+            f"What is left of the vibration is {np.sqrt(c.chi_square / c.fit_dof):.2g} times what the "
+            f"errors of the readings explain (χ² {c.chi_square:.1f} with {c.fit_dof} degrees of freedom)."
+        )
     if c.covariance is None:
         lines.append(
             "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
@@ -205,6 +233,29 @@ def _errors(c: Correction) -> dict[str, Any]:
         "floor": None if e is None else e.floor * c.labels.vibration_scale,
         "degrees_of_freedom": c.dof,
     }
+
+
+def _limits(c: Correction) -> dict[str, Any] | None:
+    """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
+    if c.limits is None:
+        return None
+    weight = c.limits.max_weight * c.labels.weight_scale
+    amplitude = c.limits.residual.ravel() * c.labels.vibration_scale
+    return {
+        "max_weight": {p: _number(w) for p, w in zip(c.planes, weight, strict=True)},
+        "amplitude": [_number(a) for a in amplitude],
+        "forbidden_deg": {
+            p: [_degrees_of(c, arc) for arc in arcs]
+            for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
+            if arcs
+        },
+    }
+
+
+def _degrees_of(c: Correction, arc: tuple[float, float]) -> list[float]:
+    """From and to of an arc, in the job's direction."""
+    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign
+    return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
 
 
 def figures(value: float, digits: int = 4) -> str:

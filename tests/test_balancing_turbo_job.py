@@ -27,7 +27,7 @@ def correction():
 
 def test_the_tables_are_what_the_script_makes(maker, tmp_path):
     maker.main(tmp_path)
-    for name in ("runs.csv", "weights.csv"):
+    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
         assert (tmp_path / name).read_text() == (JOB / name).read_text()
 
 

@@ -9,7 +9,18 @@ import warnings
 
 import typer
 
-from rotorid.cli import balance, campbell, critical, demo, fit, identify, influence, reduce, response
+from rotorid.cli import (
+    balance,
+    campbell,
+    critical,
+    demo,
+    fit,
+    identify,
+    influence,
+    reduce,
+    response,
+    unbalance,
+)
 
 app = typer.Typer(
     name="rotorid",
@@ -24,6 +35,7 @@ app.command("campbell")(campbell.campbell)
 app.command("response")(response.response)
 app.command("influence")(influence.influence)
 app.command("balance")(balance.balance)
+app.command("unbalance")(unbalance.unbalance)
 app.command("reduce")(reduce.reduce)
 app.command("identify")(identify.identify)
 app.command("fit")(fit.fit)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
@@ -17,6 +18,20 @@ from rotorid.cli.common import (
     names,
     speeds,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing import Correction, Influence
+    from balancing.check import CheckComparison
+    from balancing.subset import Subsets
+    from balancing.tradeoff import TradeOff
+    from rotorid.tables import Job
+
+METHODS = ("least-squares", "weighted", "minmax")
+COEFFICIENTS = ("measured", "computed", "combined")
+MODEL_ERROR = 20.0
+"""Percent by which a computed coefficient may be wrong (one standard deviation) if nobody says."""
 
 
 class Overrides(TypedDict):
@@ -37,8 +52,29 @@ def balance(
             show_default=False,
         ),
     ],
+    method: Annotated[
+        str, typer.Option(metavar="METHOD", help=f"{', '.join(METHODS)} (the smallest largest amplitude).")
+    ] = METHODS[0],
     influence: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Stored influence coefficients.", show_default=False)
+    ] = None,
+    coefficients: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help=f"{', '.join(COEFFICIENTS)}: from the runs, from the job's rotor, or both; default: "
+            "measured where there are trial weights.",
+            show_default=False,
+        ),
+    ] = None,
+    model_error: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PERCENT",
+            min=0.0,
+            help=f"Standard deviation of computed coefficients; combined: {MODEL_ERROR:g} if not given.",
+            show_default=False,
+        ),
     ] = None,
     amplitude_error: Annotated[
         float | None,
@@ -58,7 +94,7 @@ def balance(
         ),
     ] = None,
     planes: Annotated[
-        str | None, typer.Option(metavar="A,B", help="Correct in these planes only.", show_default=False)
+        str | None, typer.Option(metavar="LIST", help="Use these planes only.", show_default=False)
     ] = None,
     speed: Annotated[
         str | None,
@@ -69,6 +105,43 @@ def balance(
             show_default=False,
         ),
     ] = None,
+    max_mass: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MASS", help="Largest weight of every plane, 5g; or left=5g,right=3g.", show_default=False
+        ),
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SENSOR=VALUE",
+            help="Largest amplitude of a sensor; VALUE alone: of all. May be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    ridge: Annotated[
+        str | None,
+        typer.Option(
+            metavar="STRENGTH",
+            help="Small weights where planes act alike: 0.01 … 0.1, or auto.",
+            show_default=False,
+        ),
+    ] = None,
+    truncate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="NUMBER",
+            help="Keep this many combinations of planes (1, 2, …), or those above this share (below 1).",
+            show_default=False,
+        ),
+    ] = None,
+    best_planes: Annotated[
+        int | None,
+        typer.Option(metavar="K", min=1, help="Compare all choices of K planes, too.", show_default=False),
+    ] = None,
+    trade_off: Annotated[
+        bool, typer.Option("--trade-off", help="Residual against total weight, too (a second picture).")
+    ] = False,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
@@ -81,13 +154,16 @@ def balance(
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 
-    Example: rotorid balance runs.csv weights.csv --amplitude-error 2 --phase-error 2
+    Example: rotorid balance runs.csv weights.csv --amplitude-error 2 --phase-error 2 --max-mass 5g
     """
-    from balancing import correct, estimate_influence
-    from balancing.plots import overview
+    from balancing import correct
+    from balancing.check import compare_check
+    from rotorid.cli.coefficients import choose
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.influence import influence_bytes
+    from rotorid.tables.joblimits import with_limits
 
+    _check_options(method, coefficients, ridge, truncate)
     check_targets(plot, output, save_influence)
     targets = [path for path in (plot, output, save_influence) if path is not None]
     check_inputs(targets, [*files, *([influence] if influence is not None else [])])
@@ -99,27 +175,143 @@ def balance(
     }
     is_job = len(files) == 1 and influence is None and files[0].suffix.lower() in (".toml", ".xlsx")
     job = read_job(files[0], **settings) if is_job else job_from_files(files, influence=influence, **settings)
-    coefficients = job.influence if job.influence is not None else estimate_influence(job.trials)
+    if max_mass is not None or limit:
+        job = with_limits(job, max_mass, limit or [])
+    found = choose(job, coefficients, model_error)
+    used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
     result = correct(
-        coefficients,
-        baseline=job.trials if job.influence is not None else None,
-        planes=names(planes),
-        speeds=None if speed is None else speeds(speed, job.trials.labels.speed_unit),
+        found.influence,
+        baseline=found.baseline,
+        planes=names(planes) or (list(found.used) if job.left_out else None),
+        speeds=used,
+        method=method,
+        limits=job.limits_of(found.influence.planes),
+        row_weights=job.row_weights,
+        strength=_strength(ridge),
+        keep=truncate,
     )
+    report = Report(result, found.influence)
+    if job.check is not None:
+        report.check = compare_check(result, job.check, found.influence, found.baseline)
+    if best_planes is not None:
+        report.add_subsets(best_planes, job)
+    if trade_off:
+        report.add_trade_off(job)
     emit(
-        result.to_dict(),
-        result.summary,
+        report.to_dict(),
+        report.text,
         as_json=json,
         files=job.files,
         options={
             **settings,
+            "method": method,
             "planes": planes,
             "speeds": speed,
             "influence": influence,
+            "coefficients": coefficients,
+            "model_error": model_error,
+            "max_mass": max_mass,
+            "limit": ", ".join(limit) if limit else None,
+            "ridge": ridge,
+            "truncate": truncate,
         },
-        figure=(plot, lambda: overview(result)),
+        figure=(plot, report.figure),
         table=(output, result.to_frame),
         more=None
         if save_influence is None
-        else (save_influence, lambda: influence_bytes(save_influence, coefficients)),
+        else (save_influence, lambda: influence_bytes(save_influence, found.influence)),
     )
+
+
+def _check_options(method: str, coefficients: str | None, ridge: str | None, truncate: float | None) -> None:
+    for option, value, known in (
+        ("--method", method, METHODS),
+        ("--coefficients", coefficients, (*COEFFICIENTS, None)),
+    ):
+        if value not in known:
+            raise ValueError(
+                f"{option} {value!r} is not known: one of {', '.join(k for k in known if k is not None)}"
+            )
+    if ridge is not None and truncate is not None:
+        raise ValueError("--ridge and --truncate are two ways to the same end: choose one")
+
+
+def _strength(text: str | None) -> float | str | None:
+    if text is None or text == "auto":
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value < float("inf"):
+        raise ValueError(f"--ridge {text!r}: a strength above 0, such as 0.03, or auto")
+    return value
+
+
+@dataclass
+class Report:
+    """A correction and what was asked for beside it."""
+
+    result: Correction
+    influence: Influence
+    check: CheckComparison | None = None
+    subsets: Subsets | None = None
+    curve: TradeOff | None = None
+
+    def add_subsets(self, k: int, job: Job) -> None:
+        """Compare choices of k planes."""
+        from balancing.subset import best_subsets
+
+        W, Y, rows = self._stack(job, self.influence.planes)
+        self.subsets = best_subsets(
+            W,
+            Y,
+            self.influence.planes,
+            k,
+            criterion="max" if self.result.method == "minmax" else "rms",
+            row_weights=rows,
+            labels=self.result.labels,
+        )
+
+    def add_trade_off(self, job: Job) -> None:
+        """Residual against total weight, in the planes used."""
+        from balancing.tradeoff import trade_off
+
+        W, Y, rows = self._stack(job, self.result.planes)
+        self.curve = trade_off(
+            W,
+            Y,
+            self.result.planes,
+            criterion="max" if self.result.method == "minmax" else "rms",
+            row_weights=rows,
+            labels=self.result.labels,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        parts = {"check": self.check, "best_planes": self.subsets, "trade_off": self.curve}
+        return {
+            **self.result.to_dict(),
+            **{key: part.to_dict() for key, part in parts.items() if part is not None},
+        }
+
+    def text(self) -> str:
+        """For the terminal."""
+        parts = (self.result, self.check, self.subsets, self.curve)
+        return "\n\n".join(part.summary() for part in parts if part is not None)
+
+    def figure(self) -> Figure:
+        """The correction, or the trade-off where it was asked for."""
+        from balancing import plots, plots_tradeoff
+
+        return plots.overview(self.result) if self.curve is None else plots_tradeoff.overview(self.curve)
+
+    def _stack(self, job: Job, planes: tuple[str, ...]) -> tuple[Any, Any, Any]:
+        """W (N, P), Y (N,) and row weights (N,) of the speeds used."""
+        from balancing.baseline import match_speeds
+
+        at = match_speeds(self.result.speeds, self.influence.speeds)
+        columns = [self.influence.planes.index(p) for p in planes]
+        W = self.influence.W[at][..., columns].reshape(-1, len(columns))
+        rows = None if job.row_weights is None else job.row_weights[at].ravel()
+        return W, self.result.before.ravel(), rows

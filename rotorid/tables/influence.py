@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -15,8 +14,16 @@ from balancing.labels import Labels
 from balancing.trials import Trials
 from fem.sensors import label
 from rotorid.tables import units
-from rotorid.tables.columns import Column, Table, must_be, read_table
-from rotorid.tables.conventions import ANGLES, FULL_TURN, PHASES, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.columns import Column, make_table, must_be, read_grid
+from rotorid.tables.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.influence_comments import (
+    PHASE_MEANING,
+    check_notes,
+    error_comments,
+    read_conventions,
+    read_errors,
+)
+from rotorid.tables.influence_errors import error_columns, error_values, read_covariance
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.runs import PHASE, SPEED
 from rotorid.tables.speeds import same_speed, show_speed
@@ -30,14 +37,6 @@ if TYPE_CHECKING:
 
     from fem.sensors import SensorLike
 
-_CONVENTION = re.compile(r"(phase|angle)s?\b\s*([:=]|\bis\b|\bare\b)?\s*[\"']?(.*?)[\"']?\.?", re.IGNORECASE)
-_LIKELY = {
-    "phase": re.compile(r"\bphases?\b.*\b(lead|lag)|\b(lead|lag).*\bphases?\b", re.IGNORECASE),
-    "angles": re.compile(
-        r"\bangles?\b.*\b(with|against)\b|\b(against|with) (the )?rotation\b", re.IGNORECASE
-    ),
-}
-PHASE_MEANING = "phase_deg is the phase reading that a weight at angle 0 causes"
 _GAPS_NAMED = 100
 _PATTERN = (
     "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
@@ -112,7 +111,8 @@ def read_influence(
     Returns
     -------
     balancing.Influence
-        In SI, phase lead, with labels to print in; without baseline and covariance.
+        In SI, phase lead, with labels to print in and without a baseline; with the covariance of the
+        coefficients and the errors of a reading where the table has them (`write_influence`).
 
     Raises
     ------
@@ -131,10 +131,12 @@ def load_influence(
 ) -> Stored | None:
     """As `read_influence`, or None and problems."""
     before = len(problems)
-    table = read_table(path, "influence", COLUMNS, problems)
+    grid = read_grid(path, "influence", problems)
+    columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
+    table = None if grid is None else make_table(grid, columns, problems)
     if table is None:
         return None
-    said = _conventions(table, problems)
+    said = read_conventions(table.source, table.comments, problems)
     speed, size, angle = (table.numbers(stem) for stem in ("speed", "influence", "phase"))
     must_be(table, "speed", speed > 0, "a speed above 0", problems)
     must_be(table, "influence", size >= 0, "a coefficient of 0 or more", problems)
@@ -168,11 +170,14 @@ def load_influence(
     if len(problems) > before:
         return None
     sign = -1 if (said.get("phase") or phase) == "lag" else 1
-    values = polar(size, angle, sign)
-    W = np.empty((len(speeds), len(sensors), len(planes)), dtype=complex)
+    places = np.empty((len(speeds), len(sensors), len(planes)), dtype=np.intp)
     for key, i in seen.items():
-        W[key] = values[i]
+        places[key] = i
     vibration, weight = _split(table.unit("influence").name)
+    covariance = read_covariance(table, places, planes, sign, problems)
+    errors = read_errors(table, vibration, problems)
+    if len(problems) > before:
+        return None
     labels = Labels(
         vibration_unit=vibration.name,
         vibration_scale=vibration.scale,
@@ -181,31 +186,18 @@ def load_influence(
         phase=phase or as_phase(said.get("phase", "lead")),
         angles=angles or as_angles(said.get("angles", "with rotation")),
     )
-    influence = Influence(speeds=np.array(speeds), sensors=sensors, planes=planes, W=W, labels=labels)
+    influence = Influence(
+        speeds=np.array(speeds),
+        sensors=sensors,
+        planes=planes,
+        W=polar(size, angle, sign)[places],
+        covariance=covariance,
+        dof=errors.dof,
+        errors=errors.reading,
+        error_source=errors.source,
+        labels=labels,
+    )
     return Stored(influence, said)
-
-
-def _conventions(table: Table, problems: Problems) -> dict[str, str]:
-    """What comment lines of the table say about its conventions.
-
-    Capitals and the sign between do not matter; a comment that seems to state a convention in other words is
-    a problem, because passing over it would turn the weights round.
-    """
-    said: dict[str, str] = {}
-    for comment in table.comments:
-        match = _CONVENTION.fullmatch(comment)
-        word, sign = (" ".join(match[3].casefold().split()), match[2]) if match else ("", None)
-        key = {"phase": "phase", "angle": "angles"}.get(match[1].casefold() if match else "", "")
-        likely = key if sign else next((k for k, words in _LIKELY.items() if words.search(comment)), "")
-        if comment == PHASE_MEANING or not (likely or word in (*PHASES, *ANGLES)):
-            continue
-        key = key or likely
-        allowed = PHASES if key == "phase" else ANGLES
-        if word not in allowed or said.get(key, word) != word:
-            expected = f"# {key} = {listing(allowed)}, once{did_you_mean(word, allowed)}"
-            problems.add(table.source, None, None, f"# {comment}", expected)
-        said[key] = word
-    return said
 
 
 def influence_frame(coefficients: Coefficients, labels: Labels | None = None) -> pd.DataFrame:
@@ -221,7 +213,8 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
     Returns
     -------
     pandas.DataFrame
-        `speed_rad_s`, `sensor`, `plane`, `influence_<unit>`, `phase_deg`.
+        `speed_rad_s`, `sensor`, `plane`, `influence_<unit>`, `phase_deg`; where their errors are known,
+        also `std_re_<unit>`, `std_im_<unit>` and the correlations.
     """
     import pandas as pd
 
@@ -237,6 +230,7 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
             "plane": [str(name) for _ in range(S * C) for name in coefficients.planes],
             f"influence_{above}per_{labels.weight_unit}": size.ravel(),
             "phase_deg": phase.ravel(),
+            **(error_values(coefficients, labels) if isinstance(coefficients, Influence) else {}),
         }
     )
 
@@ -247,24 +241,41 @@ def labels_of(coefficients: Coefficients) -> Labels:
     return labels if isinstance(labels, Labels) else Labels(weight_unit="kg_m")
 
 
-def write_influence(path: str | Path, influence: Coefficients) -> None:
-    """Write influence coefficients, with their conventions in comment lines, to `.csv` or `.xlsx`.
+def write_influence(path: str | Path, influence: Coefficients, notes: Sequence[str] = ()) -> None:
+    """Write influence coefficients to `.csv` or `.xlsx`: with their conventions, and errors where known.
+
+    What is stored of the errors: the covariance of the coefficients, and the errors of a reading with their
+    source and degrees of freedom. The readings of the bare rotor are not stored: a later job has its own.
+
+    Parameters
+    ----------
+    path
+        An existing file is replaced.
+    influence
+        Of `balancing` or of a rotor model.
+    notes
+        Conditions in words (machine, load, number of runs), written as comment lines.
 
     Raises
     ------
     InputError
         If the file cannot be written; nothing half written is left.
+    ValueError
+        For a note that a reader would take for a statement about conventions or errors.
     """
-    write_bytes(Path(path), influence_bytes(path, influence))
+    write_bytes(Path(path), influence_bytes(path, influence, notes))
 
 
-def influence_bytes(path: str | Path, influence: Coefficients) -> bytes:
+def influence_bytes(path: str | Path, influence: Coefficients, notes: Sequence[str] = ()) -> bytes:
     """What `write_influence` writes."""
     labels = labels_of(influence)
+    check_notes(notes)
     comments = (
         f"phase = {labels.phase}",
         f"angles = {labels.angles}",
         PHASE_MEANING,
+        *(error_comments(influence, labels) if isinstance(influence, Influence) else ()),
+        *notes,
     )
     return table_bytes(path, influence_frame(influence, labels), comments=comments, sheet="influence")
 
@@ -323,7 +334,8 @@ def fit_to_readings(
         influence,
         speeds=trials.speeds,
         sensors=trials.sensors,
-        W=influence.W[np.ix_(rows, columns, range(len(influence.planes)))],
+        W=influence.W[np.ix_(rows, columns)],
+        covariance=None if influence.covariance is None else influence.covariance[np.ix_(rows, columns)],
         labels=labels,
     )
 

@@ -2,46 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from balancing.influence import Influence
+from balancing.limits import Limits
 from balancing.trials import Trials
-from rotorid.tables.conventions import (
-    ANGLES,
-    DEFAULT_TOLERANCE,
-    LARGEST_TOLERANCE,
-    PHASES,
-    Angles,
-    Conventions,
-    Phase,
-    StatedErrors,
-    as_angles,
-    as_phase,
-)
+from rotorid.tables.conventions import DEFAULT_TOLERANCE, Conventions, as_angles, as_phase
 from rotorid.tables.grid import Grid
-from rotorid.tables.influence import Stored, fit_to_readings, load_influence
+from rotorid.tables.influence import fit_to_readings, load_influence
 from rotorid.tables.jobbook import read_job_book
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.jobkeys import COLUMNS, PlaneKeys, SensorKeys, read_plane, read_sensor
+from rotorid.tables.joblimits import make_limits, make_row_weights
+from rotorid.tables.jobmodel import (
+    Model,
+    collect,
+    complain_about_places,
+    read_check,
+    read_model,
+    weight_unit_without_weights,
+)
+from rotorid.tables.jobsettings import (
+    Extra,
+    Overrides,
+    Settings,
+    file_of,
+    read_extra,
+    read_settings,
+    settle_conventions,
+)
+from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
 from rotorid.tables.sheet import is_workbook
 from rotorid.tables.tomlfile import Section, read_toml
 from rotorid.tables.trials import make_trials
 
-# Keys of the interface that later versions obey; until then each is refused by name.
-PLANES_LATER = (
-    "max_mass_g",
-    "radius_mm",
-    "trial_radius_mm",
-    "holes_deg",
-    "holes",
-    "first_hole_deg",
-    "available_g",
-    "forbidden_deg",
-    "remove",
-)
-SENSORS_LATER = ("limit", "weight", "angle_deg")
-JOB_LATER = ("rotor", "check", "key_phasor", "slow_roll")
+if TYPE_CHECKING:
+    from fem.rotor import Rotor
+    from fem.sensors import Sensor
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,22 +60,54 @@ class Job:
         Of phases, angles and speeds.
     files
         All files that were read, for the provenance of a result.
+    planes
+        Names (P,): those of stored coefficients or else of the weights, then planes that only the rotor
+        model knows (named in the job, with a node).
+    limits
+        In SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`; None: none.
+    row_weights
+        Of each reading in the fit, shape (S, C): the speed's times the sensor's; None where all are 1.
+    left_out
+        Planes that the job tells not to use.
+    check
+        Check runs, in the units and at the speeds of the job, or None.
+    check_mounted
+        Whether `check.weights` say what was mounted in the check runs; else the proposed corrections were.
+    rotor
+        The model that the job names, or None.
+    plane_nodes
+        Node of each plane that has one in the model.
+    sensor_places
+        Node and direction (degrees with the rotation from the model's x) of each sensor that has a node.
+    radii
+        Radius, m, of each plane that has one: it converts between masses and unbalances.
     """
 
     trials: Trials
     influence: Influence | None
     conventions: Conventions
     files: tuple[Path, ...]
+    planes: tuple[str, ...] = ()
+    limits: Limits | None = None
+    row_weights: NDArray[np.float64] | None = None
+    left_out: tuple[str, ...] = ()
+    check: Trials | None = None
+    check_mounted: bool = False
+    rotor: Rotor | None = None
+    plane_nodes: Mapping[str, int] = field(default_factory=dict)
+    sensor_places: Mapping[str, Sensor] = field(default_factory=dict)
+    radii: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Planes that are not left out."""
+        return tuple(p for p in self.planes if p not in self.left_out)
 
-@dataclass(frozen=True)
-class Settings:
-    """What a job's settings say, before its tables are read; conventions that nobody states are None."""
-
-    phase: Phase | None
-    angles: Angles | None
-    speed_tolerance_percent: float
-    errors: StatedErrors | None
+    def limits_of(self, planes: Sequence[str]) -> Limits | None:
+        """Limits of these planes only, in their order, at all speeds."""
+        if self.limits is None:
+            return None
+        return self.limits.pick(range(len(self.trials.speeds)), [self.planes.index(p) for p in planes])
 
 
 def read_job(
@@ -107,9 +141,9 @@ def read_job(
     """
     path = Path(path)
     problems = Problems()
-    overrides = _Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
+    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
     if is_workbook(path):
-        book = read_job_book(path, {"planes": PLANES_LATER, "sensors": SENSORS_LATER}, problems)
+        book = read_job_book(path, COLUMNS, problems)
         if book is None:
             problems.stop()
             raise AssertionError
@@ -124,7 +158,7 @@ def read_job(
         data = read_toml(path, problems)
         problems.stop()
         top = Section(str(path), data or {}, problems)
-        runs, weights = _file(top, "runs", path), _file(top, "weights", path)
+        runs, weights = file_of(top, "runs", path), file_of(top, "weights", path)
         if "runs" not in top:
             top.missing("runs", 'the runs table, runs = "runs.csv"')
     else:
@@ -132,20 +166,22 @@ def read_job(
         problems.add(str(path), None, None, None, expected)
         problems.stop()
         raise AssertionError
-    influence = _file(top, "influence", path)
-    if weights is None and "weights" not in top and "influence" not in top:
-        top.missing("weights", "a weights table, or an influence table of stored coefficients")
-    settings = _settings(top, overrides, problems)
-    planes, sensors = _named(top, "planes", PLANES_LATER), _named(top, "sensors", SENSORS_LATER)
+    influence, extra = file_of(top, "influence", path), read_extra(top, path)
+    if weights is None and "weights" not in top and "influence" not in top and "rotor" not in top:
+        top.missing("weights", "a weights table, or an influence table of stored coefficients, or a rotor")
+    settings = read_settings(top, overrides, problems)
+    unclear = len(problems) > 0
+    planes = {name: read_plane(section) for name, section in top.named("planes").items()}
+    sensors = {name: read_sensor(section) for name, section in top.named("sensors").items()}
     top.finish()
     if runs is None:
         problems.stop()
         raise AssertionError
-    job = _assemble(path, runs, weights, influence, settings, problems)
+    job = _read_tables(path, runs, weights, influence, settings, problems, unclear=unclear)
+    sign = 1 if job is None else job.conventions.angle_sign
+    model = read_model(extra.rotor, planes, sensors, sign, problems, named="rotor" in top)
     if job is not None:
-        known_planes = job.trials.planes or (job.influence.planes if job.influence else ())
-        _complain_about_names(str(path), "planes", planes, known_planes, problems)
-        _complain_about_names(str(path), "sensors", sensors, job.trials.sensors, problems)
+        job = _completed(job, model, extra, settings, top, planes, sensors, problems)
     problems.stop()
     assert job is not None
     return job
@@ -190,7 +226,7 @@ def job_from_files(
         )
     problems = Problems()
     paths = [Path(file) for file in files]
-    overrides = _Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
+    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
     settings = Settings(
         as_phase(phase) if phase else None,
         as_angles(angles) if angles else None,
@@ -204,85 +240,52 @@ def job_from_files(
     return job
 
 
-@dataclass(frozen=True)
-class _Overrides:
-    """What the caller says instead of the job file."""
-
-    phase: str | None
-    angles: str | None
-    amplitude_error_percent: float | None
-    phase_error_deg: float | None
-
-    def __post_init__(self) -> None:
-        Conventions(as_phase(self.phase or "lead"), as_angles(self.angles or "with rotation"))
-        self.errors(None)
-
-    def errors(self, stated: StatedErrors | None) -> StatedErrors | None:
-        """Stated errors with the replacements."""
-        if self.amplitude_error_percent is None and self.phase_error_deg is None:
-            return stated
-        result = stated or StatedErrors()
-        if self.amplitude_error_percent is not None:
-            result = replace(result, amplitude_percent=self.amplitude_error_percent)
-        if self.phase_error_deg is not None:
-            result = replace(result, phase_deg=self.phase_error_deg)
-        return result
-
-
-def _file(top: Section, key: str, job: Path) -> Path | None:
-    name = top.text(key)
-    if name is None:
-        return None
-    if not name.isprintable():
-        expected = (
-            "the name of a file, without control characters: in double quotes TOML takes \\ for the "
-            "beginning of one; write / in its place, or put the name in single quotes"
-        )
-        top.complain(key, expected)
-        return None
-    return job.parent / name
-
-
-def _settings(top: Section, overrides: _Overrides, problems: Problems) -> Settings:
-    phase = top.choice("phase", PHASES, "")
-    angles = top.choice("angles", ANGLES, "")
-    tolerance = top.number("speed_tolerance_percent", DEFAULT_TOLERANCE, low=0.0, high=LARGEST_TOLERANCE)
-    errors = _errors(top, problems)
-    top.later(*JOB_LATER)
-    phase, angles = overrides.phase or phase, overrides.angles or angles
-    return Settings(
-        as_phase(phase) if phase else None,
-        as_angles(angles) if angles else None,
-        DEFAULT_TOLERANCE if tolerance is None else tolerance,
-        overrides.errors(errors),
+def _completed(
+    job: Job,
+    model: Model,
+    extra: Extra,
+    settings: Settings,
+    top: Section,
+    plane_keys: Mapping[str, PlaneKeys],
+    sensor_keys: Mapping[str, SensorKeys],
+    problems: Problems,
+) -> Job:
+    """The job with limits, weights, model and check runs; problems are noted."""
+    trials = job.trials
+    radii = {name: keys.radius for name, keys in plane_keys.items() if keys.radius is not None}
+    planes = (*job.planes, *(name for name in model.plane_nodes if name not in job.planes))
+    if not job.planes and model.rotor is not None:
+        complain_about_places(trials.sensors, model, top, plane_keys)
+        trials = weight_unit_without_weights(trials, planes, radii)
+    if planes:
+        _complain_about_names(top.source, "planes", tuple(plane_keys), planes, problems)
+    _complain_about_names(top.source, "sensors", tuple(sensor_keys), trials.sensors, problems)
+    left_out = tuple(name for name in planes if name in plane_keys and not plane_keys[name].use)
+    if planes and len(left_out) == len(planes):
+        top.complain("planes", "at least one plane without use = false", value=False)
+    tolerance = settings.speed_tolerance_percent
+    limits = make_limits(trials, planes, plane_keys, sensor_keys, tolerance)
+    row_weights = make_row_weights(trials, sensor_keys, top, extra.speed_weights, tolerance)
+    check = None
+    if extra.check is not None:
+        tables, known = (extra.check, extra.check_weights), job.conventions
+        check = read_check(*tables, known, settings.errors, trials, planes, problems)
+    more = (*model.files, *(file for file in (extra.check, extra.check_weights) if file is not None))
+    return replace(
+        job,
+        trials=trials,
+        files=job.files + more,
+        planes=planes,
+        limits=limits,
+        row_weights=row_weights,
+        left_out=left_out,
+        check=check,
+        check_mounted=check is not None and extra.check_weights is not None,
+        rotor=model.rotor,
+        plane_nodes=model.plane_nodes,
+        sensor_places=model.sensor_places,
+        radii=radii,
     )
-
-
-def _errors(top: Section, problems: Problems) -> StatedErrors | None:
-    section = top.section("errors")
-    if section is None:
-        return None
-    before = len(problems)
-    values = {key: section.number(key, low=0.0) for key in ("amplitude_percent", "phase_deg", "floor")}
-    section.finish()
-    given = {key: value for key, value in values.items() if value is not None}
-    if len(problems) > before:
-        return None
-    if not any(given.values()):
-        expected = (
-            "an error above 0 (amplitude_percent, phase_deg or floor); leave [errors] out if it is unknown"
-        )
-        top.missing("errors", expected)
-        return None
-    return StatedErrors(**given)
-
-
-def _named(top: Section, key: str, later: tuple[str, ...]) -> tuple[str, ...]:
-    sections = top.named(key)
-    for section in sections.values():
-        section.later(*later)
-        section.finish()
-    return tuple(sections)
 
 
 def _complain_about_names(
@@ -292,6 +295,27 @@ def _complain_about_names(
         if name not in known:
             expected = f"one of the job's {key}, {listing(known, 'and')}{did_you_mean(name, known)}"
             problems.add(source, None, f"{key}.{name}", name, expected)
+
+
+def _read_tables(
+    job: Path,
+    runs: Path | Grid,
+    weights: Path | Grid | None,
+    stored: Path | None,
+    settings: Settings,
+    problems: Problems,
+    *,
+    unclear: bool,
+) -> Job | None:
+    """`_assemble`, also where planes or sensors have problems, unless the conventions are unclear."""
+    own = problems if unclear else Problems()
+    read = _assemble(job, runs, weights, stored, settings, own)
+    try:
+        if not unclear:
+            own.stop()
+    except InputError as error:
+        collect(error, problems)
+    return read
 
 
 def _assemble(
@@ -305,7 +329,7 @@ def _assemble(
     found = None
     if stored is not None:
         found = load_influence(stored, settings.phase, settings.angles, problems)
-    conventions, notes = _conventions(settings, stored, found)
+    conventions, notes = settle_conventions(settings, stored, found)
     trials = make_trials(runs, weights, conventions, settings.errors, problems)
     influence = None
     if found is not None and trials is not None:
@@ -317,33 +341,6 @@ def _assemble(
         return None
     trials = replace(trials, warnings=notes + trials.warnings)
     read = (job, runs, weights, stored)
-    return Job(trials, influence, conventions, tuple(file for file in read if isinstance(file, Path)))
-
-
-def _conventions(
-    settings: Settings, stored: Path | None, found: Stored | None
-) -> tuple[Conventions, tuple[str, ...]]:
-    """Conventions of the readings and weights: stated ones, else those of stored coefficients; and notes."""
-    said = {} if found is None else found.said
-    phase = settings.phase or as_phase(said.get("phase", "lead"))
-    angles = settings.angles or as_angles(said.get("angles", "with rotation"))
-    notes = []
-    adopted = [
-        words
-        for words, own, used, usual in (
-            (f"phase = {phase}", settings.phase, phase, "lead"),
-            (f"angles {angles}", settings.angles, angles, "with rotation"),
-        )
-        if own is None and used != usual
-    ]
-    if adopted:
-        notes.append(
-            f"nothing states the conventions of the readings: those of {stored} are used for them too, "
-            f"{' and '.join(adopted)}"
-        )
-    if settings.phase and said.get("phase", settings.phase) != settings.phase:
-        notes.append(
-            f"the readings are taken with phase = {settings.phase}, as stated, and the coefficients with "
-            f"phase = {said['phase']}, as {stored} says"
-        )
-    return Conventions(phase, angles, settings.speed_tolerance_percent), tuple(notes)
+    files = tuple(file for file in read if isinstance(file, Path))
+    planes = trials.planes if influence is None else influence.planes
+    return Job(trials, influence, conventions, files, planes)

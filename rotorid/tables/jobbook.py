@@ -8,11 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.tables.columns import REMARKS, sheet_source
-from rotorid.tables.grid import BadCell, Grid, Row, make_grid, show
+from rotorid.tables.grid import BadCell, Cell, Grid, Row, make_grid, show
+from rotorid.tables.jobkeys import Columns
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.sheet import find_sheet, read_workbook
 
 SHEETS = ("runs", "weights", "planes", "sensors", "settings")
+FLAG = "use"
+"""The one setting that is true or false."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class JobBook:
     where: Mapping[str, tuple[str, int, str]]
 
 
-def read_job_book(path: Path, columns: Mapping[str, tuple[str, ...]], problems: Problems) -> JobBook | None:
+def read_job_book(path: Path, columns: Mapping[str, Columns], problems: Problems) -> JobBook | None:
     """Read a job's workbook, or None and problems.
 
     Parameters
@@ -65,7 +68,7 @@ def read_job_book(path: Path, columns: Mapping[str, tuple[str, ...]], problems: 
     for name, key in (("planes", "plane"), ("sensors", "sensor")):
         if grids.get(name):
             _read_named(grids[name], name, key, settings, where, problems)
-            _check_prepared(grids[name], (key, *columns.get(name, ())), problems)
+            _check_prepared(grids[name], key, columns[name], problems)
     if "runs" not in grids:
         titles = listing((repr(title) for title in sheets), "and")
         problems.add(str(path), None, None, None, f"a sheet 'runs'; the sheets are {titles}")
@@ -77,12 +80,18 @@ def _holds_cells(rows: list[Row]) -> bool:
     return any(show(cell) for _, cells in rows for cell in cells)
 
 
-def _check_prepared(grid: Grid | None, known: tuple[str, ...], problems: Problems) -> None:
+def _check_prepared(grid: Grid | None, key: str, columns: Columns, problems: Problems) -> None:
     """Where there are no rows, whose settings would be checked, check the header itself."""
-    if grid is None or grid.rows or known[0] not in grid.header:
+    if grid is None or grid.rows or key not in grid.header:
         return
+    known = (key, *columns.usual)
     for name in grid.header:
-        if name and name not in known and not name.casefold().startswith(REMARKS):
+        if (
+            name
+            and name not in known
+            and name not in columns.more
+            and not name.casefold().startswith(REMARKS)
+        ):
             expected = f"a known column{did_you_mean(name, known)}; known are {listing(known, 'and')}"
             problems.add(grid.source, grid.header_row, name, name, expected)
 
@@ -111,7 +120,8 @@ def _read_settings(
         return
     at = [i for i, name in enumerate(grid.header) if name.casefold() in ("key", "setting", "value")]
     for row, cells in grid.rows:
-        key, value = show(cells[at[0]]), cells[at[1]]
+        key = show(cells[at[0]])
+        value = _flag(cells[at[1]]) if key.endswith(f".{FLAG}") else cells[at[1]]
         if not key:
             problems.add(grid.source, row, grid.header[at[0]], "", "the name of a setting")
         elif isinstance(value, BadCell) or value == "":
@@ -125,6 +135,12 @@ def _read_settings(
             if not _put(settings, key.split("."), value, where[key], where):
                 expected = f"no parts of {key.rpartition('.')[0]}, which has a value of its own"
                 problems.add(grid.source, row, grid.header[at[0]], key, expected)
+
+
+def _flag(cell: Cell) -> Cell | bool:
+    """A logical cell, or `true`, `false`, `yes`, `no`, as a truth value; anything else as it is."""
+    word = show(cell).casefold()
+    return word in ("true", "yes") if word in ("true", "yes", "false", "no") else cell
 
 
 def _put(
@@ -179,7 +195,8 @@ def _read_named(
             if not column or column == key or column.casefold().startswith(REMARKS) or cell == "":
                 continue
             where[f"{name}.{item}.{column}"] = (grid.source, row, column)
-            if isinstance(cell, BadCell):
-                problems.add(grid.source, row, column, cell.value, cell.expected)
+            value = _flag(cell) if column == FLAG else cell
+            if isinstance(value, BadCell):
+                problems.add(grid.source, row, column, value.value, value.expected)
             else:
-                section[column] = cell
+                section[column] = value

@@ -2,7 +2,7 @@
 
     python sample_data/turbo_job/make_job.py
 
-writes runs.csv and weights.csv beside this file. Everything is fixed by SEED; see README.md.
+writes runs.csv and weights.csv beside this file, and the check run (check.csv, check_weights.csv). Everything is fixed by SEED; see README.md.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ PLANES = {"left": 6, "middle": 12, "right": 19}
 SENSORS = {"probe 1": 4, "probe 2": 10, "probe 3": 14, "probe 4": 20}
 SPEEDS_RPM = (1220, 1360, 3600, 4950, 5400)  # critical speeds at 1291 and 5164 rpm
 TRIAL_G_MM = 800.0  # at 0°, in one plane after the other, removed again
+MOUNTED = {"left": (417, 172), "middle": (282, 278), "right": (448, 10)}  # the check run: g·mm, degrees
 G_MM = 1e-6  # kg·m
 UM_PP = 0.5e-6  # m of amplitude
 
@@ -61,7 +62,7 @@ def as_read(vibration: complex) -> tuple[str, str]:
 
 
 def main(folder: Path = HERE) -> None:
-    """Write the two tables."""
+    """Write the tables."""
     runs, weights = [], []
     for number in range(len(PLANES) + 1):
         run = "baseline" if number == 0 else f"trial {number}"
@@ -71,6 +72,12 @@ def main(folder: Path = HERE) -> None:
             weights.append((run, list(PLANES)[number - 1], f"{TRIAL_G_MM:g}", "0"))
         for speed, row in zip(SPEEDS_RPM, simulate(mounted), strict=True):
             runs += [(run, speed, sensor, *as_read(z)) for sensor, z in zip(SENSORS, row, strict=True)]
+    check, check_weights = [], [("check", plane, *map(str, MOUNTED[plane])) for plane in PLANES]
+    corrections = [g * G_MM * np.exp(1j * np.deg2rad(angle)) for g, angle in MOUNTED.values()]
+    for speed, row in zip(SPEEDS_RPM, simulate(corrections), strict=True):
+        check += [("check", speed, sensor, *as_read(z)) for sensor, z in zip(SENSORS, row, strict=True)]
+    _write(folder / "check.csv", ("run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"), check)
+    _write(folder / "check_weights.csv", ("run", "plane", "unbalance_g_mm", "angle_deg"), check_weights)
     _write(folder / "runs.csv", ("run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"), runs)
     _write(folder / "weights.csv", ("run", "plane", "unbalance_g_mm", "angle_deg"), weights)
 

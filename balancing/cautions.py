@@ -1,0 +1,133 @@
+"""What to beware of in a correction, in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.determined import acting_alike
+from balancing.influence import Influence
+from balancing.labels import Labels
+
+if TYPE_CHECKING:
+    from balancing.correction import Correction
+    from balancing.methods import Fitted, Stack
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+ILL_CONDITIONED = 30.0
+"""Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
+_RISES_NAMED = 3
+POOR = 1e-3
+"""Probability of χ² below which weights in the planes do not explain the vibration."""
+
+
+def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
+    """What to call each reading, speed by speed."""
+    return tuple(f"sensor {c!r} at {s * 30 / np.pi:.6g} rpm" for s in speeds for c in sensors)
+
+
+def amplitude_words(labels: Labels, size: float) -> str:
+    """An amplitude in the job's unit."""
+    return f"{size * labels.vibration_scale:.4g} {labels.vibration_unit}".rstrip()
+
+
+def weight_words(labels: Labels, size: float) -> str:
+    """A weight in the job's unit."""
+    return f"{size * labels.weight_scale:.4g} {labels.weight_unit}".rstrip()
+
+
+def binding(stack: Stack, fitted: Fitted) -> tuple[str, ...]:
+    """Limits that the correction touches, in words."""
+    if stack.limits is None:
+        return ()
+    D, r = fitted.weights, stack.Y + stack.W @ fitted.weights
+    words = [
+        f"plane {name!r} has its largest weight, {stack.weight(float(limit))}"
+        for name, size, limit in zip(stack.planes, np.abs(D), stack.limits.max_weight, strict=True)
+        if np.isfinite(limit) and size >= limit * (1 - 1e-6)
+    ]
+    words += [
+        f"{name} has its largest amplitude, {stack.amplitude(float(limit))}"
+        for name, size, limit in zip(stack.readings, np.abs(r), stack.limits.residual.ravel(), strict=True)
+        if np.isfinite(limit) and size >= limit * (1 - 1e-6)
+    ]
+    words += [
+        f"plane {name!r} stands at the end of a forbidden arc"
+        for name, weight, arcs in zip(stack.planes, D, stack.limits.forbidden, strict=True)
+        if abs(weight) > 0 and any(_at_end(weight, start, width) for start, width in arcs)
+    ]
+    return tuple(words)
+
+
+def _at_end(weight: complex, start: float, width: float) -> bool:
+    away = np.angle(weight * np.exp(-1j * np.array([start, start + width])))
+    return bool((np.abs(away) < 1e-6).any())
+
+
+def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, ...]:
+    """Planes that act nearly alike, weights within their errors, a poor fit, readings that rise."""
+    out = []
+    if alike and result.condition_number > ILL_CONDITIONED:
+        planes = acting_alike(W)
+        out.append(
+            f"planes {', '.join(repr(result.planes[p]) for p in planes)} act nearly alike (condition number "
+            f"{result.condition_number:.3g}): small errors of the readings become large weights; "
+            "leave one out, or add sensors or speeds"
+        )
+    std = result.angle_std
+    if std is not None:
+        out += [
+            f"the weight in plane {p!r} lies within its own error: its angle is not determined"
+            for p, s in zip(result.planes, std, strict=True)
+            if np.isnan(s)
+        ]
+    if result.chi_square is not None and result.fit_dof and _chance(result) < POOR:
+        ratio = np.sqrt(result.chi_square / result.fit_dof)
+        out.append(
+            f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
+            "large as the errors of the readings; there is unbalance outside the planes (or a bow, or the "
+            "rotor is not linear), and the errors of the weights were enlarged by that ratio"
+        )
+    return tuple(out) + _rises(result.speeds, result.sensors, result.before, result.after, result.labels, "")
+
+
+def left_out(
+    influence: Influence, Y: ComplexArray, chosen: list[int], used: list[int], D: ComplexArray, labels: Labels
+) -> tuple[str, ...]:
+    """Readings at speeds that were left out and are predicted to rise."""
+    rest = [s for s in range(len(influence.speeds)) if s not in used]
+    after = Y[rest] + influence.W[rest][..., chosen] @ D
+    words = ", a speed left out"
+    return _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, words)
+
+
+def _rises(
+    speeds: FloatArray,
+    sensors: tuple[str, ...],
+    before: ComplexArray,
+    after: ComplexArray,
+    labels: Labels,
+    where: str,
+) -> tuple[str, ...]:
+    old, new = labels.vibration(before)[0], labels.vibration(after)[0]
+    places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
+    places.sort(key=lambda place: old[place] - new[place])
+    words = [
+        f"the vibration of sensor {sensors[c]!r} at {speeds[s] * 30 / np.pi:.6g} rpm{where} is predicted "
+        f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_unit}".rstrip()
+        for s, c in places[:_RISES_NAMED]
+    ]
+    if len(places) > _RISES_NAMED:
+        words[-1] += f"; {len(places) - _RISES_NAMED} more readings{where} rise less"
+    return tuple(words)
+
+
+def _chance(result: Correction) -> float:
+    """Probability of a larger χ²."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(result.fit_dof, result.chi_square))

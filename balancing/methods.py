@@ -1,0 +1,250 @@
+"""The ways to weights: which method solves the stacked equations, and what its answer is worth.
+
+Every method gets the same stack `Y + W D` and gives weights, their covariance and what it can certify.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.determined import UndeterminedError
+from balancing.effective import effective_variance
+from balancing.limits import Limits
+from balancing.propagation import correction_covariance, prediction_covariance
+from balancing.regularised import ridge, truncated
+from balancing.sampling import sampled_covariance
+from balancing.sectors import allowed_sectors, stands_in
+from balancing.solve import Method, Solution, solve
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+ComplexArray = NDArray[np.complex128]
+
+METHODS = ("least-squares", "weighted", "minmax")
+_ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The equations of all chosen readings, one below the other.
+
+    Attributes
+    ----------
+    W, Y
+        Influence coefficients (N, P) and vibration of the bare rotor (N,).
+    channels
+        Covariance of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2); None: unknown.
+    row_weights
+        How much each reading counts, (N,); None: all alike.
+    limits
+        Of weights and amplitudes; None: no limits.
+    planes, readings
+        Names of the planes, and what to call each reading.
+    amplitude, weight
+        Write an amplitude or a weight with its unit.
+    """
+
+    W: ComplexArray
+    Y: ComplexArray
+    channels: FloatArray | None
+    row_weights: FloatArray | None
+    limits: Limits | None
+    planes: tuple[str, ...]
+    readings: tuple[str, ...]
+    amplitude: Callable[[float], str]
+    weight: Callable[[float], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Weights of one method.
+
+    Attributes
+    ----------
+    weights
+        Shape (P,).
+    covariance
+        (2P, 2P); None where errors are unknown.
+    gap
+        Certified relative distance from the optimum; None for a closed form.
+    chi_square, dof
+        Of the weighted fit: how well weights in these planes explain the readings.
+    active_weights, active_residuals
+        Limits that bind, (P,) and (N,).
+    warnings
+        What the user should know.
+    """
+
+    weights: ComplexArray
+    covariance: FloatArray | None
+    gap: float | None = None
+    chi_square: float | None = None
+    dof: int | None = None
+    active_weights: BoolArray | None = None
+    active_residuals: BoolArray | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def fit_weights(
+    stack: Stack, method: str, *, strength: float | str | None = None, keep: float | None = None
+) -> Fitted:
+    """Weights by one of the methods.
+
+    Parameters
+    ----------
+    stack
+        Equations, errors, limits.
+    method
+        "least-squares", "weighted" (readings count by the inverse of their errors, those of the coefficients
+        included) or "minmax".
+    strength
+        Ridge: how strongly large weights are avoided, relative; "auto".
+    keep
+        Truncation: number of combinations of planes to keep, or the smallest singular value relative to the
+        largest.
+
+    Raises
+    ------
+    ValueError
+        For an unknown method, combinations that are not offered, limits that cannot be met.
+    UndeterminedError
+        Where the readings do not tell the planes apart and neither ridge nor truncation is asked for.
+    """
+    if method not in METHODS:
+        raise ValueError(f"there is no method {method!r}; methods are {', '.join(METHODS)}")
+    if strength is not None or keep is not None:
+        return _regularised(stack, method, strength, keep)
+    if method == "weighted":
+        return _weighted(stack)
+    return _plain(stack, "minmax" if method == "minmax" else "least-squares")
+
+
+def _plain(stack: Stack, method: Method) -> Fitted:
+    found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
+    bound = found.active_weights.any() or found.active_residuals.any()
+    if stack.channels is None:
+        covariance = None
+    elif method == "least-squares" and not bound:
+        covariance = _propagated(stack, found.weights, stack.row_weights)
+    else:
+        covariance = sampled_covariance(
+            lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights,
+            stack.W,
+            stack.Y,
+            stack.channels,
+        )
+    return Fitted(
+        found.weights,
+        covariance,
+        found.gap,
+        active_weights=found.active_weights,
+        active_residuals=found.active_residuals,
+    )
+
+
+def _solve(
+    stack: Stack, method: Method, W: ComplexArray, Y: ComplexArray, row_weights: FloatArray | None
+) -> Solution:
+    return solve(
+        W,
+        Y,
+        method=method,
+        row_weights=row_weights,
+        limits=stack.limits,
+        names=stack.planes,
+        readings=stack.readings,
+        amplitude=stack.amplitude,
+        weight=stack.weight,
+    )
+
+
+def _propagated(stack: Stack, D: ComplexArray, row_weights: FloatArray | None) -> FloatArray:
+    """First-order covariance of least squares with row weights: those of the scaled rows."""
+    assert stack.channels is not None
+    w = np.ones(len(stack.Y)) if row_weights is None else row_weights
+    W, r = w[:, None] * stack.W, w * (stack.Y + stack.W @ D)
+    return correction_covariance(W, D, r, w[:, None, None] ** 2 * stack.channels)
+
+
+def _weighted(stack: Stack) -> Fitted:
+    if stack.channels is None:
+        if stack.row_weights is None:
+            raise ValueError(
+                "the method weighted needs errors of the readings ([errors], --amplitude-error, "
+                "--phase-error or repeated readings), or weights of sensors or speeds"
+            )
+        note = "the errors of the readings are unknown: they count by the weights of sensors and speeds alone"
+        plain = _plain(stack, "least-squares")
+        return replace(plain, warnings=(note,))
+    free = effective_variance(stack.W, stack.Y, stack.channels, row_weights=stack.row_weights)
+    if not free.converged:
+        raise UndeterminedError(
+            "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
+            "bound; use larger trial weights, fewer planes or another method"
+        )
+    if stack.limits is None or _kept(stack.limits, free.weights, free.residual):
+        covariance = free.covariance * max(1.0, free.inflation) ** 2
+        return Fitted(free.weights, covariance, chi_square=free.chi_square, dof=free.dof)
+    return _weighted_with_limits(stack, free.weights)
+
+
+def _weighted_with_limits(stack: Stack, start: ComplexArray) -> Fitted:
+    """Least squares with limits whose rows count by their errors, these taken at the last weights."""
+
+    def search(W: ComplexArray, Y: ComplexArray) -> Solution:
+        D = start
+        for _ in range(_ROUNDS):
+            found = _solve(stack, "least-squares", W, Y, _inverse_errors(stack, D))
+            if np.abs(found.weights - D).max() <= 1e-9 * max(np.abs(found.weights).max(), 1e-300):
+                break
+            D = found.weights
+        return found
+
+    assert stack.channels is not None
+    found = search(stack.W, stack.Y)
+    covariance = sampled_covariance(lambda W, Y: search(W, Y).weights, stack.W, stack.Y, stack.channels)
+    return Fitted(
+        found.weights,
+        covariance,
+        found.gap,
+        active_weights=found.active_weights,
+        active_residuals=found.active_residuals,
+    )
+
+
+def _inverse_errors(stack: Stack, D: ComplexArray) -> FloatArray:
+    """One over the mean standard deviation of each predicted reading at given weights."""
+    assert stack.channels is not None
+    variance = np.trace(prediction_covariance(D, stack.channels), axis1=1, axis2=2) / 2
+    own = np.ones(len(stack.Y)) if stack.row_weights is None else stack.row_weights
+    # a reading without errors counts for a thousand, not for ever
+    return np.asarray(own / np.sqrt(np.maximum(variance, 1e-6 * variance.max())))
+
+
+def _kept(limits: Limits, D: ComplexArray, r: ComplexArray) -> bool:
+    return bool(
+        (np.abs(D) <= limits.max_weight * (1 + 1e-9)).all()
+        and (np.abs(r) <= limits.residual.ravel() * (1 + 1e-9)).all()
+        and all(stands_in(d, allowed_sectors(arcs)) for d, arcs in zip(D, limits.forbidden, strict=True))
+    )
+
+
+def _regularised(stack: Stack, method: str, strength: float | str | None, keep: float | None) -> Fitted:
+    if strength is not None and keep is not None:
+        raise ValueError("ridge and truncation are two ways to the same end: choose one")
+    if method != "least-squares" or (stack.limits is not None and stack.limits.any):
+        raise ValueError("ridge and truncation go with least squares without limits only")
+    if strength is not None:
+        found = ridge(
+            stack.W, stack.Y, strength, stack.row_weights, channels=stack.channels, planes=stack.planes
+        )
+    else:
+        assert keep is not None
+        found = truncated(
+            stack.W, stack.Y, keep, stack.row_weights, channels=stack.channels, planes=stack.planes
+        )
+    return Fitted(found.weights, found.covariance, warnings=(found.words,))

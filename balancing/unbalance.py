@@ -1,0 +1,334 @@
+"""Unbalance at any stations from the readings of a single run: Y = W U, so that corrections are −U.
+
+Source: [S] 1.9.1, (28)–(33), extended to more stations than readings. With the singular values
+W = Σ u_i s_i v_iᴴ (rows divided by the errors of the readings where these are known) the estimate is
+U = Σ f_i v_i (u_iᴴ Y) / s_i:
+
+- f_i = 1 for s_i > 0: least squares where the readings determine every station, else the smallest unbalance
+  (|U| least) that causes these readings;
+- f_i = s_i² / (s_i² + λ²) ("ridge"): least |Y − W U|² + λ² |U|². λ is given, or such that the readings are
+  met as well as their errors allow (discrepancy principle: Σ |r_i|²/σ_i² = 2 N), or, without known errors,
+  by generalised cross-validation: least |r|² / (N − Σ f_i)².
+
+"modal": the vibration is Σ_j g_j(ω) ψ_j (φ_jᵀ U) over the modes: mode j sees of an unbalance only
+b_j = φ_jᵀ U. Of all distributions with the same b = (b_1 … b_k) the one with the least Σ |U_q|²/m_q is
+U = M Φ a with Φᵀ M Φ a = b (Lagrange: 2 M⁻¹ U = Φ μ), hence U = B b with B = M Φ (Φᵀ M Φ)⁻¹ and ΦᵀB = 1.
+The k numbers b follow from Y = (W B) b by least squares; −U then takes away what excites modes 1…k. Of the
+modes above k the readings must hold little: take them near the critical speeds 1…k.
+
+U = G Y is linear in the readings: the covariance of U is that of the readings through G, and U = R U_true
+without errors, with the resolution matrix R = G W. Row q of R tells of which stations' unbalance the estimate
+of station q is made: where it is that of the unit matrix, the station is determined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.baseline import starting_point
+from balancing.determined import UndeterminedError
+from balancing.influence import Influence
+from balancing.labels import Labels
+from balancing.propagation import prediction_covariance
+from balancing.repeatability import tail
+from balancing.resolution import HOPELESS
+from balancing.trials import Trials, check_names
+from balancing.unbalance_result import Unbalance
+from rotorid.regression import RCOND, stretch
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Method = Literal["minimum-norm", "ridge", "modal"]
+
+LEVEL = 0.99
+_REASONS = "unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons"
+_PASSES = 4
+_SMALLEST, _LARGEST = 1e-10, 1e6
+"""Range of λ, relative to the largest singular value."""
+
+
+def estimate_unbalance(
+    W: ArrayLike,
+    Y: ArrayLike,
+    *,
+    method: Method = "minimum-norm",
+    names: Sequence[str] | None = None,
+    covariance: ArrayLike | None = None,
+    ridge: float | None = None,
+    shapes: ArrayLike | None = None,
+    masses: ArrayLike | None = None,
+    labels: Labels | None = None,
+) -> Unbalance:
+    """Estimate the unbalance at Q stations from N readings (sensors × speeds) of one run.
+
+    Parameters
+    ----------
+    W
+        Influence coefficients, shape (N, Q), such as `model_influence(…).W.reshape(-1, Q)`.
+    Y
+        Complex readings, shape (N,).
+    method
+        "minimum-norm" (which is least squares where the readings determine all stations), "ridge", "modal".
+    names
+        Of the stations; default 1 … Q.
+    covariance
+        Of (Re Y, Im Y) of each reading, (N, 2, 2), or of (Re Y, Im Y, Re W₁, Im W₁, …), (N, 2Q + 2, 2Q + 2);
+        rows then count by their variance. Default: unknown.
+    ridge
+        λ relative to the largest singular value, for "ridge"; default: chosen as described above.
+    shapes
+        Φ for "modal", shape (Q, k), such as `modal_shapes(…)`; its scale does not matter.
+    masses
+        Diagonal of M for "modal", shape (Q,), > 0; default all alike.
+    labels
+        Units and conventions to print in; default SI.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit, NaN, and options of another method.
+    UndeterminedError
+        Where no station has an effect, or the readings or stations do not tell the modes apart.
+    """
+    A, y = np.array(W, dtype=complex), np.array(Y, dtype=complex)
+    if A.ndim != 2 or 0 in A.shape or y.shape != A.shape[:1]:
+        raise ValueError(f"W must be (N, Q) and Y (N,), at least one each; got {A.shape} and {y.shape}")
+    if not (np.isfinite(A).all() and np.isfinite(y).all()):
+        raise ValueError("coefficients and readings must be finite; found NaN or infinity")
+    N, Q = A.shape
+    stations = check_names(names or [str(q) for q in range(1, Q + 1)], "stations")
+    if len(stations) != Q:
+        raise ValueError(f"{Q} names of stations are needed; got {len(stations)}")
+    _check_options(method, ridge, shapes, masses)
+    if not A.any():
+        raise UndeterminedError("no station has an effect on any reading: check the coefficients")
+    channels = _channels(covariance, N, Q)
+    basis = _basis(shapes, masses, Q) if method == "modal" else np.eye(Q)
+    variance: FloatArray | None = None
+    sigma: FloatArray | None = None
+    U, G, rank, condition, used = np.zeros(Q, dtype=complex), np.zeros((Q, N), dtype=complex), 0, 1.0, ridge
+    for _ in range(_PASSES if channels is not None and channels.shape[1] > 2 else 1):
+        if channels is not None:
+            variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
+            sigma = _sigma(variance)
+        G, rank, condition, used = _gain((A @ basis).astype(complex), y, sigma, method, ridge)
+        G = basis @ G
+        U = G @ y
+    residual = y - A @ U
+    out = None
+    if channels is not None:
+        variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
+        rows = stretch(G).reshape(2 * Q, N, 2)
+        out = np.einsum("ani,nij,bnj->ab", rows, variance, rows, optimize=True)
+    chi_square = None if variance is None else float(np.sum((np.abs(residual) / _sigma(variance)) ** 2))
+    result = Unbalance(
+        stations=stations,
+        unbalance=U,
+        residual=residual,
+        method="least-squares" if method == "minimum-norm" and rank == Q else method,
+        rank=rank,
+        resolution=G @ A,
+        covariance=out,
+        chi_square=chi_square,
+        condition_number=condition,
+        ridge=used if method == "ridge" else None,
+        modal=None if shapes is None else np.asarray(np.array(shapes, dtype=complex).T @ U),
+        labels=labels or Labels(weight_unit="kg_m"),
+    )
+    return result.with_warnings(_warnings(result, N))
+
+
+def unbalance_of_run(
+    influence: Influence,
+    baseline: Trials | ArrayLike | None = None,
+    *,
+    method: Method = "minimum-norm",
+    ridge: float | None = None,
+    shapes: ArrayLike | None = None,
+    masses: ArrayLike | None = None,
+) -> Unbalance:
+    """Estimate the unbalance at the planes of the coefficients from a baseline run, with its errors.
+
+    Parameters
+    ----------
+    influence
+        Coefficients of any stations, such as `model_influence(…)`.
+    baseline
+        As in `correct`: runs (what is mounted in them is taken into account), complex amplitudes (S, C) of
+        the bare rotor, or nothing where the coefficients have a baseline.
+    method, ridge, shapes, masses
+        As in `estimate_unbalance`.
+
+    Raises
+    ------
+    ValueError
+        As `correct` and `estimate_unbalance`.
+    """
+    start = starting_point(influence, baseline)
+    n = 2 * len(influence.planes) + 2
+    unit = influence.labels.weight_unit, influence.labels.weight_scale
+    result = estimate_unbalance(
+        influence.W.reshape(-1, len(influence.planes)),
+        start.readings.ravel(),
+        method=method,
+        names=influence.planes,
+        covariance=None if start.covariance is None else start.covariance.reshape(-1, n, n),
+        ridge=ridge,
+        shapes=shapes,
+        masses=masses,
+        labels=replace(start.labels, weight_unit=unit[0], weight_scale=unit[1]),
+    )
+    return result.with_warnings(influence.warnings + start.warnings + result.warnings)
+
+
+def _check_options(
+    method: str, ridge: float | None, shapes: ArrayLike | None, masses: ArrayLike | None
+) -> None:
+    if method not in ("minimum-norm", "ridge", "modal"):
+        raise ValueError(f'method must be "minimum-norm", "ridge" or "modal", not {method!r}')
+    if method != "ridge" and ridge is not None:
+        raise ValueError(f'ridge is an option of the method "ridge", not of {method!r}')
+    if ridge is not None and not (np.isfinite(ridge) and ridge > 0):
+        raise ValueError(f"ridge must be a finite number > 0, not {ridge}")
+    if method == "modal" and shapes is None:
+        raise ValueError('the method "modal" needs the mode shapes at the stations')
+    if method != "modal" and (shapes is not None or masses is not None):
+        raise ValueError(f'shapes and masses are options of the method "modal", not of {method!r}')
+
+
+def _channels(covariance: ArrayLike | None, N: int, Q: int) -> FloatArray | None:
+    if covariance is None:
+        return None
+    channels = np.array(covariance, dtype=np.float64)
+    if channels.shape not in ((N, 2, 2), (N, 2 * Q + 2, 2 * Q + 2)):
+        raise ValueError(
+            f"the covariance must have shape ({N}, 2, 2), or with that of the coefficients "
+            f"({N}, {2 * Q + 2}, {2 * Q + 2}); got {channels.shape}"
+        )
+    if not np.isfinite(channels).all() or not channels.any():
+        raise ValueError("the covariance of the readings must be finite and not all zero")
+    return channels
+
+
+def _sigma(variance: FloatArray) -> FloatArray:
+    """Standard deviation of each reading in one direction (N,); none counts infinitely much.
+
+    All alike where there is none: errors of coefficients alone, before an unbalance is known.
+    """
+    mean = np.trace(variance, axis1=1, axis2=2) / 2
+    return np.asarray(np.sqrt(np.maximum(mean, 1e-8 * mean.max()))) if mean.any() else np.ones(len(mean))
+
+
+def _basis(shapes: ArrayLike | None, masses: ArrayLike | None, Q: int) -> FloatArray:
+    """B = M Φ (Φᵀ M Φ)⁻¹, shape (Q, k)."""
+    Phi = np.array(shapes, dtype=np.float64)
+    if Phi.ndim != 2 or len(Phi) != Q or not Phi.shape[1] or not np.isfinite(Phi).all():
+        raise ValueError(f"the mode shapes must be finite and have shape ({Q}, k); got {Phi.shape}")
+    m = np.ones(Q) if masses is None else np.array(masses, dtype=np.float64)
+    if m.shape != (Q,) or not (np.isfinite(m) & (m > 0)).all():
+        raise ValueError(f"the masses must be finite, > 0, and have shape ({Q},); got {m.shape}")
+    root = np.sqrt(m)[:, None] * Phi
+    scale = np.linalg.norm(root, axis=0)
+    singular = np.linalg.svd(root / np.where(scale > 0, scale, 1.0), compute_uv=False)
+    if Phi.shape[1] > Q or singular[-1] <= 1e-6 * singular[0]:
+        raise UndeterminedError(
+            f"{Q} station{'s' if Q > 1 else ''} cannot tell {Phi.shape[1]} modes apart: "
+            "choose fewer modes, or more stations where the shapes differ"
+        )
+    return np.asarray(np.sqrt(m)[:, None] * np.linalg.pinv(root).T)
+
+
+def _gain(
+    A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, method: str, ridge: float | None
+) -> tuple[ComplexArray, int, float, float | None]:
+    """Gain (n, N), rank, condition number of what is determined, and λ relative to the largest s."""
+    weight = 1.0 / sigma if sigma is not None else np.ones(len(A))
+    # the columns of modes may be of any scale; the norm of stations has a meaning
+    scale = np.ones(A.shape[1])
+    if method == "modal":
+        norms = np.linalg.norm(weight[:, None] * A, axis=0)
+        scale = np.where(norms > 0, norms, 1.0)
+    left, s, right = np.linalg.svd(weight[:, None] * A / scale, full_matrices=False)
+    rank = int(np.count_nonzero(s > RCOND * s[0]))
+    if method == "modal" and rank < A.shape[1]:
+        raise UndeterminedError(
+            f"{len(A)} reading{'s' if len(A) > 1 else ''} cannot tell {A.shape[1]} modes apart: "
+            "choose fewer modes, or add sensors or speeds"
+        )
+    left, s, right = left[:, :rank], s[:rank], right[:rank]
+    f = np.ones(rank)
+    if method == "ridge":
+        b = weight * y
+        beta = np.abs(left.conj().T @ b) ** 2
+        rest = max(float(np.sum(np.abs(b) ** 2) - beta.sum()), 0.0)
+        if ridge is None:
+            known = sigma is not None
+            ridge = _by_discrepancy(s, beta, rest, len(y)) if known else _by_gcv(s, beta, rest, len(y))
+        f = s**2 / (s**2 + (ridge * s[0]) ** 2)
+    G = (right.conj().T * (f / s)) @ left.conj().T * weight / scale[:, None]
+    return G, rank, float(s[0] / s[-1]), ridge
+
+
+def _remains(
+    s: FloatArray, beta: FloatArray, rest: float, ridge: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Squared residual and Σ (1 − f_i) for each relative λ."""
+    lost = 1 / (1 + (s / (ridge[..., None] * s[0])) ** 2)
+    return rest + np.sum(lost**2 * beta, axis=-1), lost.sum(axis=-1)
+
+
+def _by_discrepancy(s: FloatArray, beta: FloatArray, rest: float, N: int) -> float:
+    """λ at which Σ |r|²/σ² = 2 N, by bisection (the residual grows with λ)."""
+    low, high = np.log(_SMALLEST), np.log(_LARGEST)
+    for _ in range(100):
+        middle = (low + high) / 2
+        if _remains(s, beta, rest, np.exp(np.array(middle)))[0] < 2 * N:
+            low = middle
+        else:
+            high = middle
+    return float(np.exp((low + high) / 2))
+
+
+def _by_gcv(s: FloatArray, beta: FloatArray, rest: float, N: int) -> float:
+    """λ of the least generalised cross-validation, on a grid that is refined around the best."""
+    low, high = np.log(_SMALLEST), np.log(_LARGEST)
+    best = low
+    for _ in range(3):
+        grid = np.linspace(low, high, 200)
+        squares, free = _remains(s, beta, rest, np.exp(grid))
+        place = int(np.argmin(squares / (N - len(s) + free) ** 2))
+        best, step = grid[place], grid[1] - grid[0]
+        low, high = best - step, best + step
+    return float(np.exp(best))
+
+
+def _warnings(result: Unbalance, N: int) -> tuple[str, ...]:
+    out = []
+    if result.method in ("least-squares", "minimum-norm") and result.condition_number > HOPELESS:
+        out.append(
+            f"small errors of the readings become large unbalances (condition number "
+            f'{result.condition_number:.2g}): use the method "ridge" or "modal", or fewer stations'
+        )
+    free = N - (len(result.modal) if result.modal is not None else result.rank)
+    tested = result.chi_square if result.method != "ridge" and free > 0 else None
+    # half of it with half the degrees of freedom: right even if errors have one direction only
+    if tested is not None and tail(tested / 2, free, None) < 1 - LEVEL:
+        ratio = np.sqrt(tested / (2 * free))
+        out.append(
+            f"the readings differ from what unbalance {_where(result)} causes by {ratio:.2g} times their "
+            f"errors: {_REASONS}"
+        )
+    if result.ridge is not None and result.ridge >= 0.99 * _LARGEST:
+        out.append("the readings lie within their errors: they show no unbalance at all")
+    if result.ridge is not None and result.chi_square is not None and result.ridge <= 1.01 * _SMALLEST:
+        out.append(f"no unbalance at these stations meets the readings within their errors: {_REASONS}")
+    return tuple(out)
+
+
+def _where(result: Unbalance) -> str:
+    return "at these stations" if result.modal is None else f"in {len(result.modal)} modes"

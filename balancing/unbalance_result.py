@@ -1,0 +1,208 @@
+"""Unbalance at stations: the result; it is found in `balancing.unbalance`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.labels import Labels
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+BoolArray = NDArray[np.bool_]
+
+DETERMINED = 0.05
+"""Largest distance of a station's row of the resolution matrix from that of the unit matrix."""
+
+_NAMED = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Unbalance:
+    """Unbalance at Q stations that explains N readings.
+
+    Attributes
+    ----------
+    stations
+        Names, length Q.
+    unbalance
+        U, kg·m (or kg, as the coefficients are), angle with the rotation from the mark, shape (Q,).
+    residual
+        Y − W U, shape (N,).
+    method
+        "least-squares", "minimum-norm", "ridge" or "modal".
+    rank
+        Number of independent combinations of the stations (of the modes, for "modal") that are determined.
+    resolution
+        R with U = R U_true for readings without errors, shape (Q, Q).
+    covariance
+        Of (Re U₁, Im U₁, …) from the errors of the readings (and coefficients, if given), shape (2Q, 2Q);
+        None: unknown. What the readings leave open is not in it.
+    chi_square
+        Σ |residual|²/σ² with σ of a reading in one direction; None where errors are unknown.
+    condition_number
+        Largest by smallest singular value of what is determined.
+    ridge
+        λ relative to the largest singular value; None without.
+    modal
+        Modal unbalances φ_jᵀ U, shape (k,); None for other methods.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    stations: tuple[str, ...]
+    unbalance: ComplexArray
+    residual: ComplexArray
+    method: str
+    rank: int
+    resolution: ComplexArray
+    covariance: FloatArray | None
+    chi_square: float | None
+    condition_number: float
+    ridge: float | None
+    modal: ComplexArray | None
+    labels: Labels
+    warnings: tuple[str, ...] = ()
+
+    def with_warnings(self, warnings: tuple[str, ...]) -> Unbalance:
+        """The same, with warnings and arrays that cannot be changed."""
+        for name in ("unbalance", "residual", "resolution", "covariance", "modal"):
+            array = getattr(self, name)
+            if array is not None:
+                array.flags.writeable = False
+        return replace(self, warnings=warnings)
+
+    @property
+    def corrections(self) -> ComplexArray:
+        """Weights that balance it, −U, shape (Q,)."""
+        return np.asarray(-self.unbalance)
+
+    @property
+    def own_share(self) -> FloatArray:
+        """How much of a station's estimate is its own unbalance, Re R_qq, shape (Q,); 1: all."""
+        return np.asarray(np.diag(self.resolution).real)
+
+    @property
+    def determined(self) -> BoolArray:
+        """Whether the readings determine a station (to 5 %), whatever stands elsewhere, shape (Q,)."""
+        away = np.linalg.norm(self.resolution - np.eye(len(self.stations)), axis=1)
+        return np.asarray(away < DETERMINED)
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviation (Q,) in one direction (mean of both); NaN where a station is not determined."""
+        if self.covariance is None:
+            return None
+        variance = np.diag(self.covariance).reshape(-1, 2).mean(axis=1)
+        return np.where(self.determined, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+
+    def words(self) -> str:
+        """What the readings determine, in one sentence."""
+        Q, known = len(self.stations), self.determined
+        if self.modal is not None:
+            k = len(self.modal)
+            modes = "mode 1" if k == 1 else f"modes 1 to {k}"
+            return (
+                f"the readings determine what excites {modes}; along the rotor the unbalance is shown "
+                "as the smallest one that does the same"
+            )
+        if known.all():
+            return (
+                f"the readings determine all {Q} stations" if Q > 1 else "the readings determine the station"
+            )
+        alone = [name for name, sure in zip(self.stations, known, strict=True) if sure]
+        text = f"the readings determine {self.rank} of {Q} independent combinations of the stations"
+        text += f"; determined: {', '.join(alone)}" if alone else "; no station is determined by itself"
+        open_ = [q for q in np.argsort(self.own_share) if not known[q]]
+        parts = []
+        for q in open_[:_NAMED]:
+            row = np.abs(self.resolution[q])
+            others = [i for i in np.argsort(-row) if i != q and row[i] > 0.1 * row.max()][:_NAMED]
+            mixed = f", mixed with {', '.join(self.stations[i] for i in others)}" if others else ""
+            parts.append(f"{self.stations[q]} ({100 * self.own_share[q]:.0f} % its own{mixed})")
+        more = f" and {len(open_) - _NAMED} more" if len(open_) > _NAMED else ""
+        return f"{text}; not determined: {', '.join(parts)}{more}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the labels' units and conventions; what is unknown is None."""
+        size, angle = self.labels.weight(self.unbalance)
+        std, known, share = self.std, self.determined, self.own_share
+        rows = [
+            {
+                "station": name,
+                "unbalance": float(size[q]),
+                "unit": self.labels.weight_unit,
+                "angle_deg": float(angle[q]),
+                "std": None if std is None or np.isnan(std[q]) else float(std[q] * self.labels.weight_scale),
+                "own_share": float(share[q]),
+                "determined": bool(known[q]),
+            }
+            for q, name in enumerate(self.stations)
+        ]
+        return {
+            "stations": rows,
+            "method": self.method,
+            "rank": self.rank,
+            "condition_number": self.condition_number,
+            "ridge": self.ridge,
+            "chi_square": self.chi_square,
+            "words": self.words(),
+            "conventions": self.labels.conventions(),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per station: unbalance, unit, angle_deg, std (NaN: unknown), own_share, determined."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_dict()["stations"]).astype({"std": float})
+
+    def summary(self) -> str:
+        """Text: what is determined, and the unbalance of each station with its standard deviation."""
+        data = self.to_dict()
+        width = max(8, *(len(name) for name in self.stations))
+        lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {data['words']}"]
+        lines.append(
+            f"{'station':<{width}} {self.labels.weight_unit:>12} {'angle':>8} {'std':>10}  determined"
+        )
+        for row in data["stations"]:
+            std = "" if row["std"] is None else f"{row['std']:.3g}"
+            sure = "yes" if row["determined"] else f"no ({100 * row['own_share']:.0f} % its own)"
+            size = f"{row['unbalance']:>12.5g} {row['angle_deg']:>7.1f}°"
+            lines.append(f"{row['station']:<{width}} {size} {std:>10}  {sure}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the size of the unbalance at each station: filled, ± 1.96 std, where determined; else open.
+
+        Parameters
+        ----------
+        ax
+            None: those of a new figure.
+        """
+        from matplotlib.figure import Figure
+
+        if ax is None:
+            ax = Figure(figsize=(7.0, 3.6), layout="constrained").add_subplot()
+        size, x, sure = self.labels.weight(self.unbalance)[0], np.arange(len(self.stations)), self.determined
+        for those, colour, label in ((sure, "#0072B2", "determined"), (~sure, "none", "not determined")):
+            if those.any():
+                ax.bar(x[those], size[those], 0.7, color=colour, edgecolor="#0072B2", label=label)
+        if self.std is not None and sure.any():
+            error = 1.96 * self.std[sure] * self.labels.weight_scale
+            ax.errorbar(x[sure], size[sure], yerr=error, fmt="none", ecolor="black", capsize=2, lw=1.2)
+        ax.set_xticks(x, self.stations, rotation=0 if len(x) < 12 else 90)
+        ax.set_xlabel("station")
+        ax.set_ylabel(f"unbalance, {self.labels.weight_unit}")
+        ax.set_title(f"Unbalance of a single run, {self.method}")
+        ax.legend(frameon=False)
+        return ax

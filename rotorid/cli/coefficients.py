@@ -1,0 +1,110 @@
+"""Which influence coefficients a job is balanced with: measured, stored, computed, or several together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from rotorid.cli.balance import MODEL_ERROR
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from balancing import Influence, Trials
+    from rotorid.tables import Job
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Coefficients, the runs that give the vibration (None: those of the coefficients), and planes to use."""
+
+    influence: Influence
+    baseline: Trials | None
+    used: tuple[str, ...]
+
+
+def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
+    """Coefficients of a job.
+
+    Raises
+    ------
+    ValueError
+        Where the job has no rotor, or no place in it for a plane or sensor.
+    UndeterminedError
+        Where the runs do not determine the coefficients.
+    """
+    from balancing import estimate_influence
+    from balancing.combine import combine
+
+    has_trials = bool(job.trials.weights.any())
+    if kind is None:
+        kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
+    if kind == "computed":
+        influence = computed(job, model_error or 0.0)
+        return _chosen(job, influence, job.trials)
+    if job.influence is not None:
+        measured, baseline = job.influence, job.trials
+    else:
+        measured, baseline = estimate_influence(job.trials), None
+    if kind == "combined":
+        error = MODEL_ERROR if model_error is None else model_error
+        measured = combine(measured, computed(job, error))
+    return _chosen(job, measured, baseline)
+
+
+def _chosen(job: Job, influence: Influence, baseline: Trials | None) -> Chosen:
+    return Chosen(influence, baseline, tuple(p for p in influence.planes if p not in job.left_out))
+
+
+def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
+    """Coefficients from the rotor model of the job, at its planes, or per unbalance at given stations.
+
+    Raises
+    ------
+    ValueError
+        Where the job has no rotor, or no place in it for a plane or sensor.
+    """
+    from dataclasses import replace
+
+    from balancing.modelled import model_influence
+
+    if job.rotor is None:
+        raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
+    missing = [f"[sensors.{s}]" for s in job.trials.sensors if s not in job.sensor_places]
+    nodes = stations or {p: job.plane_nodes[p] for p in job.planes if p in job.plane_nodes}
+    missing += [f"[planes.{p}]" for p in job.planes if stations is None and p not in nodes]
+    if missing or not nodes:
+        raise ValueError(
+            "computed coefficients need the place of every sensor and plane in the model: node = … (or "
+            f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
+        )
+    labels = job.trials.labels
+    by_mass = stations is None and not labels.weight_unit.endswith(("_mm", "_m", "_in"))
+    if stations is not None:
+        labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
+    if by_mass and (lost := [p for p in job.planes if p not in job.radii]):
+        raise ValueError(
+            f"weights as masses need the radius of every plane: radius_mm in [planes.{lost[0]}], or weights "
+            "as unbalances"
+        )
+    return model_influence(
+        job.rotor,
+        nodes,
+        {s: job.sensor_places[s] for s in job.trials.sensors},
+        job.trials.speeds,
+        radii={p: job.radii[p] for p in job.planes} if by_mass else None,
+        relative_error=error_percent / 100,
+        quantity=_quantity(labels.vibration_unit),
+        labels=labels,
+    )
+
+
+def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
+    plain = unit.removesuffix("_pp").removesuffix("_rms")
+    if plain in ("mm_s", "in_s"):
+        return "velocity"
+    if plain == "g":
+        return "acceleration"
+    if plain:
+        return "displacement"
+    raise ValueError("computed coefficients need the unit of the amplitudes, such as amplitude_um_pp")

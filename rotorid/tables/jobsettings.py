@@ -1,0 +1,161 @@
+"""What a job's settings say, before its tables are read: files, conventions, stated errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rotorid.tables.conventions import (
+    ANGLES,
+    DEFAULT_TOLERANCE,
+    LARGEST_TOLERANCE,
+    PHASES,
+    Angles,
+    Conventions,
+    Phase,
+    StatedErrors,
+    as_angles,
+    as_phase,
+)
+from rotorid.tables.influence import Stored
+from rotorid.tables.jobkeys import JOB_LATER, by_speed
+from rotorid.tables.problems import Problems
+from rotorid.tables.tomlfile import Section
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a job's settings say, before its tables are read; conventions that nobody states are None."""
+
+    phase: Phase | None
+    angles: Angles | None
+    speed_tolerance_percent: float
+    errors: StatedErrors | None
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """What the caller says instead of the job file."""
+
+    phase: str | None
+    angles: str | None
+    amplitude_error_percent: float | None
+    phase_error_deg: float | None
+
+    def __post_init__(self) -> None:
+        Conventions(as_phase(self.phase or "lead"), as_angles(self.angles or "with rotation"))
+        self.errors(None)
+
+    def errors(self, stated: StatedErrors | None) -> StatedErrors | None:
+        """Stated errors with the replacements."""
+        if self.amplitude_error_percent is None and self.phase_error_deg is None:
+            return stated
+        result = stated or StatedErrors()
+        if self.amplitude_error_percent is not None:
+            result = replace(result, amplitude_percent=self.amplitude_error_percent)
+        if self.phase_error_deg is not None:
+            result = replace(result, phase_deg=self.phase_error_deg)
+        return result
+
+
+@dataclass(frozen=True)
+class Extra:
+    """What else a job may name: rotor model, check runs with their weights, weights of the speeds."""
+
+    rotor: Path | None
+    check: Path | None
+    check_weights: Path | None
+    speed_weights: Mapping[str, float]
+
+
+def read_extra(top: Section, job: Path) -> Extra:
+    """Take the files besides the tables, and the weights of the speeds."""
+    rotor, check, weights = (file_of(top, key, job) for key in ("rotor", "check", "check_weights"))
+    if "check_weights" in top and "check" not in top:
+        top.complain("check_weights", 'the check runs too, check = "check.csv"')
+    if "speed_weights" in top and not isinstance(top.take("speed_weights"), (dict, str)):
+        top.complain("speed_weights", 'a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }')
+        return Extra(rotor, check, weights, {})
+    return Extra(
+        rotor, check, weights, by_speed(top, "speed_weights", "a weight of 0 or more", above_zero=False)
+    )
+
+
+def file_of(top: Section, key: str, job: Path) -> Path | None:
+    """The file that a key names, relative to the job; None without it, or with a problem."""
+    name = top.text(key)
+    if name is None:
+        return None
+    if not name.isprintable():
+        expected = (
+            "the name of a file, without control characters: in double quotes TOML takes \\ for the "
+            "beginning of one; write / in its place, or put the name in single quotes"
+        )
+        top.complain(key, expected)
+        return None
+    return job.parent / name
+
+
+def read_settings(top: Section, overrides: Overrides, problems: Problems) -> Settings:
+    """Take conventions, tolerance and errors, with what the caller says in their place."""
+    phase = top.choice("phase", PHASES, "")
+    angles = top.choice("angles", ANGLES, "")
+    tolerance = top.number("speed_tolerance_percent", DEFAULT_TOLERANCE, low=0.0, high=LARGEST_TOLERANCE)
+    errors = _errors(top, problems)
+    top.later(*JOB_LATER)
+    phase, angles = overrides.phase or phase, overrides.angles or angles
+    return Settings(
+        as_phase(phase) if phase else None,
+        as_angles(angles) if angles else None,
+        DEFAULT_TOLERANCE if tolerance is None else tolerance,
+        overrides.errors(errors),
+    )
+
+
+def _errors(top: Section, problems: Problems) -> StatedErrors | None:
+    section = top.section("errors")
+    if section is None:
+        return None
+    before = len(problems)
+    values = {key: section.number(key, low=0.0) for key in ("amplitude_percent", "phase_deg", "floor")}
+    section.finish()
+    given = {key: value for key, value in values.items() if value is not None}
+    if len(problems) > before:
+        return None
+    if not any(given.values()):
+        expected = (
+            "an error above 0 (amplitude_percent, phase_deg or floor); leave [errors] out if it is unknown"
+        )
+        top.missing("errors", expected)
+        return None
+    return StatedErrors(**given)
+
+
+def settle_conventions(
+    settings: Settings, stored: Path | None, found: Stored | None
+) -> tuple[Conventions, tuple[str, ...]]:
+    """Conventions of the readings and weights: stated ones, else those of stored coefficients; and notes."""
+    said = {} if found is None else found.said
+    phase = settings.phase or as_phase(said.get("phase", "lead"))
+    angles = settings.angles or as_angles(said.get("angles", "with rotation"))
+    notes = []
+    adopted = [
+        words
+        for words, own, used, usual in (
+            (f"phase = {phase}", settings.phase, phase, "lead"),
+            (f"angles {angles}", settings.angles, angles, "with rotation"),
+        )
+        if own is None and used != usual
+    ]
+    if adopted:
+        notes.append(
+            f"nothing states the conventions of the readings: those of {stored} are used for them too, "
+            f"{' and '.join(adopted)}"
+        )
+    if settings.phase and said.get("phase", settings.phase) != settings.phase:
+        notes.append(
+            f"the readings are taken with phase = {settings.phase}, as stated, and the coefficients with "
+            f"phase = {said['phase']}, as {stored} says"
+        )
+    return Conventions(phase, angles, settings.speed_tolerance_percent), tuple(notes)

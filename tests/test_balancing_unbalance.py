@@ -1,0 +1,339 @@
+"""Unbalance at any stations from a single run."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from balancing_data import complex_normal
+from fem_rotors import rotor23
+
+import fem
+from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct
+from balancing.errors import reading_covariance
+from balancing.modelled import modal_shapes, model_influence
+from balancing.unbalance import estimate_unbalance, unbalance_of_run
+
+THREE = {"a": 4, "b": 12, "c": 20}
+EVERY = {f"n{node}": node for node in range(1, 25)}
+SENSORS = {"s3": 3, "s9": 9, "s15": 15, "s21": 21}
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    return rotor23(damping=2e4)
+
+
+def readings(rotor, U, speeds):
+    """Of an exact response, (N,), stacked speed by speed."""
+    response = fem.unbalance_response(rotor, U, speeds, method="exact")
+    return np.array([response.at(node) for node in SENSORS.values()]).T.ravel()
+
+
+def coefficients(rotor, planes, speeds):
+    return model_influence(rotor, planes, SENSORS, speeds).W.reshape(-1, len(planes))
+
+
+def test_three_stations_are_recovered_exactly(rotor):
+    U = np.array([2e-3, 1e-3 * np.exp(2j), -3e-3j])
+    speeds = [100.0, 130.0, 400.0]
+    Y = readings(rotor, dict(zip(THREE.values(), U, strict=True)), speeds)
+    found = estimate_unbalance(coefficients(rotor, THREE, speeds), Y, names=list(THREE))
+    np.testing.assert_allclose(found.unbalance, U, rtol=1e-5)
+    np.testing.assert_array_equal(found.corrections, -found.unbalance)
+    assert (found.method, found.rank, found.warnings) == ("least-squares", 3, ())
+    assert found.determined.all()
+    assert found.words() == "the readings determine all 3 stations"
+    np.testing.assert_allclose(found.resolution, np.eye(3), atol=1e-9)
+
+
+def test_more_stations_than_readings_by_the_smallest_unbalance(rotor):
+    speeds = [100.0, 400.0]
+    W = coefficients(rotor, EVERY, speeds)
+    rng = np.random.default_rng(2)
+    U = 1e-3 * complex_normal(rng, 24)
+    Y = W @ U
+    found = estimate_unbalance(W, Y, names=list(EVERY))
+    np.testing.assert_allclose(found.residual, 0, atol=1e-9 * np.abs(Y).max())
+    assert found.method == "minimum-norm"
+    assert found.rank == 8 < 24
+    others = np.linalg.svd(W)[2][8:].conj().T  # what no reading shows
+    np.testing.assert_allclose(W @ others, 0, atol=1e-12 * np.abs(W).max())
+    assert np.abs(others.conj().T @ found.unbalance).max() < 1e-9 * np.linalg.norm(found.unbalance)
+    for _ in range(20):
+        other = found.unbalance + others @ (1e-4 * complex_normal(rng, 16))
+        np.testing.assert_allclose(W @ other, Y, atol=1e-9 * np.abs(Y).max())
+        assert np.linalg.norm(other) > np.linalg.norm(found.unbalance)
+    np.testing.assert_allclose(found.resolution @ U, found.unbalance, atol=1e-9)
+    assert "the readings determine 8 of 24 independent combinations" in found.words()
+
+
+def test_words_say_which_station_is_determined():
+    found = estimate_unbalance([[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6.0], names=["A", "B", "C"])
+    np.testing.assert_allclose(found.unbalance, [1, 1, 1], rtol=1e-14)
+    assert found.determined.tolist() == [True, False, False]
+    np.testing.assert_allclose(found.own_share, [1, 0.5, 0.5], rtol=1e-14)
+    assert found.words() == (
+        "the readings determine 2 of 3 independent combinations of the stations; determined: A; "
+        "not determined: B (50 % its own, mixed with C), C (50 % its own, mixed with B)"
+    )
+
+
+def test_std_only_where_the_station_is_determined():
+    covariance = np.tile(np.diag([0.04, 0.04]), (2, 1, 1))
+    found = estimate_unbalance([[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6.0], covariance=covariance)
+    np.testing.assert_allclose(found.std, [0.1, np.nan, np.nan], rtol=1e-12)
+
+
+def test_covariance_is_that_of_drawn_readings():
+    rng = np.random.default_rng(4)
+    W, U = complex_normal(rng, (8, 3)), np.array([1.0, 2j, -1.5])
+    Y = W @ U
+    errors = ReadingErrors(0.01, 0.04)
+    covariance = reading_covariance(Y, errors)
+    found = estimate_unbalance(W, Y, covariance=covariance)
+    root = np.linalg.cholesky(covariance)
+    drawn = []
+    for _ in range(4000):
+        noise = np.einsum("nij,nj->ni", root, rng.standard_normal((8, 2)))
+        each = estimate_unbalance(W, Y + noise[:, 0] + 1j * noise[:, 1], covariance=covariance)
+        drawn.append(each.unbalance.view(float))
+    scale = np.sqrt(np.diag(found.covariance))
+    spread = np.cov(np.array(drawn).T)
+    np.testing.assert_allclose(
+        spread / np.outer(scale, scale), found.covariance / np.outer(scale, scale), atol=0.07
+    )
+
+
+def test_errors_of_the_coefficients_count_too():
+    rng = np.random.default_rng(4)
+    W, U = complex_normal(rng, (8, 3)), np.array([1.0, 2j, -1.5])
+    channels = np.zeros((8, 8, 8))
+    own = np.arange(2, 8)
+    channels[:, own, own] = np.repeat((0.02 * np.abs(W)) ** 2, 2, axis=1)
+    found = estimate_unbalance(W, W @ U, covariance=channels)
+    np.testing.assert_allclose(found.unbalance, U, rtol=1e-9)
+    drawn = []
+    for _ in range(4000):
+        wrong = W + 0.02 * np.abs(W) * complex_normal(rng, W.shape)
+        weight = 1 / np.sqrt(np.sum((0.02 * np.abs(W) * np.abs(U)) ** 2, axis=1))
+        drawn.append(np.linalg.lstsq(weight[:, None] * wrong, weight * (W @ U), rcond=None)[0])
+    spread = np.sqrt(np.var(drawn, axis=0) / 2)
+    np.testing.assert_allclose(found.std, spread, rtol=0.05)
+
+
+def smooth(rotor, scale=1e-3):
+    x = rotor.positions / rotor.positions[-1]
+    return scale * (np.exp(0.5j) + 2j * np.sin(3 * x) - 1.5 * x)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_ridge_is_nearer_to_a_smooth_unbalance_than_the_smallest_one(rotor, known):
+    speeds = [80.0, 125.0, 145.0, 400.0, 540.0, 700.0]
+    W = coefficients(rotor, EVERY, speeds)
+    U = smooth(rotor)
+    rng = np.random.default_rng(7)
+    sigma = 0.02 * np.median(np.abs(W @ U))
+    Y = W @ U + sigma * complex_normal(rng, len(W))
+    covariance = np.tile(sigma**2 * np.eye(2), (len(W), 1, 1)) if known else None
+    found = estimate_unbalance(W, Y, method="ridge", covariance=covariance)
+    plain = estimate_unbalance(W, Y)
+    assert np.linalg.norm(found.unbalance - U) < 0.01 * np.linalg.norm(plain.unbalance - U)
+    assert any("use the method" in words for words in plain.warnings)
+    assert found.warnings == ()
+    if known:
+        assert found.chi_square == pytest.approx(2 * len(W), rel=1e-6)
+    assert found.own_share.max() < 1
+
+
+def test_ridge_that_is_given():
+    rng = np.random.default_rng(1)
+    W, Y = complex_normal(rng, (4, 6)), complex_normal(rng, 4)
+    found = estimate_unbalance(W, Y, method="ridge", ridge=0.3)
+    level = (0.3 * np.linalg.norm(W, 2)) ** 2
+    expected = np.linalg.solve(W.conj().T @ W + level * np.eye(6), W.conj().T @ Y)
+    np.testing.assert_allclose(found.unbalance, expected, rtol=1e-12)
+    assert found.ridge == 0.3
+
+
+def test_cross_validation_finds_the_least_of_its_measure():
+    rng = np.random.default_rng(1)
+    W = complex_normal(rng, (9, 6)) * np.logspace(0, -3, 6)
+    Y = W @ complex_normal(rng, 6) + 0.01 * complex_normal(rng, 9)
+    found = estimate_unbalance(W, Y, method="ridge")
+
+    def measure(factor):
+        again = estimate_unbalance(W, Y, method="ridge", ridge=found.ridge * factor)
+        hat = W @ np.linalg.solve(
+            W.conj().T @ W + (again.ridge * np.linalg.norm(W, 2)) ** 2 * np.eye(6), W.conj().T
+        )
+        return np.linalg.norm(again.residual) ** 2 / np.trace(np.eye(9) - hat).real ** 2
+
+    values = [measure(factor) for factor in (0.3, 0.8, 1.0, 1.25, 3.0)]
+    assert min(values) == values[2]
+
+
+def test_readings_within_their_errors_show_no_unbalance():
+    covariance = np.tile(np.eye(2), (4, 1, 1))
+    found = estimate_unbalance(
+        np.diag([1.0, 2, 3, 4]), [0.1, 0.1j, 0.1, 0], method="ridge", covariance=covariance
+    )
+    assert np.abs(found.unbalance).max() < 1e-9
+    assert found.warnings == ("the readings lie within their errors: they show no unbalance at all",)
+
+
+@pytest.mark.parametrize("method", ["minimum-norm", "ridge"])
+def test_readings_that_no_unbalance_here_explains(method):
+    W, Y = np.array([[1.0], [1.0], [1.0]]), np.array([1.0, 2.0, 3.0])
+    covariance = np.tile(0.01 * np.eye(2), (3, 1, 1))
+    found = estimate_unbalance(W, Y, method=method, covariance=covariance)
+    [words] = found.warnings
+    assert words.endswith("unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons")
+    assert estimate_unbalance(W, 2 * W[:, 0], covariance=covariance).warnings == ()
+
+
+def test_modes_recover_a_distribution_of_theirs(rotor):
+    shapes = modal_shapes(rotor, EVERY, 2)
+    masses = np.linspace(1.0, 3.0, 24)
+    U = masses * (shapes @ [1e-3j, 2e-3])
+    speeds = [120.0, 500.0]
+    found = estimate_unbalance(
+        coefficients(rotor, EVERY, speeds),
+        readings(rotor, dict(zip(EVERY.values(), U, strict=True)), speeds),
+        method="modal",
+        shapes=shapes * [5.0, -0.1],
+        masses=masses,
+    )
+    np.testing.assert_allclose(found.unbalance, U, rtol=1e-4, atol=1e-5 * np.abs(U).max())
+    np.testing.assert_allclose(found.modal, (shapes * [5.0, -0.1]).T @ U, rtol=1e-4)
+    assert found.rank == 2
+    assert found.words().startswith("the readings determine what excites modes 1 to 2; along the rotor")
+
+
+def test_modal_unbalance_of_least_size(rotor):
+    """Among all distributions with the same modal unbalances the one found has the least Σ |U|²/m."""
+    shapes, masses = modal_shapes(rotor, EVERY, 2), np.linspace(1.0, 3.0, 24)
+    speeds = [120.0, 500.0]
+    W = coefficients(rotor, EVERY, speeds)
+    found = estimate_unbalance(W, W @ smooth(rotor), method="modal", shapes=shapes, masses=masses)
+    hidden = np.linalg.svd(shapes.T)[2][2:].T
+    slope = hidden.T @ (found.unbalance / masses)
+    assert np.abs(slope).max() < 1e-12 * np.abs(found.unbalance).max()
+
+
+def test_modal_corrections_quieten_the_first_critical_speeds(rotor):
+    """Of unbalance of all modes, estimated from readings near two critical speeds."""
+    modes = fem.critical_speeds(rotor, n=3).frequencies
+    speeds = np.array([0.98 * modes[0], 1.02 * modes[0], 0.98 * modes[1], 1.02 * modes[1]])
+    U = smooth(rotor) + 2e-4 * complex_normal(np.random.default_rng(3), 24)
+    before = dict(zip(EVERY.values(), U, strict=True))
+    shapes = modal_shapes(rotor, EVERY, 3)
+    left = []
+    for k in (1, 2):
+        found = estimate_unbalance(
+            coefficients(rotor, EVERY, speeds[: 2 * k]),
+            readings(rotor, before, speeds[: 2 * k]),
+            method="modal",
+            shapes=shapes[:, :k],
+        )
+        after = dict(zip(EVERY.values(), U + found.corrections, strict=True))
+        at = [
+            np.abs(readings(rotor, after, [omega])).max() / np.abs(readings(rotor, before, [omega])).max()
+            for omega in modes[:2]
+        ]
+        left.append(at)
+        assert all(
+            abs(shapes[:, j] @ (U + found.corrections)) < 0.05 * abs(shapes[:, j] @ U) for j in range(k)
+        )
+    assert left[0][0] < 0.05
+    assert left[0][1] > 0.5  # one mode does not help at the second critical speed
+    assert max(left[1]) < 0.05
+
+
+def test_rows_count_by_their_errors():
+    covariance = np.array([np.eye(2), 4 * np.eye(2)])
+    found = estimate_unbalance([[1.0], [1.0]], [1.0, 2.0], covariance=covariance)
+    assert found.unbalance[0] == pytest.approx((1.0 + 2.0 / 4) / (1 + 1 / 4), rel=1e-12)
+    assert found.std[0] == pytest.approx(1 / np.sqrt(1 + 1 / 4), rel=1e-12)
+
+
+def test_result_in_the_labels_units():
+    labels = Labels(weight_unit="g_mm", weight_scale=1e6, angles="against rotation")
+    covariance = np.tile(1e-12 * np.eye(2), (2, 1, 1))
+    found = estimate_unbalance(
+        np.eye(2), [1e-3, 2e-3j], names=["DE", "NDE"], covariance=covariance, labels=labels
+    )
+    data = found.to_dict()
+    assert [row["unbalance"] for row in data["stations"]] == pytest.approx([1000.0, 2000.0])
+    assert [row["angle_deg"] for row in data["stations"]] == pytest.approx([0.0, 270.0])
+    assert [row["std"] for row in data["stations"]] == pytest.approx([1.0, 1.0])
+    frame = found.to_frame()
+    assert list(frame["station"]) == ["DE", "NDE"]
+    assert frame["determined"].all()
+    lines = found.summary().splitlines()
+    assert lines[0] == "least-squares: the readings determine all 2 stations"
+    assert lines[2].split() == ["DE", "1000", "0.0°", "1", "yes"]
+    assert all(len(a) < 110 for a, _ in pairwise(lines))
+
+
+def test_picture():
+    covariance = np.tile(np.diag([0.04, 0.04]), (2, 1, 1))
+    labels = Labels(weight_unit="g_mm", weight_scale=1e6)
+    found = estimate_unbalance(
+        [[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6j], names=["A", "B", "C"], covariance=covariance, labels=labels
+    )
+    ax = found.plot()
+    assert [bar.get_height() for bar in ax.patches] == pytest.approx([1e6, 1e6, 1e6])
+    assert [bar.get_facecolor()[3] for bar in ax.patches] == [1.0, 0.0, 0.0]
+    [[(_, low), (_, high)]] = ax.collections[0].get_segments()
+    assert (low, high) == pytest.approx((0.804e6, 1.196e6))
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["A", "B", "C"]
+    assert ax.get_ylabel() == "unbalance, g_mm"
+    assert found.plot(ax) is ax
+
+
+def test_from_a_run_with_a_weight_mounted(rotor):
+    """The same weights as `correct`, with the opposite sign; what is mounted is no unbalance of the rotor."""
+    speeds = np.array([100.0, 130.0, 400.0])
+    U = {4: 2e-3, 12: 1e-3j, 20: -1e-3}
+    mounted = 5e-4 * np.exp(1j)
+    Y = readings(rotor, U | {4: 2e-3 + mounted}, speeds).reshape(1, 3, 4)
+    errors = ReadingErrors(0.02, 0.02)
+    model = model_influence(rotor, THREE, SENSORS, speeds, relative_error=0.01)
+    run = Trials(("now",), speeds, tuple(SENSORS), ("a",), Y, [[mounted]], errors, Labels("um", 1e6))
+    found, weights = unbalance_of_run(model, run), correct(model, run)
+    np.testing.assert_allclose(found.unbalance, list(U.values()), rtol=1e-4)
+    np.testing.assert_allclose(found.corrections, weights.weights, rtol=1e-4)
+    assert found.stations == ("a", "b", "c")
+    assert (found.labels.vibration_unit, found.labels.weight_unit) == ("um", "kg_m")
+    assert (found.std > 0).all()
+    assert (found.std <= np.sqrt(np.diag(weights.covariance).reshape(-1, 2).mean(axis=1)) * 1.001).all()
+    bare = unbalance_of_run(model, Y[0])
+    assert bare.std is None  # nothing tells how well amplitudes without stated errors are known
+    assert bare.unbalance[0] == pytest.approx(2e-3 + mounted, rel=1e-4)
+
+
+BAD = [
+    ({"W": [[1.0, np.nan]]}, ValueError, "must be finite; found NaN"),
+    ({"Y": [np.inf]}, ValueError, "must be finite"),
+    ({"Y": [1.0, 2.0]}, ValueError, r"W must be \(N, Q\) and Y \(N,\)"),
+    ({"W": [[0.0, 0.0]]}, UndeterminedError, "no station has an effect on any reading"),
+    ({"method": "best"}, ValueError, "minimum-norm"),
+    ({"ridge": 0.1}, ValueError, "an option of the method"),
+    ({"method": "ridge", "ridge": 0.0}, ValueError, "ridge must be a finite number > 0"),
+    ({"method": "modal"}, ValueError, "needs the mode shapes"),
+    ({"shapes": [[1.0], [1.0]]}, ValueError, "options of the method"),
+    ({"method": "modal", "shapes": [[1.0]]}, ValueError, r"have shape \(2, k\)"),
+    ({"method": "modal", "shapes": [[1.0, 1], [1, 1]]}, UndeterminedError, "2 stations cannot tell 2 modes"),
+    ({"method": "modal", "shapes": [[1.0, 1], [1, -1]]}, UndeterminedError, "1 reading cannot tell 2 modes"),
+    ({"method": "modal", "shapes": [[1.0], [1]], "masses": [1, 0]}, ValueError, "masses must be finite, > 0"),
+    ({"covariance": np.eye(2)}, ValueError, "the covariance must have shape"),
+    ({"covariance": np.zeros((1, 2, 2))}, ValueError, "not all zero"),
+    ({"names": ["A"]}, ValueError, "2 names of stations"),
+]
+
+
+@pytest.mark.parametrize(("change", "kind", "words"), BAD)
+def test_what_cannot_be(change, kind, words):
+    arguments = {"W": [[1.0, 2.0]], "Y": [1.0]} | change
+    with pytest.raises(kind, match=words):
+        estimate_unbalance(**arguments)

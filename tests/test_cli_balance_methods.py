@@ -1,0 +1,304 @@
+"""`rotorid balance` with methods, limits, models and checks; and what peers answer with silence."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from rotorid.samples import sample_data
+
+TURBO = sample_data() / "turbo_job"
+JOB = TURBO / "job.toml"
+MODEL = sample_data() / "model_job" / "job.toml"
+METHODS = ("least-squares", "weighted", "minmax")
+
+
+def vectors(found):
+    return np.array([c["mass"] * np.exp(1j * np.deg2rad(c["angle_deg"])) for c in found["corrections"]])
+
+
+@pytest.fixture
+def answers(cli):
+    def run(*args):
+        outcome = cli("balance", *args, "--json")
+        assert outcome.code == 0, outcome.err
+        return outcome.json
+
+    return run
+
+
+def test_each_method_is_best_at_what_it_promises(answers):
+    found = {method: answers(JOB, "--method", method) for method in METHODS}
+    assert found["least-squares"]["rms_after"] == min(f["rms_after"] for f in found.values())
+    assert found["minmax"]["max_after"] == min(f["max_after"] for f in found.values())
+    assert 0 <= found["minmax"]["duality_gap"] < 1e-6
+    assert found["least-squares"]["duality_gap"] is None
+    assert found["weighted"]["chi_square_dof"] == 2 * 20 - 2 * 3
+    for method, f in found.items():
+        assert f["method"] == method
+        for c in f["corrections"]:
+            assert 0 < c["mass_std"] < (0.4 if method == "weighted" else 0.2) * c["mass"]
+    # five stations in three planes: the weighted fit sees that, and says so
+    assert any("do not explain the vibration" in w for w in found["weighted"]["warnings"])
+    # the unbalance lies in five stations, so three planes differ by method, but not by much
+    largest = np.abs(vectors(found["least-squares"])).max()
+    for method in METHODS:
+        assert np.abs(vectors(found[method]) - vectors(found["least-squares"])).max() < 0.3 * largest
+
+
+def test_limits_are_kept_and_named(answers):
+    found = answers(JOB, "--max-mass", "300", "--limit", "probe 4=30")
+    assert max(c["mass"] for c in found["corrections"]) < 300 * (1 + 1e-6)
+    assert max(r["after"] for r in found["residuals"] if r["sensor"] == "probe 4") < 30 * (1 + 1e-6)
+    assert any("largest weight, 300 g_mm" in words for words in found["limits_that_bind"])
+    assert found["limits"]["max_weight"] == {"left": 300, "middle": 300, "right": 300}
+    assert found["duality_gap"] < 1e-6
+    free = answers(JOB)
+    assert free["limits"] is None
+    assert found["rms_after"] > free["rms_after"]
+
+
+def test_limits_with_every_method(answers):
+    for method in METHODS:
+        found = answers(JOB, "--max-mass", "left=200", "--method", method)
+        assert found["corrections"][0]["mass"] == pytest.approx(200, rel=1e-6)
+        assert found["corrections"][0]["covariance"] is not None
+
+
+def test_limits_that_force_zero_weights(cli, answers, tmp_path):
+    outcome = cli("balance", JOB, "--max-mass", "middle=0")
+    assert outcome.code == 2
+    assert "leave the plane out" in outcome.err
+    circle = job_with(tmp_path, "[planes.middle]\nforbidden_deg = [[0, 180], [180, 360]]\n")
+    outcome = cli("balance", circle)
+    assert outcome.code == 2
+    assert "middle" in outcome.err
+    without = answers(job_with(tmp_path, "[planes.middle]\nuse = false\n"))
+    assert without["corrections"] == answers(JOB, "--planes", "left,right")["corrections"]
+
+
+def test_limits_that_cannot_be_met_name_the_conflict_and_the_way_out(cli, tmp_path):
+    picture = tmp_path / "no.png"
+    outcome = cli("balance", JOB, "--max-mass", "100", "--limit", "5", "--plot", picture)
+    assert outcome.code == 2
+    assert "cannot be met" in outcome.err
+    assert "100 g_mm" in outcome.err
+    assert "limit 5 um_pp" in outcome.err
+    factor = float(outcome.err.split("relaxing all amplitude limits ")[1].split()[0])
+    assert not picture.exists()
+    relaxed = cli("balance", JOB, "--max-mass", "100", "--limit", f"{5.01 * factor}")
+    assert relaxed.code == 0, relaxed.err
+    assert cli("balance", JOB, "--max-mass", "100", "--limit", f"{4.95 * factor}").code == 2
+
+
+def job_with(tmp_path, text, weights=None):
+    """The turbo job in another folder with more keys."""
+    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
+        (tmp_path / name).write_text((TURBO / name).read_text())
+    if weights:
+        (tmp_path / "weights.csv").write_text(weights)
+    path = tmp_path / "job.toml"
+    path.write_text(JOB.read_text() + text)
+    return path
+
+
+def test_forbidden_angles_run_in_the_direction_of_the_job(answers, tmp_path):
+    free = answers(JOB)["corrections"]
+    at = free[0]["angle_deg"]
+    arc = f"[planes.left]\nforbidden_deg = [[{at - 20:.3f}, {at + 30:.3f}]]\n"
+    moved = answers(job_with(tmp_path, arc))["corrections"][0]
+    ends = [(at - 20) % 360, (at + 30) % 360]
+    assert min(abs((moved["angle_deg"] - end + 180) % 360 - 180) for end in ends) < 1e-3
+
+    # the same rotor written against the rotation: mirrored angles, the same place
+    rows = (TURBO / "weights.csv").read_text()
+    assert ",0\n" in rows  # all trial weights at 0°, the same in both directions
+    against = JOB.read_text().replace("with rotation", "against rotation")
+    path = job_with(tmp_path, "")
+    path.write_text(against + f"[planes.left]\nforbidden_deg = [[{-at - 30:.3f}, {-at + 20:.3f}]]\n")
+    mirrored = answers(path)["corrections"][0]
+    assert mirrored["mass"] == pytest.approx(moved["mass"], rel=1e-6)
+    assert (mirrored["angle_deg"] + moved["angle_deg"]) % 360 == pytest.approx(0, abs=1e-3) or (
+        mirrored["angle_deg"] + moved["angle_deg"]
+    ) % 360 == pytest.approx(360, abs=1e-3)
+
+
+def test_weight_zero_of_a_sensor_leaves_it_out_of_the_fit(answers, tmp_path):
+    found = answers(job_with(tmp_path, '[sensors."probe 4"]\nweight = 0\n'))
+    assert {r["sensor"] for r in found["residuals"]} == {f"probe {i}" for i in (1, 2, 3, 4)}
+    assert found["corrections"] != answers(JOB)["corrections"]
+
+
+def test_check_run_is_compared(answers, tmp_path):
+    found = answers(TURBO / "checked.toml")["check"]
+    assert found["explained"] is True
+    assert found["improvement_achieved"] > 50
+    # the same with a sensor that reads 3 % more
+    path = job_with(tmp_path, "")
+    path.write_text((TURBO / "checked.toml").read_text())
+    rows = (TURBO / "check.csv").read_text().splitlines()
+    rows = [
+        r.replace(r.split(",")[3], str(float(r.split(",")[3]) + 5)) if "probe 2" in r else r for r in rows
+    ]
+    (tmp_path / "check.csv").write_text("\n".join(rows) + "\n")
+    bad = answers(path)["check"]
+    assert bad["explained"] is False
+    assert "unbalance outside the planes" in bad["verdict"]
+
+
+def test_model_instead_of_trial_runs(answers):
+    found, trial = answers(MODEL, "--model-error", "2"), answers(JOB)
+    assert np.abs(vectors(found) - vectors(trial)).max() < 0.1 * np.abs(vectors(trial)).max()
+    # its errors cover the difference
+    for a, b in zip(found["corrections"], trial["corrections"], strict=True):
+        assert abs(a["mass"] - b["mass"]) < 3 * a["mass_std"]
+
+
+def test_measured_and_computed_coefficients_together(answers, tmp_path):
+    keys = MODEL.read_text().split("[planes.left]")[1]
+    text = f"\n[planes.left]{keys}"
+    path = job_with(tmp_path, text)
+    path.write_text(
+        path.read_text().replace('weights = "weights.csv"', 'weights = "weights.csv"\nrotor = "rotor.csv"')
+    )
+    (tmp_path / "rotor.csv").write_text((MODEL.parent / "rotor.csv").read_text())
+    both = answers(path, "--coefficients", "combined", "--model-error", "1")
+    alone = answers(path)
+    for a, b in zip(both["corrections"], alone["corrections"], strict=True):
+        assert a["mass_std"] < b["mass_std"]
+
+
+def test_unbalance_from_one_run(cli):
+    outcome = cli("unbalance", MODEL, "--stations", "6,9,12,15,18", "--json")
+    assert outcome.code == 0, outcome.err
+    assert outcome.json["provenance"]["options"]["stations"] == "6,9,12,15,18"
+    assert "determine all 5 stations" in cli("unbalance", MODEL, "--stations", "6,9,12,15,18").out
+    assert cli("unbalance", JOB, "--stations", "6").code == 2
+    assert cli("unbalance", MODEL, "--stations", "6", "--method", "modal").code == 2
+
+
+def test_ridge_truncation_subsets_and_trade_off(answers, cli, tmp_path):
+    free = answers(JOB)
+    soft = answers(JOB, "--ridge", "0.1")
+    assert np.abs(vectors(soft)).sum() < np.abs(vectors(free)).sum()
+    assert any("towards zero" in w for w in soft["warnings"])
+    fewer = answers(JOB, "--truncate", "2")
+    assert fewer["method"] == "truncated"
+    found = answers(JOB, "--best-planes", "2", "--trade-off")
+    assert found["best_planes"]["choices"] == len(found["best_planes"]["rows"]) == 3
+    assert len(found["trade_off"]["points"]) >= 10
+    assert cli("balance", JOB, "--ridge", "0.1", "--truncate", "2").code == 2
+    picture = tmp_path / "curve.png"
+    assert cli("balance", JOB, "--trade-off", "--plot", picture).code == 0
+    assert picture.stat().st_size > 10_000
+
+
+def runs(readings, planes=("a",), trials=None):
+    """Tables of a baseline and one trial run per plane; readings[run][sensor] complex."""
+    rows = ["run,speed_rpm,sensor,amplitude_um,phase_deg"]
+    for r, sensors in enumerate(readings):
+        for s, z in enumerate(sensors):
+            rows.append(f"r{r},3000,s{s},{abs(z):.9g},{np.degrees(np.angle(z)) % 360:.9g}")
+    weights = ["run,plane,mass_g,angle_deg"]
+    weights += [f"r{i + 1},{p},{(trials or [10] * len(planes))[i]},0" for i, p in enumerate(planes)]
+    return "\n".join(rows) + "\n", "\n".join(weights) + "\n"
+
+
+def refused(cli, tmp_path, tables, *args):
+    (tmp_path / "runs.csv").write_text(tables[0])
+    (tmp_path / "weights.csv").write_text(tables[1])
+    outcome = cli("balance", tmp_path / "runs.csv", tmp_path / "weights.csv", *args)
+    assert outcome.code == 2
+    assert "Traceback" not in outcome.err
+    assert outcome.out == ""
+    return outcome.err
+
+
+BASE = np.array([10 + 2j, -3 + 7j, 5 - 4j, 1 + 1j])
+EFFECT = np.array([[1, 2, -1, 0.5], [2j, 1, 1j, -1]]).T  # of 10 g in planes a and b
+
+
+def readings_of(effects):
+    return [BASE, *(BASE + effect for effect in effects)]
+
+
+@pytest.mark.parametrize("bad", ["nan", "NaN", "", "inf"])
+def test_vibration_that_is_no_number(cli, tmp_path, bad):
+    tables = runs(readings_of(EFFECT.T), ("a", "b"))
+    lines = tables[0].splitlines()
+    parts = lines[3].split(",")
+    parts[3] = bad
+    lines[3] = ",".join(parts)
+    message = refused(cli, tmp_path, ("\n".join(lines) + "\n", tables[1]))
+    assert "row 4" in message
+    assert "amplitude_um" in message
+
+
+def test_trial_without_effect(cli, tmp_path):
+    message = refused(cli, tmp_path, runs(readings_of([EFFECT[:, 0], 0 * BASE]), ("a", "b")))
+    assert "'b'" in message
+
+
+def test_exactly_dependent_third_plane(cli, tmp_path):
+    third = 2 * EFFECT[:, 0] - 1j * EFFECT[:, 1]
+    message = refused(cli, tmp_path, runs(readings_of([*EFFECT.T, third]), ("a", "b", "c")))
+    assert "act alike" in message
+
+
+def test_singular_two_planes(cli, tmp_path):
+    message = refused(cli, tmp_path, runs(readings_of([EFFECT[:, 0], 3j * EFFECT[:, 0]]), ("a", "b")))
+    assert "'a' and 'b' act alike" in message
+
+
+def test_phase_beyond_a_turn(cli, tmp_path):
+    tables = runs(readings_of(EFFECT.T), ("a", "b"))
+    lines = tables[0].splitlines()
+    parts = lines[2].split(",")
+    parts[4] = "725"
+    lines[2] = ",".join(parts)
+    assert "row 3" in refused(cli, tmp_path, ("\n".join(lines) + "\n", tables[1]))
+
+
+def test_sensor_missing_in_one_run(cli, tmp_path):
+    tables = runs(readings_of(EFFECT.T), ("a", "b"))
+    lines = [line for line in tables[0].splitlines() if not line.startswith("r1,3000,s2")]
+    message = refused(cli, tmp_path, ("\n".join(lines) + "\n", tables[1]))
+    assert "s2" in message
+    assert "r1" in message
+
+
+def test_speeds_that_differ_slightly_count_as_one(cli, tmp_path):
+    tables = runs(readings_of(EFFECT.T), ("a", "b"))
+    (tmp_path / "runs.csv").write_text(tables[0].replace("r1,3000", "r1,3004").replace("r2,3000", "r2,2998"))
+    (tmp_path / "weights.csv").write_text(tables[1])
+    same = cli("balance", tmp_path / "runs.csv", tmp_path / "weights.csv", "--json")
+    (tmp_path / "runs.csv").write_text(tables[0])
+    plain = cli("balance", tmp_path / "runs.csv", tmp_path / "weights.csv", "--json")
+    assert json.loads(same.out)["corrections"] == json.loads(plain.out)["corrections"]
+    far = tables[0].replace("r1,3000", "r1,3100")
+    assert "3100" in refused(cli, tmp_path, (far, tables[1]))
+
+
+def test_mixed_units_in_one_column(cli, tmp_path):
+    tables = runs(readings_of(EFFECT.T), ("a", "b"))
+    lines = tables[0].splitlines()
+    parts = lines[4].split(",")
+    parts[3] = f"{parts[3]} mil"
+    lines[4] = ",".join(parts)
+    message = refused(cli, tmp_path, ("\n".join(lines) + "\n", tables[1]))
+    assert "row 5" in message
+    assert "mil" in message
+
+
+def test_unknown_options(cli):
+    assert "one of least-squares, weighted, minmax" in cli("balance", JOB, "--method", "magic").err
+    assert "one of measured, computed, combined" in cli("balance", JOB, "--coefficients", "guessed").err
+    assert "needs a rotor model" in cli("balance", JOB, "--coefficients", "computed").err.replace(
+        "\n", " "
+    ) or ("need a rotor model" in cli("balance", JOB, "--coefficients", "computed").err)
+    assert (
+        "no number" in cli("balance", JOB, "--max-mass", "heavy").err
+        or cli("balance", JOB, "--max-mass", "heavy").code == 2
+    )
