@@ -57,7 +57,7 @@ $(BENCH_VENV)/.bench: pyproject.toml
 # hsbalance in its own environment, without XPRESS, whose free licence refuses all but small problems
 $(HSBALANCE_VENV)/.peer:
 	$(PYTHON) -m venv $(HSBALANCE_VENV)
-	$(HSBALANCE_VENV)/bin/python -m pip -q install 'hsbalance==0.5.5' clarabel
+	$(HSBALANCE_VENV)/bin/python -m pip -q install 'hsbalance==0.5.5' clarabel cvxopt
 	$(HSBALANCE_VENV)/bin/python -m pip -q uninstall -y xpress
 	touch $@
 

@@ -21,6 +21,8 @@ ComplexArray = NDArray[np.complex128]
 ILL_CONDITIONED = 30.0
 """Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
 _RISES_NAMED = 3
+_TOUCHES = 2e-3
+"""Relative distance below which a limit with a price is touched (the solver stays a little inside)."""
 POOR = 1e-3
 """Probability of χ² below which weights in the planes do not explain the vibration."""
 
@@ -45,15 +47,22 @@ def binding(stack: Stack, fitted: Fitted) -> tuple[str, ...]:
     if stack.limits is None:
         return ()
     D, r = fitted.weights, stack.Y + stack.W @ fitted.weights
+    nothing = np.zeros(0, dtype=bool)
+    weights = nothing if fitted.active_weights is None else fitted.active_weights
+    amplitudes = nothing if fitted.active_residuals is None else fitted.active_residuals
     words = [
         f"plane {name!r} has its largest weight, {stack.weight(float(limit))}"
-        for name, size, limit in zip(stack.planes, np.abs(D), stack.limits.max_weight, strict=True)
-        if np.isfinite(limit) and size >= limit * (1 - 1e-6)
+        for name, touches, size, limit in zip(
+            stack.planes, weights, np.abs(D), stack.limits.max_weight, strict=False
+        )
+        if touches and size >= limit * (1 - _TOUCHES)
     ]
     words += [
         f"{name} has its largest amplitude, {stack.amplitude(float(limit))}"
-        for name, size, limit in zip(stack.readings, np.abs(r), stack.limits.residual.ravel(), strict=True)
-        if np.isfinite(limit) and size >= limit * (1 - 1e-6)
+        for name, touches, size, limit in zip(
+            stack.readings, amplitudes, np.abs(r), stack.limits.residual.ravel(), strict=False
+        )
+        if touches and size >= limit * (1 - _TOUCHES)
     ]
     words += [
         f"plane {name!r} stands at the end of a forbidden arc"
@@ -89,8 +98,9 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
-            "large as the errors of the readings; there is unbalance outside the planes (or a bow, or the "
-            "rotor is not linear), and the errors of the weights were enlarged by that ratio"
+            "large as the errors of the readings; unbalance outside the planes (or a bow, or a rotor that is "
+            "not linear) is likely, and the errors of the weights allow for it; if the readings have larger "
+            f"errors than stated instead, those of the weights are up to {ratio:.2g} times larger"
         )
     return tuple(out) + _rises(result.speeds, result.sensors, result.before, result.after, result.labels, "")
 

@@ -170,7 +170,7 @@ def _times(factor: float | None) -> str:
 
 
 def _percent(probability: float) -> str:
-    return "below 0.01 %" if probability < 1e-4 else f"{100 * probability:.2g} %"
+    return "below 0.01 %" if probability < 1e-4 else f"{100 * probability:.3g} %"
 
 
 def _rms(amplitudes: NDArray[np.float64]) -> float:

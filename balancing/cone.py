@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.certificate import Bound, Problem, lower_bound
-from balancing.coneprogram import TIGHTER, InfeasibleError, Program, within_limits
+from balancing.coneprogram import TIGHTER, InfeasibleError, Program, SolverError, within_limits
 from balancing.limits import Arc
 
 FloatArray = NDArray[np.float64]
@@ -33,13 +33,14 @@ __all__ = [
 ]
 
 AT_LIMIT = 1e-6
-"""A limit counts as active where less than this share of it is left."""
+"""A limit counts as active where less than this share of it is left; less than 1e-3 where it has a price."""
 
 # what is quick comes first: the certificate tells whether it was good enough
 _SETTINGS = ((1e-9, False), (1e-10, True))
 _ACCEPTED_GAP = 1e-7
 _ROUNDING = 1e-12
 _POOR_GAP = 1e-3
+_COSTLY = 1e-3
 NEGLIGIBLE = 1e-6
 """Objectives below this share of that without weights count as zero."""
 
@@ -105,7 +106,7 @@ def least_squares_cone(
         Where no weights are within the limits.
     ValueError
         For NaN, shapes that do not fit, negative limits.
-    ArithmeticError
+    SolverError
         Where the solver does not come near the optimum.
     """
     return solve_cone(problem(W, Y, row_weights, max_weight, residual, sectors))
@@ -219,11 +220,11 @@ def _empty(problem: Problem) -> Bound:
 
 
 def _result(problem: Problem, weights: ComplexArray, bound: Bound) -> Cone:
-    size = np.abs(problem.Y + problem.W @ weights)
-    at_limit = (size >= problem.residual * (1 - AT_LIMIT)) & np.isfinite(problem.residual)
-    objective = problem.objective(weights)
+    size, objective = np.abs(problem.Y + problem.W @ weights), problem.objective(weights)
+    limit = problem.residual
     if problem.minmax:
-        at_limit |= (problem.row_weights * size >= objective * (1 - AT_LIMIT)) & (problem.row_weights > 0)
+        w = problem.row_weights
+        limit = np.minimum(limit, np.divide(objective, w, out=np.full(len(w), np.inf), where=w > 0))
     without = problem.objective(np.zeros_like(weights))
     lower = min(bound.value, objective)
     return Cone(
@@ -231,11 +232,17 @@ def _result(problem: Problem, weights: ComplexArray, bound: Bound) -> Cone:
         objective=objective,
         bound=lower,
         gap=(objective - lower) / (max(objective, NEGLIGIBLE * without) or 1.0),
-        active_weights=np.abs(weights) >= problem.max_weight * (1 - AT_LIMIT),
-        active_residuals=at_limit,
+        active_weights=_active(np.abs(weights), problem.max_weight, bound.weight_prices / (objective or 1.0)),
+        active_residuals=_active(size, limit, bound.residual_prices / (objective or 1.0)),
         residual_prices=bound.residual_prices,
         weight_prices=bound.weight_prices,
     )
+
+
+def _active(size: FloatArray, limit: FloatArray, price: FloatArray) -> BoolArray:
+    """Limits reached; those that cost something are, although the solver stopped a little before them."""
+    close = np.where(price > AT_LIMIT, _COSTLY, AT_LIMIT)
+    return np.asarray(np.isfinite(limit) & (size >= np.where(np.isfinite(limit), limit, 0.0) * (1 - close)))
 
 
 def _optimum(problem: Problem) -> tuple[ComplexArray, Bound]:
@@ -273,7 +280,7 @@ def _optimum(problem: Problem) -> tuple[ComplexArray, Bound]:
         )
     largest = max(problem.objective(best[1]), NEGLIGIBLE * without)
     if best[0] > _POOR_GAP * largest:
-        raise ArithmeticError(
+        raise SolverError(
             "the solver did not come near the best weights: leave out a plane that acts like another, "
             "or relax the limits"
         )

@@ -31,6 +31,10 @@ TIGHTER = (3e-9, 3e-8, 3e-7, 3e-6)
 """By how much limits are tightened where amplitudes are limited, one after the other until all are kept."""
 
 
+class SolverError(ValueError):
+    """The solver did not come near the optimum."""
+
+
 class InfeasibleError(ValueError):
     """Limits that no weights meet."""
 
@@ -60,9 +64,11 @@ class Program:
         self.own = np.where(own > 0, own, float(own.max(initial=0.0)) or 1.0)
         limit_rows = W[self.limited] / self.own[:, None]
         self.unit = float(np.abs(known).max())
-        if self.unit <= _NOTHING * float(np.abs(w * problem.Y).max()):  # what will the limits cost, then?
+        kept = bool((np.abs(self.residual) <= problem.residual).all())
+        if not kept and self.unit <= _NOTHING * float(np.abs(w * problem.Y).max()):  # what do limits cost?
             needed = np.linalg.lstsq(limit_rows, -self.residual[self.limited] / self.own, rcond=RCOND)[0]
-            self.unit = float(np.abs(rows @ needed).max()) or float(np.abs(rows).max())
+            self.unit = float(np.abs(rows @ needed).max())
+        self.unit = self.unit or float(np.abs(rows).max()) or 1.0
         self.transform = self._orthogonal(np.concatenate((rows / self.unit, limit_rows)))
         self.objective_rows, self.objective_known = rows @ self.transform / self.unit, known / self.unit
         self.limit_rows = limit_rows @ self.transform
@@ -107,7 +113,7 @@ class Program:
         settings.verbose = False
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
         settings.presolve_enable = False
-        settings.equilibrate_enable = settings.iterative_refinement_enable = careful
+        settings.equilibrate_enable = careful
         settings.max_threads = 1
         found = clarabel.DefaultSolver(_zero(len(q)), q, _csc(A), b, cones, settings).solve()
         if "PrimalInfeasible" in str(found.status):
@@ -250,11 +256,11 @@ def _csc(dense: FloatArray) -> csc_matrix:
 
     columns = np.ascontiguousarray(dense.T)
     filled = columns != 0
-    ends = np.concatenate(([0], np.cumsum(filled.sum(axis=1))))
-    return csc((columns[filled], np.nonzero(filled)[1], ends), shape=dense.shape)
+    ends = np.concatenate(([0], np.cumsum(filled.sum(axis=1)))).astype(np.int32)
+    return csc((columns[filled], np.nonzero(filled)[1].astype(np.int32), ends), shape=dense.shape)
 
 
 def _zero(n: int) -> csc_matrix:
     from scipy.sparse import csc_matrix as csc
 
-    return csc((n, n))
+    return csc((np.zeros(0), np.zeros(0, dtype=np.int32), np.zeros(n + 1, dtype=np.int32)), shape=(n, n))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.certificate import Problem
-from balancing.cone import InfeasibleError
+from balancing.coneprogram import InfeasibleError, SolverError
 from balancing.limits import Arc
 from balancing.sectors import solve_sectors
 
@@ -141,7 +141,7 @@ def _weights(whole: Problem, sectors: Sequence[Sequence[Arc] | None]) -> float:
     )
     try:
         return solve_sectors(stacked, sectors).objective
-    except (InfeasibleError, ArithmeticError):  # nothing is said of a factor that is not certain
+    except (InfeasibleError, SolverError):  # nothing is said of a factor that is not certain
         return np.inf
 
 
@@ -166,6 +166,8 @@ def explain(
         Write a number with its unit.
     """
     found = relax(whole, sectors)
+    if found.amplitudes < 1 - PRICED or not found.readings:
+        return "the limits can be met only to within rounding: relax a limit of the amplitudes a little"
     conditions = []
     for p in found.planes:
         limit = whole.max_weight[p]

@@ -12,20 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.determined import UndeterminedError
-from balancing.effective import effective_variance
+from balancing.effective import FLOOR, effective_variance
 from balancing.limits import Limits
-from balancing.propagation import correction_covariance, prediction_covariance
+from balancing.propagation import correction_covariance
 from balancing.regularised import ridge, truncated
+from balancing.resolution import HOPELESS
 from balancing.sampling import sampled_covariance
 from balancing.sectors import allowed_sectors, stands_in
 from balancing.solve import Method, Solution, solve
+from balancing.weighted_limits import STEPS, limited_fit
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 ComplexArray = NDArray[np.complex128]
 
+NO_EFFECT = 1e-6
+"""Share of the largest singular value below which a combination of planes has no effect."""
 METHODS = ("least-squares", "weighted", "minmax")
-_ROUNDS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,16 +129,13 @@ def fit_weights(
 def _plain(stack: Stack, method: Method) -> Fitted:
     found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
     bound = found.active_weights.any() or found.active_residuals.any()
-    if stack.channels is None:
-        covariance = None
-    elif method == "least-squares" and not bound:
+    covariance: FloatArray | None = None
+    words: tuple[str, ...] = ()
+    if stack.channels is not None and method == "least-squares" and not bound:
         covariance = _propagated(stack, found.weights, stack.row_weights)
-    else:
-        covariance = sampled_covariance(
-            lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights,
-            stack.W,
-            stack.Y,
-            stack.channels,
+    elif stack.channels is not None:
+        covariance, words = _sampled(
+            stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
         )
     return Fitted(
         found.weights,
@@ -143,6 +143,7 @@ def _plain(stack: Stack, method: Method) -> Fitted:
         found.gap,
         active_weights=found.active_weights,
         active_residuals=found.active_residuals,
+        warnings=words,
     )
 
 
@@ -187,42 +188,58 @@ def _weighted(stack: Stack) -> Fitted:
             "bound; use larger trial weights, fewer planes or another method"
         )
     if stack.limits is None or _kept(stack.limits, free.weights, free.residual):
-        covariance = free.covariance * max(1.0, free.inflation) ** 2
-        return Fitted(free.weights, covariance, chi_square=free.chi_square, dof=free.dof)
-    return _weighted_with_limits(stack, free.weights)
+        return Fitted(free.weights, free.covariance, chi_square=free.chi_square, dof=free.dof)
+    limits, channels = stack.limits, _regular(stack.channels, free.model_error)
 
+    def search(W: ComplexArray, Y: ComplexArray, rows: FloatArray, within: Limits) -> Solution:
+        names = (*(f"row {i + 1}" for i in range(len(stack.planes))), *stack.readings)
+        return solve(
+            W,
+            Y,
+            row_weights=rows,
+            limits=within,
+            names=stack.planes,
+            readings=names,
+            amplitude=stack.amplitude,
+            weight=stack.weight,
+        )
 
-def _weighted_with_limits(stack: Stack, start: ComplexArray) -> Fitted:
-    """Least squares with limits whose rows count by their errors, these taken at the last weights."""
+    def limited(W: ComplexArray, Y: ComplexArray, start: ComplexArray, steps: int) -> Solution:
+        return limited_fit(W, Y, channels, stack.row_weights, limits, start, search, steps=steps)
 
-    def search(W: ComplexArray, Y: ComplexArray) -> Solution:
-        D = start
-        for _ in range(_ROUNDS):
-            found = _solve(stack, "least-squares", W, Y, _inverse_errors(stack, D))
-            if np.abs(found.weights - D).max() <= 1e-9 * max(np.abs(found.weights).max(), 1e-300):
-                break
-            D = found.weights
-        return found
-
-    assert stack.channels is not None
-    found = search(stack.W, stack.Y)
-    covariance = sampled_covariance(lambda W, Y: search(W, Y).weights, stack.W, stack.Y, stack.channels)
+    found = limited(stack.W, stack.Y, free.weights, STEPS)
+    # drawn from the errors of the readings alone: what explains the residuals is the same in every job
+    covariance, words = _sampled(
+        stack, lambda W, Y: limited(W, Y, found.weights, 1).weights, _regular(stack.channels, 0.0)
+    )
     return Fitted(
         found.weights,
         covariance,
         found.gap,
+        free.chi_square,
+        free.dof,
         active_weights=found.active_weights,
         active_residuals=found.active_residuals,
+        warnings=words,
     )
 
 
-def _inverse_errors(stack: Stack, D: ComplexArray) -> FloatArray:
-    """One over the mean standard deviation of each predicted reading at given weights."""
-    assert stack.channels is not None
-    variance = np.trace(prediction_covariance(D, stack.channels), axis1=1, axis2=2) / 2
-    own = np.ones(len(stack.Y)) if stack.row_weights is None else stack.row_weights
-    # a reading without errors counts for a thousand, not for ever
-    return np.asarray(own / np.sqrt(np.maximum(variance, 1e-6 * variance.max())))
+def _regular(channels: FloatArray, model_error: float) -> FloatArray:
+    """Errors of the readings with the further one that explains the residuals, and none that is exactly 0."""
+    wider = channels.copy()
+    least = FLOOR**2 * float(np.trace(channels[:, :2, :2], axis1=1, axis2=2).mean()) / 2
+    wider[:, [0, 1], [0, 1]] += model_error**2 + least
+    return wider
+
+
+def _sampled(
+    stack: Stack, solver: Callable[[ComplexArray, ComplexArray], ComplexArray], channels: FloatArray
+) -> tuple[FloatArray | None, tuple[str, ...]]:
+    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
+    try:
+        return sampled_covariance(solver, stack.W, stack.Y, channels), ()
+    except ValueError as error:
+        return None, (str(error),)
 
 
 def _kept(limits: Limits, D: ComplexArray, r: ComplexArray) -> bool:
@@ -247,4 +264,17 @@ def _regularised(stack: Stack, method: str, strength: float | str | None, keep: 
         found = truncated(
             stack.W, stack.Y, keep, stack.row_weights, channels=stack.channels, planes=stack.planes
         )
-    return Fitted(found.weights, found.covariance, warnings=(found.words,))
+    words = [found.words]
+    if found.kept:
+        share = float(found.singular_values[found.kept - 1] / found.singular_values[0])
+        if share < NO_EFFECT:
+            raise UndeterminedError(
+                f"of the {found.kept} combinations of planes to keep, the last has no effect ({share:.1g} "
+                "of that of the first): keep fewer"
+            )
+        if share < 1 / HOPELESS:
+            words.append(
+                f"the last combination of planes that is kept has only {share:.1g} of the effect of the "
+                "first: no instrument measures that; keep fewer"
+            )
+    return Fitted(found.weights, found.covariance, warnings=tuple(words))

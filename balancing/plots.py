@@ -72,19 +72,17 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
         # a region far larger than the weights would hide them: it may leave the picture
         reach = float(np.abs(regions).max()) * c.labels.weight_scale
         largest = max(largest, min(reach, 2.5 * largest))
-    _largest_weights(polar, c)
+    _largest_weights(polar, c, largest)
     polar.set_rlim(0, 1.15 * largest)
     _quiet_radii(polar, angle, mass)
     polar.set_title(
         f"Correction weights on the bare rotor, {c.labels.weight_unit}", fontsize="medium", pad=14
     )
-    turn = "with" if c.labels.angle_sign > 0 else "against"
     polar.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.08),
         fontsize="small",
-        title=f"angles from the mark {turn} the rotation (↺)"
-        + ("" if regions is None else "; closed lines: 95 % regions"),
+        title=_legend_words(c, regions),
         title_fontsize="small",
     )
     return polar
@@ -105,14 +103,38 @@ def _regions(c: Correction) -> ComplexArray | None:
     return np.asarray(c.weights[:, None] + edge[:, 0] + 1j * edge[:, 1])
 
 
-def _largest_weights(polar: PolarAxes, c: Correction) -> None:
-    """Dashed circles of the largest weights, where they are limited."""
+def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
+    """Dashed circles of the largest weights, and arcs where nothing can be mounted."""
     if c.limits is None:
         return
+    for p, arcs in enumerate(c.limits.forbidden):
+        for start, width in arcs:
+            along = c.labels.weight(np.exp(1j * np.linspace(start, start + width, 91)))[1]
+            polar.plot(
+                np.unwrap(np.deg2rad(along)),
+                np.full(91, (1.03 + 0.03 * p) * reach),
+                color=COLOURS[p % len(COLOURS)],
+                lw=4.0,
+                alpha=0.45,
+                solid_capstyle="butt",
+            )
     turn = np.linspace(0.0, 2 * np.pi, 181)
     for p, limit in enumerate(c.limits.max_weight * c.labels.weight_scale):
         if np.isfinite(limit):
             polar.plot(turn, np.full_like(turn, limit), ls="--", lw=0.9, color=COLOURS[p % len(COLOURS)])
+
+
+def _legend_words(c: Correction, regions: ComplexArray | None) -> str:
+    """What the lines of the polar picture mean."""
+    turn = "with" if c.labels.angle_sign > 0 else "against"
+    words = [f"angles from the mark {turn} the rotation (↺)"]
+    if regions is not None:
+        words.append("closed lines: 95 % regions")
+    if c.limits is not None and np.isfinite(c.limits.max_weight).any():
+        words.append("dashed: largest weights")
+    if c.limits is not None and any(c.limits.forbidden):
+        words.append("thick arcs: nothing can be mounted")
+    return "\n".join(words)
 
 
 def _amplitude_limits(ax: Axes, c: Correction, x: NDArray[np.float64]) -> None:

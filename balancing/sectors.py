@@ -94,6 +94,8 @@ def solve_sectors(problem: Problem, sectors: Sequence[Sequence[Arc] | None]) -> 
     InfeasibleError
         Where no weights are within the limits.
     """
+    if all(s is None for s in sectors):
+        return solve_cone(replace(problem, sectors=tuple(None for _ in sectors)))
     empty = np.array([s is not None and len(s) == 0 for s in sectors])
     whole = replace(
         problem,

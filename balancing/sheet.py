@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 WIDTH = 80
+HELD = 1e-5
+"""Relative scatter of a weight below which a limit holds it."""
 DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 
@@ -116,9 +118,14 @@ def _corrections(c: Correction) -> str:
     for p, plane in enumerate(c.planes):
         row = [plane, figures(mass[p]), _degrees(angle[p])]
         if factor and mass_std is not None and angle_std is not None:
-            row.append(f"± {figures(factor * mass_std[p] * c.labels.weight_scale, 2)} {unit}")
+            width = factor * mass_std[p]
+            held = width < HELD * abs(c.weights[p])
+            row.append("at its limit" if held else f"± {figures(width * c.labels.weight_scale, 2)} {unit}")
             half = factor * np.degrees(angle_std[p])
-            row.append("angle not determined" if np.isnan(half) else f"± {figures(half, 2)}°")
+            if np.isnan(half):
+                row.append("angle not determined")
+            else:
+                row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
         rows.append(row)
     head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
     turn = "with" if c.labels.angle_sign > 0 else "against"

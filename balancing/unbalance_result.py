@@ -128,7 +128,7 @@ class Unbalance:
             row = np.abs(self.resolution[q])
             others = [i for i in np.argsort(-row) if i != q and row[i] > 0.1 * row.max()][:_NAMED]
             mixed = f", mixed with {', '.join(self.stations[i] for i in others)}" if others else ""
-            parts.append(f"{self.stations[q]} ({100 * self.own_share[q]:.0f} % its own{mixed})")
+            parts.append(f"{self.stations[q]} ({_percent(self.own_share[q])} % its own{mixed})")
         more = f" and {len(open_) - _NAMED} more" if len(open_) > _NAMED else ""
         return f"{text}; not determined: {', '.join(parts)}{more}"
 
@@ -176,7 +176,7 @@ class Unbalance:
         )
         for row in data["stations"]:
             std = "" if row["std"] is None else f"{row['std']:.3g}"
-            sure = "yes" if row["determined"] else f"no ({100 * row['own_share']:.0f} % its own)"
+            sure = "yes" if row["determined"] else f"no ({_percent(row['own_share'])} % its own)"
             size = f"{row['unbalance']:>12.5g} {row['angle_deg']:>7.1f}°"
             lines.append(f"{row['station']:<{width}} {size} {std:>10}  {sure}")
         return "\n".join(lines)
@@ -206,3 +206,8 @@ class Unbalance:
         ax.set_title(f"Unbalance of a single run, {self.method}")
         ax.legend(frameon=False)
         return ax
+
+
+def _percent(share: float) -> str:
+    """Of a station that is not determined: never 100, never below 0."""
+    return f"{min(max(100 * share, 0.0), 99.0):.0f}"

@@ -7,7 +7,15 @@ import os
 import platform
 import sys
 
-BENCHMARKS = ("startup", "critical_speeds", "unbalance_response", "campbell", "identification", "time_fit")
+BENCHMARKS = (
+    "startup",
+    "critical_speeds",
+    "unbalance_response",
+    "campbell",
+    "identification",
+    "time_fit",
+    "balancing_solvers",
+)
 
 
 def main(names: list[str]) -> int:

@@ -307,6 +307,17 @@ def test_an_amplitude_of_zero():
     ) or words.endswith("at 10 um at best; an amplitude of zero cannot be reached, give a larger limit")
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("largest", [0.0, 1e-17])
+def test_an_amplitude_of_zero_that_only_exact_numbers_reach(method, largest):
+    """Two planes and two readings leave nothing but rounding: more than zero."""
+    _, W, Y = numbers(11, 2, 2)
+    with pytest.raises(InfeasibleError, match="only to within rounding"):
+        solve(W, Y, method=method, limits=limits(2, 2, residual=largest))
+    found = solve(W, Y, method=method, limits=limits(2, 2, residual=1e-12))
+    assert np.abs(found.residual).max() <= 1e-12
+
+
 def test_without_limits_of_amplitudes_nothing_is_infeasible():
     with pytest.raises(ValueError, match="zero weights meet every limit"):
         relax(problem([[1.0]], [1.0], None, [0.1]), [None])

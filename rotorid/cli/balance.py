@@ -137,7 +137,9 @@ def balance(
     ] = None,
     best_planes: Annotated[
         int | None,
-        typer.Option(metavar="K", min=1, help="Compare all choices of K planes, too.", show_default=False),
+        typer.Option(
+            metavar="K", min=1, help="Use the best K planes, after comparing all choices.", show_default=False
+        ),
     ] = None,
     trade_off: Annotated[
         bool, typer.Option("--trade-off", help="Residual against total weight, too (a second picture).")
@@ -158,7 +160,7 @@ def balance(
     """
     from balancing import correct
     from balancing.check import compare_check
-    from rotorid.cli.coefficients import choose
+    from rotorid.cli.coefficients import choose, compare_planes
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.influence import influence_bytes
     from rotorid.tables.joblimits import with_limits
@@ -179,10 +181,15 @@ def balance(
         job = with_limits(job, max_mass, limit or [])
     found = choose(job, coefficients, model_error)
     used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
+    candidates = names(planes) or (list(found.used) if job.left_out else list(found.influence.planes))
+    subsets = None
+    if best_planes is not None:
+        subsets = compare_planes(found, candidates, used, best_planes, method, job.row_weights)
+        candidates = list(subsets.planes[0])
     result = correct(
         found.influence,
         baseline=found.baseline,
-        planes=names(planes) or (list(found.used) if job.left_out else None),
+        planes=candidates,
         speeds=used,
         method=method,
         limits=job.limits_of(found.influence.planes),
@@ -190,11 +197,9 @@ def balance(
         strength=_strength(ridge),
         keep=truncate,
     )
-    report = Report(result, found.influence)
+    report = Report(result, found.influence, subsets=subsets)
     if job.check is not None:
         report.check = compare_check(result, job.check, found.influence, found.baseline)
-    if best_planes is not None:
-        report.add_subsets(best_planes, job)
     if trade_off:
         report.add_trade_off(job)
     emit(
@@ -258,21 +263,6 @@ class Report:
     subsets: Subsets | None = None
     curve: TradeOff | None = None
 
-    def add_subsets(self, k: int, job: Job) -> None:
-        """Compare choices of k planes."""
-        from balancing.subset import best_subsets
-
-        W, Y, rows = self._stack(job, self.influence.planes)
-        self.subsets = best_subsets(
-            W,
-            Y,
-            self.influence.planes,
-            k,
-            criterion="max" if self.result.method == "minmax" else "rms",
-            row_weights=rows,
-            labels=self.result.labels,
-        )
-
     def add_trade_off(self, job: Job) -> None:
         """Residual against total weight, in the planes used."""
         from balancing.tradeoff import trade_off
@@ -298,7 +288,10 @@ class Report:
     def text(self) -> str:
         """For the terminal."""
         parts = (self.result, self.check, self.subsets, self.curve)
-        return "\n\n".join(part.summary() for part in parts if part is not None)
+        blocks = [part.summary() for part in parts if part is not None]
+        if self.result.limits is not None and (self.subsets or self.curve):
+            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
+        return "\n\n".join(blocks)
 
     def figure(self) -> Figure:
         """The correction, or the trade-off where it was asked for."""

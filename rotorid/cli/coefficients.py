@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING, Literal
 from rotorid.cli.balance import MODEL_ERROR
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
     from balancing import Influence, Trials
+    from balancing.subset import Subsets
     from rotorid.tables import Job
+
+    FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -54,6 +60,35 @@ def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
 
 def _chosen(job: Job, influence: Influence, baseline: Trials | None) -> Chosen:
     return Chosen(influence, baseline, tuple(p for p in influence.planes if p not in job.left_out))
+
+
+def compare_planes(
+    chosen: Chosen,
+    planes: Sequence[str],
+    speeds: Sequence[float] | None,
+    k: int,
+    method: str,
+    row_weights: FloatArray | None,
+) -> Subsets:
+    """Compare all choices of k of these planes, without limits."""
+    from balancing.baseline import match_speeds, starting_point
+    from balancing.subset import best_subsets
+
+    influence = chosen.influence
+    if unknown := [p for p in planes if p not in influence.planes]:
+        raise ValueError(f"there is no plane {unknown[0]!r}; the planes are {', '.join(influence.planes)}")
+    start = starting_point(influence, chosen.baseline)
+    at = range(len(influence.speeds)) if speeds is None else match_speeds(speeds, influence.speeds)
+    columns = [influence.planes.index(p) for p in planes]
+    return best_subsets(
+        influence.W[list(at)][..., columns].reshape(-1, len(columns)),
+        start.readings[list(at)].ravel(),
+        planes,
+        k,
+        criterion="max" if method == "minmax" else "rms",
+        row_weights=None if row_weights is None else row_weights[list(at)].ravel(),
+        labels=start.labels,
+    )
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

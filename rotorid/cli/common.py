@@ -190,7 +190,12 @@ def _angle(text: str) -> float:
 
 def names(text: str | None) -> list[str] | None:
     """Read "A,B" as names; None stays None."""
-    return None if text is None else [part.strip() for part in text.split(",") if part.strip()]
+    if text is None:
+        return None
+    found = [part.strip() for part in text.split(",")]
+    if not all(found):
+        raise ValueError(f"names with commas between them are needed, such as left,right; got {text!r}")
+    return found
 
 
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": 3.141592653589793 / 30.0, "Hz": 2.0 * 3.141592653589793}

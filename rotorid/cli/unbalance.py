@@ -59,6 +59,8 @@ def unbalance(
         raise ValueError(f"--method {method!r} is not known: one of {', '.join(METHODS)}")
     if (modes is not None) != (method == "modal"):
         raise ValueError("--method modal and --modes K belong together")
+    if ridge is not None and method != "ridge":
+        raise ValueError("--ridge is an option of --method ridge")
     check_targets(plot, output)
     read = read_job(job)
     result = _estimate(read, stations, method, modes, ridge, model_error)
@@ -88,7 +90,10 @@ def _estimate(
 
     if job.rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
-    places = {str(node): job.rotor.node(node) for node in parse_nodes(stations, "--stations")}
+    asked = parse_nodes(stations, "--stations")
+    places = {str(node): job.rotor.node(node) for node in asked}
+    if len(set(places.values())) < len(asked):
+        raise ValueError(f"--stations {stations!r}: every station may stand only once")
     influence = computed(job, (model_error or 0.0), places)
     shapes = modal_shapes(job.rotor, places, modes) if modes is not None else None
     if method == "modal":

@@ -2,7 +2,8 @@
 
     python sample_data/turbo_job/make_job.py
 
-writes runs.csv and weights.csv beside this file, and the check run (check.csv, check_weights.csv). Everything is fixed by SEED; see README.md.
+writes runs.csv and weights.csv beside this file, and the check run (check.csv, check_weights.csv).
+Everything is fixed by SEED; see README.md.
 """
 
 from __future__ import annotations

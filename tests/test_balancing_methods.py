@@ -1,0 +1,207 @@
+"""`correct` with its methods: what each promises, with limits, weights of readings, and refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from balancing import Labels, Limits, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
+from balancing.effective import effective_variance
+
+ERRORS = ReadingErrors(0.02, 0.02)
+S, C, P = 3, 4, 2
+
+
+def job(seed=0, errors=ERRORS, outside=0.0, effect=0.6):
+    rng = np.random.default_rng(seed)
+
+    def normal(*shape):
+        return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+    W, D = normal(S, C, P), normal(P)
+    Y = -W @ D + outside * normal(S, C)
+    T = np.vstack((np.zeros(P), effect * np.eye(P)))
+    true = Y + np.einsum("scp,rp->rsc", W, T)
+    noise = 0.02 * normal(P + 1, S, C) if errors is not None else 0
+    return Trials(
+        ("base", "one", "two"),
+        np.array([100.0, 150.0, 200.0]),
+        ("a", "b", "c", "d"),
+        ("left", "right"),
+        true * (1 + noise),
+        T,
+        errors,
+        Labels(),
+    ), D
+
+
+def test_weighted_is_the_effective_variance_fit():
+    trials, _ = job()
+    influence = estimate_influence(trials)
+    found = correct(influence, method="weighted")
+    direct = effective_variance(
+        influence.W.reshape(-1, P), influence.baseline.ravel(), influence.covariance.reshape(-1, 6, 6)
+    )
+    np.testing.assert_allclose(found.weights, direct.weights, rtol=1e-9)
+    assert found.chi_square == pytest.approx(direct.chi_square)
+    assert found.fit_dof == 2 * S * C - 2 * P
+
+
+def test_truth_lies_in_the_weighted_region():
+    hits = 0
+    for seed in range(200):
+        trials, D = job(seed, effect=1.5)
+        found = correct(estimate_influence(trials), method="weighted")
+        d = (found.weights - D).view(float)
+        hits += d @ np.linalg.solve(found.covariance, d) < 9.488  # χ² with 4, 95 %
+    assert 180 <= hits <= 199  # 190 ± 3.1
+
+
+def test_unbalance_outside_the_planes_is_said_by_the_weighted_fit():
+    trials, D = job(outside=0.5, effect=1.5)
+    found = correct(estimate_influence(trials), method="weighted")
+    assert any("unbalance outside the planes" in w for w in found.warnings)
+    d = (found.weights - D).view(float)
+    assert d @ np.linalg.solve(found.covariance, d) < 18.47  # χ² with 4, 99.9 %
+    assert (found.mass_std < 0.2 * np.abs(D)).all()
+
+
+def test_weighted_without_errors():
+    trials, _ = job(errors=None)
+    influence = estimate_influence(trials)
+    with pytest.raises(ValueError, match="needs errors of the readings"):
+        correct(influence, method="weighted")
+    rows = np.ones((S, C))
+    rows[0] = 3.0
+    found = correct(influence, method="weighted", row_weights=rows)
+    assert found.covariance is None
+    assert any("count by the weights" in w for w in found.warnings)
+
+
+def test_row_weights_are_those_of_a_weighted_least_squares_problem():
+    trials, _ = job(outside=0.5)
+    influence = estimate_influence(trials)
+    rows = np.random.default_rng(1).uniform(0.2, 2, (S, C))
+    found = correct(influence, row_weights=rows)
+    w = rows.ravel()
+    W, Y = influence.W.reshape(-1, P), influence.baseline.ravel()
+    direct = np.linalg.lstsq(w[:, None] * W, -w * Y, rcond=None)[0]
+    np.testing.assert_allclose(found.weights, direct, rtol=1e-9)
+
+
+def test_covariance_with_row_weights_is_that_of_repeated_jobs():
+    rows = np.random.default_rng(1).uniform(0.2, 2, (S, C))
+    weights, stated = [], []
+    rng = np.random.default_rng(9)
+    trials, _ = job(3, outside=0.3, effect=2.0)
+    exact = trials.mean
+    for _ in range(400):
+        noise = 0.02 * (rng.standard_normal(exact.shape) + 1j * rng.standard_normal(exact.shape))
+        again = Trials(
+            trials.runs,
+            trials.speeds,
+            trials.sensors,
+            trials.planes,
+            exact * (1 + noise),
+            trials.weights,
+            ERRORS,
+        )
+        found = correct(estimate_influence(again), row_weights=rows)
+        weights.append(found.weights.view(float))
+        stated.append(found.covariance)
+    seen = np.cov(np.array(weights).T)
+    ratio = np.sqrt(np.diag(seen) / np.diag(np.mean(stated, axis=0)))
+    assert (np.abs(ratio - 1) < 0.09).all()  # 400 draws: 3.5 %
+
+
+def test_limits_of_each_method_are_kept():
+    trials, _ = job()
+    influence = estimate_influence(trials)
+    free = {m: correct(influence, method=m) for m in ("least-squares", "weighted", "minmax")}
+    limits = Limits.of(
+        S,
+        influence.sensors,
+        influence.planes,
+        max_weight={"left": 0.8 * abs(free["least-squares"].weights[0])},
+        forbidden={"right": [(np.angle(free["least-squares"].weights[1]) - 0.2, 0.5)]},
+    )
+    for method, before in free.items():
+        found = correct(influence, method=method, limits=limits)
+        assert abs(found.weights[0]) <= limits.max_weight[0] * (1 + 1e-9)
+        turn = np.mod(np.angle(found.weights[1]) - limits.forbidden[1][0][0], 2 * np.pi)
+        assert turn >= 0.5 - 1e-6 or turn <= 1e-6 or turn >= 2 * np.pi - 1e-6
+        assert found.covariance is not None
+        assert np.isfinite(found.covariance).all()
+        assert len(found.active) == 2
+        if method == "least-squares":
+            assert np.linalg.norm(found.after) > np.linalg.norm(before.after)
+    loose = Limits.of(S, influence.sensors, influence.planes, max_weight={"left": 100.0})
+    same = correct(influence, method="weighted", limits=loose)
+    np.testing.assert_allclose(same.weights, free["weighted"].weights, rtol=1e-9)
+
+
+def test_weighted_with_limits_is_the_constrained_optimum_and_passes_without_a_jump():
+    from scipy.optimize import minimize
+
+    from balancing import likelihood
+    from rotorid.regression import stretch
+
+    trials, _ = job(5, effect=1.2)
+    influence = estimate_influence(trials)
+    free = correct(influence, method="weighted")
+    problem = likelihood.problem_of(
+        influence.W.reshape(-1, P),
+        influence.baseline.ravel(),
+        influence.covariance.reshape(-1, 6, 6),
+        np.ones(S * C),
+    )
+    for share in (0.99999, 0.9, 0.5):
+        most = share * abs(free.weights[0])
+        limits = Limits.of(S, influence.sensors, influence.planes, max_weight={"left": most})
+        found = correct(influence, method="weighted", limits=limits)
+        best = minimize(
+            lambda d: likelihood.evaluate(problem, d).objective,
+            stretch(free.weights),
+            jac=lambda d: 2 * likelihood.gradient(problem, likelihood.evaluate(problem, d)),
+            constraints={"type": "ineq", "fun": lambda d, m=most: m**2 - d[0] ** 2 - d[1] ** 2},
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 500},
+        )
+        np.testing.assert_allclose(stretch(found.weights), best.x, rtol=1e-4, atol=1e-5)
+        if share > 0.999:
+            np.testing.assert_allclose(found.weights, free.weights, rtol=1e-3)
+        assert any("largest weight" in words for words in found.active)
+
+
+def test_ridge_answers_where_planes_act_alike():
+    trials, _ = job(errors=None)
+    twin = np.array(trials.mean)
+    twin[2] = twin[0] + 1.5 * (twin[1] - twin[0])
+    alike = Trials(trials.runs, trials.speeds, trials.sensors, trials.planes, twin, trials.weights)
+    influence = estimate_influence(alike)
+    with pytest.raises(UndeterminedError):
+        correct(influence)
+    soft = correct(influence, strength=0.01)
+    assert soft.method == "ridge"
+    assert soft.rank == 1
+    assert np.isfinite(soft.weights).all()
+    cut = correct(influence, keep=1)
+    assert cut.method == "truncated"
+    # what is left of the vibration is the part that the one effect of both planes cannot undo
+    only = correct(influence, planes=["left"])
+    np.testing.assert_allclose(cut.after, only.after, rtol=1e-9)
+
+
+def test_what_cannot_be():
+    trials, _ = job()
+    influence = estimate_influence(trials)
+    with pytest.raises(ValueError, match="no method 'magic'"):
+        correct(influence, method="magic")
+    with pytest.raises(ValueError, match="choose one"):
+        correct(influence, strength=0.1, keep=1)
+    with pytest.raises(ValueError, match="least squares without limits only"):
+        correct(influence, strength=0.1, method="minmax")
+    with pytest.raises(ValueError, match="shape"):
+        correct(influence, row_weights=np.ones(3))
+    with pytest.raises(ValueError, match="all readings have the weight 0"):
+        correct(influence, row_weights=np.zeros((S, C)))
