@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from balancing.determined import acting_alike
 from balancing.influence import Influence
 from balancing.labels import Labels
+from balancing.limits import Limits
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
@@ -20,6 +21,8 @@ ComplexArray = NDArray[np.complex128]
 
 ILL_CONDITIONED = 30.0
 """Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""
+EMPTY = 1e-7
+"""Effect of a weight, relative to the vibration, below which it is none."""
 _RISES_NAMED = 3
 _TOUCHES = 2e-3
 """Relative distance below which a limit with a price is touched (the solver stays a little inside)."""
@@ -87,12 +90,19 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
             f"{result.condition_number:.3g}): small errors of the readings become large weights; "
             "leave one out, or add sensors or speeds"
         )
+    empty = np.abs(result.weights) < EMPTY * np.linalg.norm(result.before) / np.linalg.norm(W, axis=0)
+    if result.limits is not None:
+        out += [
+            f"within the limits plane {p!r} is best left without a weight"
+            for p, nothing in zip(result.planes, empty, strict=True)
+            if nothing
+        ]
     std = result.angle_std
     if std is not None:
         out += [
             f"the weight in plane {p!r} lies within its own error: its angle is not determined"
-            for p, s in zip(result.planes, std, strict=True)
-            if np.isnan(s)
+            for p, s, nothing in zip(result.planes, std, empty, strict=True)
+            if np.isnan(s) and not nothing
         ]
     if result.chi_square is not None and result.fit_dof and _chance(result) < POOR:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
@@ -106,13 +116,27 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
 
 
 def left_out(
-    influence: Influence, Y: ComplexArray, chosen: list[int], used: list[int], D: ComplexArray, labels: Labels
+    influence: Influence,
+    Y: ComplexArray,
+    chosen: list[int],
+    used: list[int],
+    D: ComplexArray,
+    labels: Labels,
+    limits: Limits | None,
 ) -> tuple[str, ...]:
-    """Readings at speeds that were left out and are predicted to rise."""
+    """Readings at speeds that were left out and are predicted to rise, or to pass their limits."""
     rest = [s for s in range(len(influence.speeds)) if s not in used]
     after = Y[rest] + influence.W[rest][..., chosen] @ D
-    words = ", a speed left out"
-    return _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, words)
+    words = _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, ", a speed left out")
+    if limits is None:
+        return words
+    over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
+    return words + tuple(
+        f"the vibration of {reading_names((influence.sensors[c],), influence.speeds[[rest[s]]])[0]}, a speed "
+        f"left out, is predicted to be {amplitude_words(labels, float(np.abs(after[s, c])))}, more than its "
+        f"limit of {amplitude_words(labels, float(limits.residual[rest[s], c]))}"
+        for s, c in np.argwhere(over)[:_RISES_NAMED]
+    )
 
 
 def _rises(

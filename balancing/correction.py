@@ -265,6 +265,10 @@ def correct(
     names = tuple(influence.planes[p] for p in chosen)
     W = influence.W[used][..., chosen].reshape(-1, len(chosen))
     Y = start.readings[used]
+    if not Y.any():
+        raise ValueError(
+            "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
+        )
     soft = strength is not None or keep is not None
     unclear: tuple[str, ...] = ()
     unclear_regions: tuple[str, ...] = ()
@@ -326,7 +330,7 @@ def correct(
     )
     warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
     warnings += cautions(result, W, alike=not unclear)
-    warnings += left_out(influence, start.readings, chosen, used, D, start.labels)
+    warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
     return _with_warnings(result, warnings)
 
 
@@ -341,7 +345,7 @@ def _rows(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> F
     chosen = weights[used].ravel()
     if not chosen.any():
         raise ValueError("all readings have the weight 0: nothing is left to be minimised")
-    return None if (chosen == 1).all() else chosen
+    return None if (chosen == chosen[0]).all() else chosen / chosen.max()
 
 
 def region_radius(dof: int | None) -> float:
