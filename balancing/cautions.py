@@ -90,13 +90,12 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
             f"{result.condition_number:.3g}): small errors of the readings become large weights; "
             "leave one out, or add sensors or speeds"
         )
-    empty = np.abs(result.weights) < EMPTY * np.linalg.norm(result.before) / np.linalg.norm(W, axis=0)
-    if result.limits is not None:
-        out += [
-            f"within the limits plane {p!r} is best left without a weight"
-            for p, nothing in zip(result.planes, empty, strict=True)
-            if nothing
-        ]
+    empty = (result.weights == 0) & (result.limits is not None)
+    out += [
+        f"the limits leave plane {p!r} without a weight"
+        for p, nothing in zip(result.planes, empty, strict=True)
+        if nothing
+    ]
     std = result.angle_std
     if std is not None:
         out += [

@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.baseline import match_speeds, starting_point
-from balancing.cautions import amplitude_words, binding, cautions, left_out, reading_names, weight_words
+from balancing.cautions import (
+    EMPTY,
+    amplitude_words,
+    binding,
+    cautions,
+    left_out,
+    reading_names,
+    weight_words,
+)
 from balancing.conditioning import conditioning
 from balancing.determined import check_planes, check_resolution
 from balancing.errors import Source, reading_covariance
@@ -298,6 +306,8 @@ def correct(
     )
     fitted = fit_weights(stack, method, strength=strength, keep=keep)
     D = fitted.weights
+    if stack.limits is not None:
+        D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
     after_covariance = None
     if channels is not None and errors is not None:

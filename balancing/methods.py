@@ -128,7 +128,7 @@ def fit_weights(
 
 def _plain(stack: Stack, method: Method) -> Fitted:
     found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
-    bound = found.active_weights.any() or found.active_residuals.any()
+    bound = found.gap is not None  # limits that do not bind leave the closed form
     covariance: FloatArray | None = None
     words: tuple[str, ...] = ()
     if stack.channels is not None and method == "least-squares" and not bound:

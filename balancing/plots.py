@@ -48,7 +48,9 @@ def overview(c: Correction) -> Figure:
         ax = vectors.add_subplot(rows, columns, place + 1, projection="polar")
         vibration(c, int(s), ax, legend=False)
     handles, names = vectors.axes[0].get_legend_handles_labels()
-    vectors.legend(handles, names, loc="outside lower center", ncols=min(len(names), 6), fontsize="small")
+    vectors.legend(
+        handles, names, loc="outside lower center", ncols=min(len(names), 2 * columns), fontsize="small"
+    )
     title = f"Vibration before (open) and predicted after (filled){_unit(c)}, phase as {c.labels.phase}"
     vectors.suptitle(title, fontsize="medium")
     return fig
@@ -153,7 +155,7 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
     old, old_phase = (v[speed] for v in c.labels.vibration(c.before))
     new, new_phase = (v[speed] for v in c.labels.vibration(c.after))
     for k, sensor in enumerate(c.sensors):
-        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[(k + k // len(COLOURS)) % len(MARKERS)]
         polar.plot(
             np.deg2rad([old_phase[k], new_phase[k]]), [old[k], new[k]], color=colour, lw=0.8, ls=":", zorder=2
         )

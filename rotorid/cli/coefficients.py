@@ -45,6 +45,10 @@ def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
     has_trials = bool(job.trials.weights.any())
     if kind is None:
         kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
+    if kind == "measured" and model_error is not None:
+        raise ValueError(
+            "--model-error is for computed coefficients: add --coefficients computed or combined"
+        )
     if kind == "computed":
         influence = computed(job, model_error or 0.0)
         return _chosen(job, influence, job.trials)

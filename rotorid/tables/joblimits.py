@@ -249,6 +249,6 @@ def _split(text: str, what: str, example: str) -> tuple[float, str]:
     except NotANumber as error:
         raise ValueError(f"{what}: expected {error}, such as {example}") from None
     if value <= 0:
-        hint = "to use no weight at all, leave the plane out"
-        raise ValueError(f"{what}: expected a value above 0, such as {example}; {hint}")
+        hint = "; to use no weight at all, leave the plane out" if _OPTION_MASS in what else ""
+        raise ValueError(f"{what}: expected a value above 0, such as {example}{hint}")
     return value, (match[2] or "").strip() if match else ""
