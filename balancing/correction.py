@@ -20,6 +20,7 @@ from balancing.cautions import (
     reading_names,
     weight_words,
 )
+from balancing.choice import coefficients_of, plane_indices, rows_of
 from balancing.conditioning import conditioning
 from balancing.determined import check_planes, check_resolution
 from balancing.errors import Source, reading_covariance
@@ -268,7 +269,7 @@ def correct(
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
     start = starting_point(influence, baseline)
-    chosen = _plane_indices(influence, planes)
+    chosen = plane_indices(influence, planes)
     used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
     names = tuple(influence.planes[p] for p in chosen)
     W = influence.W[used][..., chosen].reshape(-1, len(chosen))
@@ -282,7 +283,7 @@ def correct(
     unclear_regions: tuple[str, ...] = ()
     if not soft:
         check_planes(W, names)
-        coefficients = _of_planes(influence, used, chosen)
+        coefficients = coefficients_of(influence, used, chosen)
         unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
             small = optimism(W, coefficients, names, method=method)
@@ -297,7 +298,7 @@ def correct(
         W,
         Y.ravel(),
         channels,
-        _rows(row_weights, influence.W.shape[:2], used),
+        rows_of(row_weights, influence.W.shape[:2], used),
         kept if kept is not None and kept.any else None,
         names,
         reading_names(influence.sensors, influence.speeds[used]),
@@ -344,51 +345,11 @@ def correct(
     return _with_warnings(result, warnings)
 
 
-def _rows(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:
-    if given is None:
-        return None
-    weights = np.asarray(given, dtype=np.float64)
-    if weights.shape != shape or not (np.isfinite(weights) & (weights >= 0)).all():
-        raise ValueError(
-            f"the weights of the readings must be numbers ≥ 0 of shape {shape} (speeds, sensors)"
-        )
-    chosen = weights[used].ravel()
-    if not chosen.any():
-        raise ValueError("all readings have the weight 0: nothing is left to be minimised")
-    return None if (chosen == chosen[0]).all() else chosen / chosen.max()
-
-
 def region_radius(dof: int | None) -> float:
     """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
     from scipy.special import chdtri, fdtri
 
     return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
-
-
-def _of_planes(influence: Influence, used: list[int], chosen: list[int]) -> FloatArray | None:
-    """Covariance of the chosen coefficients of each reading, (N, 2P, 2P)."""
-    if influence.covariance is None:
-        return None
-    index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
-    return np.asarray(
-        influence.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
-    )
-
-
-def _plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:
-    if planes is None:
-        return list(range(len(influence.planes)))
-    if isinstance(planes, str):
-        planes = [planes]
-    unknown = [p for p in planes if p not in influence.planes]
-    if unknown:
-        raise ValueError(
-            f"there is no plane {', '.join(map(repr, unknown))}; the planes are "
-            f"{', '.join(map(repr, influence.planes))}"
-        )
-    if not planes or len(set(planes)) < len(planes):
-        raise ValueError("choose at least one plane, each once")
-    return [influence.planes.index(p) for p in planes]
 
 
 def _with_warnings(result: Correction, warnings: tuple[str, ...]) -> Correction:

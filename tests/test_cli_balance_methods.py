@@ -302,3 +302,40 @@ def test_unknown_options(cli):
         "no number" in cli("balance", JOB, "--max-mass", "heavy").err
         or cli("balance", JOB, "--max-mass", "heavy").code == 2
     )
+
+
+def test_nothing_to_balance(cli, tmp_path):
+    effects = [EFFECT[:, 0], EFFECT[:, 1]]
+    rows, weights = runs([0 * BASE, *effects], ("a", "b"))
+    for method in METHODS:
+        message = refused(cli, tmp_path, (rows, weights), "--method", method, "--amplitude-error", "2")
+        assert "nothing to balance" in message
+
+
+def test_limit_at_a_speed_left_out_is_watched(answers, tmp_path):
+    job = job_with(tmp_path, '[sensors."probe 4"]\nlimit = 0.2\n')
+    found = answers(job, "--speeds", "1220,1360")
+    assert any("a speed left out" in w and "more than its limit" in w for w in found["warnings"])
+
+
+def test_best_planes_are_used_and_leave_out_what_the_job_leaves_out(answers, tmp_path):
+    found = answers(JOB, "--best-planes", "2")
+    assert [c["plane"] for c in found["corrections"]] == ["left", "right"]
+    job = job_with(tmp_path, "[planes.left]\nuse = false\n")
+    assert answers(job, "--best-planes", "2")["best_planes"]["choices"] == 1
+
+
+def test_scatter_of_a_weight_that_an_arc_holds(answers, tmp_path):
+    free = answers(JOB)["corrections"][0]
+    at = free["angle_deg"]
+    job = job_with(tmp_path, f"[planes.left]\nforbidden_deg = [[{at - 5:.3f}, {at + 30:.3f}]]\n")
+    held = answers(job)["corrections"][0]
+    assert held["angle_std_deg"] < 1e-3 < free["angle_std_deg"]
+    assert held["mass_std"] > 0
+
+
+def test_options_that_would_be_ignored_are_refused(cli):
+    assert "--coefficients computed" in cli("balance", JOB, "--model-error", "5").err
+    assert "names with commas" in cli("balance", JOB, "--planes", "").err
+    assert "only once" in cli("unbalance", MODEL, "--stations", "6,6").err
+    assert "--method ridge" in cli("unbalance", MODEL, "--stations", "6,12", "--ridge", "0.1").err
