@@ -167,6 +167,8 @@ def estimate_influence(trials: Trials) -> Influence:
     elif model.errors is not None and R > P + 1:
         G = _weighted_gain(A, mean_covariance(trials, model.errors))
     theta = np.einsum("scpr,scr->scp", G, Y)
+    # a rotor at rest is at rest: what is left of its readings is rounding
+    theta[..., 0][np.abs(theta[..., 0]) < EQUAL * np.abs(Y).max(axis=-1)] = 0.0
     covariance = None
     if model.errors is not None:
         covariance = _channel_covariance(G, mean_covariance(trials, model.errors))

@@ -328,7 +328,7 @@ def test_best_planes_are_used_and_leave_out_what_the_job_leaves_out(answers, tmp
 def test_scatter_of_a_weight_that_an_arc_holds(answers, tmp_path):
     free = answers(JOB)["corrections"][0]
     at = free["angle_deg"]
-    job = job_with(tmp_path, f"[planes.left]\nforbidden_deg = [[{at - 5:.3f}, {at + 30:.3f}]]\n")
+    job = job_with(tmp_path, f"[planes.left]\nforbidden_deg = [[{at - 20:.3f}, {at + 40:.3f}]]\n")
     held = answers(job)["corrections"][0]
     assert held["angle_std_deg"] < 1e-3 < free["angle_std_deg"]
     assert held["mass_std"] > 0
