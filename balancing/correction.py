@@ -83,6 +83,8 @@ class Correction:
         Of the method "weighted": how well weights in these planes explain the readings.
     limits, active
         What the correction had to keep to, and the limits that bind, in words.
+    remove
+        Planes where material is taken away, opposite to the weight that would be added.
     """
 
     speeds: FloatArray
@@ -108,6 +110,7 @@ class Correction:
     fit_dof: int | None = None
     limits: Limits | None = None
     active: tuple[str, ...] = ()
+    remove: tuple[str, ...] = ()
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -171,8 +174,11 @@ class Correction:
         """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown)."""
         import pandas as pd
 
-        rows = [{k: v for k, v in row.items() if k != "covariance"} for row in self.to_dict()["corrections"]]
+        left_out = ("covariance", "action", "remove_at_deg")
+        rows = [{k: v for k, v in row.items() if k not in left_out} for row in self.to_dict()["corrections"]]
         frame = pd.DataFrame(rows)
+        if self.remove:
+            frame["remove_at_deg"] = [row["remove_at_deg"] for row in self.to_dict()["corrections"]]
         return frame.astype({"mass_std": float, "angle_std_deg": float})
 
     def residuals_frame(self) -> pd.DataFrame:
@@ -222,6 +228,7 @@ def correct(
     row_weights: ArrayLike | None = None,
     strength: float | str | None = None,
     keep: float | None = None,
+    remove: Sequence[str] = (),
 ) -> Correction:
     """Correction weights over all chosen sensors and speeds.
 
@@ -252,6 +259,8 @@ def correct(
     keep
         Truncation instead: how many combinations of planes to keep (1, 2, …), or the smallest singular value
         relative to the largest (below 1).
+    remove
+        Planes where material is taken away instead of added.
 
     Returns
     -------
@@ -338,6 +347,7 @@ def correct(
         fit_dof=fitted.dof,
         limits=stack.limits,
         active=binding(stack, fitted),
+        remove=tuple(name for name in names if name in remove),
     )
     warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
     warnings += cautions(result, W, alike=not unclear)

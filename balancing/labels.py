@@ -2,18 +2,22 @@
 
 Inside, every vibration is a complex amplitude with positive phase = lead, every weight is complex with
 its angle counted with the rotation. Only a `Labels` object, made where files are read, knows how the
-people of the job write them.
+people of the job write them. The signs are derived in docs/conventions.md.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+Phase = Literal["lead", "lag"]
+Angles = Literal["with rotation", "against rotation"]
+Rotation = Literal["clockwise", "counter-clockwise"]
+View = Literal["drive end", "free end"]
 
 
 @dataclass(frozen=True)
@@ -32,15 +36,33 @@ class Labels:
         Whether angles on the rotor count with or against the rotation.
     speed_unit
         In which the readings give the speed: "rpm", "rad_s" or "Hz".
+    rotation
+        How the rotor turns, seen from the end of `view`; None where the job does not say.
+    view
+        The end from which `rotation` is seen and discs are drawn; None where the job does not say.
+    clock
+        Whether the job calls its angles clockwise or counter-clockwise instead of with or against the
+        rotation.
+
+    Raises
+    ------
+    ValueError
+        If `clock` is set or `view` is given without `rotation`.
     """
 
     vibration_unit: str = "m"
     vibration_scale: float = 1.0
     weight_unit: str = "kg"
     weight_scale: float = 1.0
-    phase: Literal["lead", "lag"] = "lead"
-    angles: Literal["with rotation", "against rotation"] = "with rotation"
+    phase: Phase = "lead"
+    angles: Angles = "with rotation"
     speed_unit: str = "rpm"
+    rotation: Rotation | None = None
+    view: View | None = None
+    clock: bool = False
+
+    def __post_init__(self) -> None:
+        check_turning(self.rotation, self.view, clock=self.clock)
 
     def vibration(self, amplitude: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Amplitude in the job's unit and phase in degrees, 0 ≤ phase < 360, as the job counts it."""
@@ -68,14 +90,92 @@ class Labels:
         """+1 with the rotation, −1 against it."""
         return 1 if self.angles == "with rotation" else -1
 
+    @property
+    def angle_words(self) -> str:
+        """How angles count, in the word of the job: "with rotation", or "clockwise" seen from `view`."""
+        if not self.clock or self.rotation is None:
+            return self.angles
+        return self.rotation if self.angle_sign > 0 else opposite(self.rotation)
+
+    @property
+    def drawn_sign(self) -> int:
+        """+1 where the rotor drawn from the stated end turns counter-clockwise (or nothing is stated)."""
+        return -1 if self.rotation == "clockwise" else 1
+
+    def drawn(self, angle: ArrayLike) -> FloatArray:
+        """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
+        return np.asarray(self.drawn_sign * np.asarray(angle, dtype=float))
+
+    def seen_from(self, view: View) -> Labels:
+        """The same conventions seen from an end.
+
+        From the other end the rotation, and with it the words clockwise and counter-clockwise, are turned
+        round; numbers stay what they are.
+
+        Raises
+        ------
+        ValueError
+            If the labels do not say from which end the rotation is seen.
+        """
+        if self.rotation is None or self.view is None:
+            raise ValueError(
+                "the direction of rotation and the end from which it is seen are not stated: "
+                'give both, rotation = "clockwise" and view = "drive end"'
+            )
+        if view == self.view:
+            return self
+        return replace(self, view=view, rotation=opposite(self.rotation))
+
+    def turning_in_words(self) -> str:
+        """One clause for captions: how angles count and how the rotor turns."""
+        if self.clock:
+            end = "" if self.view is None else f" seen from the {self.view}"
+            return f"angles from the mark {self.angle_words}{end}, the rotor turns {self.rotation}"
+        turn = "with" if self.angle_sign > 0 else "against"
+        words = f"angles from the mark {turn} the rotation"
+        if self.rotation is not None:
+            words += f", which is {self.rotation}"
+            words += "" if self.view is None else f" seen from the {self.view}"
+        return words
+
     def conventions(self) -> dict[str, str]:
-        """The conventions in the words of the job file."""
-        return {
+        """The conventions in the words of the job file; rotation and view only where they are stated."""
+        words = {
             "phase": self.phase,
-            "angles": self.angles,
+            "angles": self.angle_words,
             "vibration_unit": self.vibration_unit,
             "weight_unit": self.weight_unit,
         }
+        if self.rotation is not None:
+            words["rotation"] = self.rotation
+        if self.view is not None:
+            words["view"] = self.view
+        return words
+
+
+def opposite(rotation: Rotation) -> Rotation:
+    """The direction of the same rotation seen from the other end."""
+    return "counter-clockwise" if rotation == "clockwise" else "clockwise"
+
+
+def check_turning(rotation: str | None, view: str | None, *, clock: bool) -> None:
+    """Refuse a rotation that is none, and what cannot be understood without one.
+
+    Raises
+    ------
+    ValueError
+        Saying what is missing.
+    """
+    if rotation not in (None, "clockwise", "counter-clockwise"):
+        raise ValueError(f"rotation must be 'clockwise' or 'counter-clockwise', not {rotation!r}")
+    if view not in (None, "drive end", "free end"):
+        raise ValueError(f"view must be 'drive end' or 'free end', not {view!r}")
+    if rotation is None and (clock or view is not None):
+        what = "angles that count clockwise or counter-clockwise" if clock else f"a view from the {view}"
+        raise ValueError(
+            f"{what} cannot be understood without the direction of rotation seen from the same end: "
+            "state rotation as clockwise or counter-clockwise"
+        )
 
 
 def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:

@@ -5,9 +5,13 @@ Source: [S] 1.9.1. A computed coefficient is what a sensor reads per unbalance; 
 
 - Phase. The model's vibration is Re W U e^{iωt} with the mark in the direction x at t = 0. Instruments count
   time from the pulse of the key phasor, which comes when the mark passes its direction, at the angle κ from
-  x: t = t' + κ/ω. What they read is therefore W e^{iκ}.
+  x: t = t' + κ/ω. What they read is therefore W e^{iκ}: a key phasor further on starts the clock later.
+- Sensor. In its direction β from x it sees Re z e^{−iβ}, which is in `fem.influence` already: a probe further
+  on sees the heavy spot later. Where bearings are alike in x and y only κ − β matters.
 - Quantity. A velocity reads iω W, an acceleration −ω² W.
 - Weight. A mass m in a plane of radius r is the unbalance m r: per mass the coefficient is r W.
+
+Offsets that cancel in trial runs (κ, β, peak or peak to peak) do not cancel here: docs/conventions.md.
 """
 
 from __future__ import annotations

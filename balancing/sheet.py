@@ -64,6 +64,8 @@ def correction_dict(c: Correction) -> dict[str, Any]:
                 "mass_std": None if mass_std is None else float(mass_std[p] * c.labels.weight_scale),
                 "angle_std_deg": None if angle_std is None else _number(np.degrees(angle_std[p])),
                 "covariance": None if covariance is None else covariance[p].tolist(),
+                "action": "remove" if plane in c.remove else "add",
+                "remove_at_deg": float((angle[p] + 180) % 360) if plane in c.remove else None,
             }
             for p, plane in enumerate(c.planes)
         ],
@@ -116,7 +118,8 @@ def _corrections(c: Correction) -> str:
     rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
     mass_std, angle_std = c.mass_std, c.angle_std
     for p, plane in enumerate(c.planes):
-        row = [plane, figures(mass[p]), _degrees(angle[p])]
+        gone = plane in c.remove
+        row = [f"{plane} (remove)" if gone else plane, figures(mass[p]), _degrees(angle[p] + 180 * gone)]
         if factor and mass_std is not None and angle_std is not None:
             width = factor * mass_std[p]
             held = width < HELD * abs(c.weights[p])

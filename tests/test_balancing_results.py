@@ -38,7 +38,7 @@ def test_the_keys_of_the_interface(correction):
     assert set(d) >= KEYS
     assert d["method"] == "least-squares"
     row = ["plane", "mass", "unit", "angle_deg", "mass_std", "angle_std_deg", "covariance"]
-    assert list(d["corrections"][0]) == row
+    assert list(d["corrections"][0]) == [*row, "action", "remove_at_deg"]
     row = [
         "speed_rpm",
         "sensor",

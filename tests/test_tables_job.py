@@ -10,7 +10,6 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_boo
 
 from balancing import correct, estimate_influence
 from rotorid.tables import job_from_files, read_job, read_trials, write_influence
-from rotorid.tables.jobkeys import JOB_LATER, PLANES_LATER
 
 JOB = """
 runs = "runs.csv"
@@ -178,7 +177,7 @@ BAD_JOBS = [
         'angles = "with"',
         "angles",
         "with",
-        "'with rotation' or 'against rotation'",
+        "'with rotation', 'against rotation', 'clockwise' or 'counter-clockwise'",
     ),
     (
         "speed_tolerance_percent = 1",
@@ -223,18 +222,6 @@ def test_bad_jobs(job, old, new, key, value, words):
     the_only(complaints(job, JOB.replace(old, new, 1)), "job.toml", None, key, value, words)
 
 
-@pytest.mark.parametrize("key", JOB_LATER)
-def test_keys_of_the_job_that_this_version_does_not_know(job, key):
-    found = complaints(job, f'{key} = "x"\n' + JOB)
-    the_only(found, "job.toml", None, key, "x", "not supported by this version of rotorid")
-
-
-@pytest.mark.parametrize("key", PLANES_LATER)
-def test_keys_of_planes_that_this_version_does_not_know(job, key):
-    found = complaints(job, JOB.replace("[planes.1]", f"[planes.1]\n{key} = 5"))
-    the_only(found, "job.toml", None, f"planes.1.{key}", "5", "not supported by this version of rotorid")
-
-
 def test_errors_that_are_all_zero(job):
     text = 'runs = "runs.csv"\nweights = "weights.csv"\n[errors]\nphase_deg = 0\n'
     the_only(complaints(job, text), "job.toml", None, "errors", None, "an error above 0")
@@ -267,8 +254,8 @@ BAD_SETTINGS = [
     (5, "key", None, "", "the name of a setting"),
     (5, "key", "phase", "phase", "each setting once (row 2 has it too)"),
     (5, "key", "phase.x", "phase.x", "no parts of phase"),
-    (5, "key", "slow_roll", "2", "not supported by this version"),
-    (5, "key", "planes.1.holes", "2", "not supported by this version"),
+    (5, "key", "planes.1.holes_deg.x", "a table", "numbers, not"),
+    (5, "key", "planes.1.remove", "2", "true or false"),
     (5, "key", "runs", "2", "the table in the sheet 'runs'"),
 ]
 
@@ -288,7 +275,7 @@ def test_bad_sheets_of_a_workbook(book, tmp_path):
     found = complaints(book, settings=[["a", "b"], [1, 2]])
     the_only(found, "job.xlsx", 1, None, "a and b", "the columns key and value")
     found = complaints(book, planes=[["plane", "available_g"], ["1", 20]])
-    the_only(found, "job.xlsx", 2, "available_g", "20", "not supported by this version")
+    the_only(found, "job.xlsx", 2, "available_g", "20", "the holes of the plane too")
     found = complaints(book, planes=[["plane"], ["1"], ["1"]])
     the_only(found, "job.xlsx", 3, "plane", "1", "each plane once (row 2 has it too)")
     found = complaints(book, sensors=[["name"], ["A"]])

@@ -19,6 +19,9 @@ from rotorid.cli import (
     influence,
     reduce,
     response,
+    split,
+    tolerance,
+    trial_weight,
     unbalance,
 )
 
@@ -35,6 +38,9 @@ app.command("campbell")(campbell.campbell)
 app.command("response")(response.response)
 app.command("influence")(influence.influence)
 app.command("balance")(balance.balance)
+app.command("trial-weight")(trial_weight.trial_weight)
+app.command("split")(split.split)
+app.command("tolerance")(tolerance.tolerance)
 app.command("unbalance")(unbalance.unbalance)
 app.command("reduce")(reduce.reduce)
 app.command("identify")(identify.identify)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import Annotated, TypedDict
 
 import typer
 
@@ -18,15 +17,6 @@ from rotorid.cli.common import (
     names,
     speeds,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from balancing import Correction, Influence
-    from balancing.check import CheckComparison
-    from balancing.subset import Subsets
-    from balancing.tradeoff import TradeOff
-    from rotorid.tables import Job
 
 METHODS = ("least-squares", "weighted", "minmax")
 COEFFICIENTS = ("measured", "computed", "combined")
@@ -90,7 +80,10 @@ def balance(
     angles: Annotated[
         str | None,
         typer.Option(
-            metavar="'with rotation'|'against rotation'", help="How angles count.", show_default=False
+            metavar="DIRECTION",
+            help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
+            "where the job states its rotation.",
+            show_default=False,
         ),
     ] = None,
     planes: Annotated[
@@ -135,6 +128,22 @@ def balance(
             show_default=False,
         ),
     ] = None,
+    split: Annotated[
+        bool,
+        typer.Option(
+            "--split", help="Choose pieces in the holes of the job, all planes together (a picture of discs)."
+        ),
+    ] = False,
+    split_seconds: Annotated[
+        float, typer.Option(metavar="SECONDS", min=0.1, help="For the proof that no choice is better.")
+    ] = 5.0,
+    refine: Annotated[
+        bool,
+        typer.Option(
+            "--refine",
+            help="Add the job's check runs to its trial runs: coefficients and trim from all of them.",
+        ),
+    ] = False,
     best_planes: Annotated[
         int | None,
         typer.Option(
@@ -144,6 +153,18 @@ def balance(
     trade_off: Annotated[
         bool, typer.Option("--trade-off", help="Residual against total weight, too (a second picture).")
     ] = False,
+    grade: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GRADE", help="Judge the planes by ISO 21940-11: G0.4 to G4000.", show_default=False
+        ),
+    ] = None,
+    rotor_mass: Annotated[
+        str | None, typer.Option(metavar="MASS", help="For --grade, such as 500kg.", show_default=False)
+    ] = None,
+    service_speed: Annotated[
+        str | None, typer.Option(metavar="SPEED", help="For --grade, such as 3000rpm.", show_default=False)
+    ] = None,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
@@ -160,7 +181,10 @@ def balance(
     """
     from balancing import correct
     from balancing.check import compare_check
+    from balancing.mounted import mount
+    from rotorid.cli.balance_report import Report
     from rotorid.cli.coefficients import choose, compare_planes
+    from rotorid.cli.verdict import judge, tolerance_of
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.influence import influence_bytes
     from rotorid.tables.joblimits import with_limits
@@ -179,7 +203,7 @@ def balance(
     job = read_job(files[0], **settings) if is_job else job_from_files(files, influence=influence, **settings)
     if max_mass is not None or limit:
         job = with_limits(job, max_mass, limit or [])
-    found = choose(job, coefficients, model_error)
+    found = choose(job, coefficients, model_error, refined=refine)
     used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
     candidates = names(planes) or (list(found.used) if job.left_out else list(found.influence.planes))
     subsets = None
@@ -196,10 +220,22 @@ def balance(
         row_weights=job.row_weights,
         strength=_strength(ridge),
         keep=truncate,
+        remove=sorted(job.remove),
     )
     report = Report(result, found.influence, subsets=subsets)
-    if job.check is not None:
+    if split:
+        report.mounted = mount(
+            result,
+            found.influence,
+            found.baseline,
+            job.holes,
+            row_weights=job.row_weights,
+            time_limit=split_seconds,
+        )
+    if job.check is not None and not refine:
         report.check = compare_check(result, job.check, found.influence, found.baseline)
+    tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes)
+    report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
     if trade_off:
         report.add_trade_off(job)
     emit(
@@ -219,9 +255,14 @@ def balance(
             "limit": ", ".join(limit) if limit else None,
             "ridge": ridge,
             "truncate": truncate,
+            "split": split,
+            "refine": refine,
+            "grade": grade,
+            "rotor_mass": rotor_mass,
+            "service_speed": service_speed,
         },
         figure=(plot, report.figure),
-        table=(output, result.to_frame),
+        table=(output, report.frame),
         more=None
         if save_influence is None
         else (save_influence, lambda: influence_bytes(save_influence, found.influence)),
@@ -251,60 +292,3 @@ def _strength(text: str | None) -> float | str | None:
     if not 0 < value < float("inf"):
         raise ValueError(f"--ridge {text!r}: a strength above 0, such as 0.03, or auto")
     return value
-
-
-@dataclass
-class Report:
-    """A correction and what was asked for beside it."""
-
-    result: Correction
-    influence: Influence
-    check: CheckComparison | None = None
-    subsets: Subsets | None = None
-    curve: TradeOff | None = None
-
-    def add_trade_off(self, job: Job) -> None:
-        """Residual against total weight, in the planes used."""
-        from balancing.tradeoff import trade_off
-
-        W, Y, rows = self._stack(job, self.result.planes)
-        self.curve = trade_off(
-            W,
-            Y,
-            self.result.planes,
-            criterion="max" if self.result.method == "minmax" else "rms",
-            row_weights=rows,
-            labels=self.result.labels,
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        parts = {"check": self.check, "best_planes": self.subsets, "trade_off": self.curve}
-        return {
-            **self.result.to_dict(),
-            **{key: part.to_dict() for key, part in parts.items() if part is not None},
-        }
-
-    def text(self) -> str:
-        """For the terminal."""
-        parts = (self.result, self.check, self.subsets, self.curve)
-        blocks = [part.summary() for part in parts if part is not None]
-        if self.result.limits is not None and (self.subsets or self.curve):
-            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
-        return "\n\n".join(blocks)
-
-    def figure(self) -> Figure:
-        """The correction, or the trade-off where it was asked for."""
-        from balancing import plots, plots_tradeoff
-
-        return plots.overview(self.result) if self.curve is None else plots_tradeoff.overview(self.curve)
-
-    def _stack(self, job: Job, planes: tuple[str, ...]) -> tuple[Any, Any, Any]:
-        """W (N, P), Y (N,) and row weights (N,) of the speeds used."""
-        from balancing.baseline import match_speeds
-
-        at = match_speeds(self.result.speeds, self.influence.speeds)
-        columns = [self.influence.planes.index(p) for p in planes]
-        W = self.influence.W[at][..., columns].reshape(-1, len(columns))
-        rows = None if job.row_weights is None else job.row_weights[at].ravel()
-        return W, self.result.before.ravel(), rows

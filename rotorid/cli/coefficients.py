@@ -29,8 +29,8 @@ class Chosen:
     used: tuple[str, ...]
 
 
-def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
-    """Coefficients of a job.
+def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bool = False) -> Chosen:
+    """Coefficients of a job; `refined` by its check runs.
 
     Raises
     ------
@@ -49,6 +49,8 @@ def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
         raise ValueError(
             "--model-error is for computed coefficients: add --coefficients computed or combined"
         )
+    if refined:
+        return _refined(job, kind)
     if kind == "computed":
         influence = computed(job, model_error or 0.0)
         return _chosen(job, influence, job.trials)
@@ -60,6 +62,19 @@ def choose(job: Job, kind: str | None, model_error: float | None) -> Chosen:
         error = MODEL_ERROR if model_error is None else model_error
         measured = combine(measured, computed(job, error))
     return _chosen(job, measured, baseline)
+
+
+def _refined(job: Job, kind: str) -> Chosen:
+    """From trial runs and check runs together."""
+    from balancing import correct, estimate_influence
+    from balancing.refine import refine
+
+    if job.check is None:
+        raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
+    if kind != "measured" or job.influence is not None:
+        raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
+    mounted = None if job.check_mounted else correct(estimate_influence(job.trials))
+    return _chosen(job, refine(job.trials, job.check, corrections=mounted), None)
 
 
 def _chosen(job: Job, influence: Influence, baseline: Trials | None) -> Chosen:
@@ -134,16 +149,31 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
         radii={p: job.radii[p] for p in job.planes} if by_mass else None,
         relative_error=error_percent / 100,
         quantity=_quantity(labels.vibration_unit),
+        key_phasor=job.key_phasor,
         labels=labels,
     )
 
 
 def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
-    plain = unit.removesuffix("_pp").removesuffix("_rms")
-    if plain in ("mm_s", "in_s"):
-        return "velocity"
-    if plain == "g":
-        return "acceleration"
-    if plain:
-        return "displacement"
-    raise ValueError("computed coefficients need the unit of the amplitudes, such as amplitude_um_pp")
+    """What an amplitude in this unit is.
+
+    Raises
+    ------
+    ValueError
+        For a unit that is only a label.
+    """
+    from rotorid.tables.units import vibration
+
+    kinds: dict[str, Literal["displacement", "velocity", "acceleration"]] = {
+        "length": "displacement",
+        "displacement": "displacement",
+        "velocity": "velocity",
+        "acceleration": "acceleration",
+    }
+    kind = vibration(unit).kind if unit else ""
+    if kind not in kinds:
+        raise ValueError(
+            "computed coefficients need amplitudes in a unit of length, velocity or acceleration, such as "
+            f"um_pp or mm_s_rms; {unit or 'a column without a unit'} is none"
+        )
+    return kinds[kind]

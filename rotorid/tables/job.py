@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from balancing.influence import Influence
-from balancing.limits import Limits
-from balancing.trials import Trials
-from rotorid.tables.conventions import DEFAULT_TOLERANCE, Conventions, as_angles, as_phase
 from rotorid.tables.grid import Grid
 from rotorid.tables.influence import fit_to_readings, load_influence
 from rotorid.tables.jobbook import read_job_book
-from rotorid.tables.jobkeys import COLUMNS, PlaneKeys, SensorKeys, read_plane, read_sensor
-from rotorid.tables.joblimits import make_limits, make_row_weights
-from rotorid.tables.jobmodel import (
-    Model,
-    collect,
-    complain_about_places,
-    read_check,
-    read_model,
-    weight_unit_without_weights,
-)
+from rotorid.tables.jobcompletion import completed
+from rotorid.tables.jobdata import Job
+from rotorid.tables.jobkeys import COLUMNS, read_plane, read_sensor
+from rotorid.tables.jobmodel import collect, read_model
 from rotorid.tables.jobsettings import (
-    Extra,
     Overrides,
     Settings,
     file_of,
@@ -36,78 +21,12 @@ from rotorid.tables.jobsettings import (
     read_settings,
     settle_conventions,
 )
-from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
+from rotorid.tables.problems import InputError, Problems
 from rotorid.tables.sheet import is_workbook
 from rotorid.tables.tomlfile import Section, read_toml
 from rotorid.tables.trials import make_trials
 
-if TYPE_CHECKING:
-    from fem.rotor import Rotor
-    from fem.sensors import Sensor
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """One balancing job, read completely.
-
-    Attributes
-    ----------
-    trials
-        Readings and mounted weights.
-    influence
-        Stored coefficients for the speeds and sensors of the readings, in their order, or None.
-    conventions
-        Of phases, angles and speeds.
-    files
-        All files that were read, for the provenance of a result.
-    planes
-        Names (P,): those of stored coefficients or else of the weights, then planes that only the rotor
-        model knows (named in the job, with a node).
-    limits
-        In SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`; None: none.
-    row_weights
-        Of each reading in the fit, shape (S, C): the speed's times the sensor's; None where all are 1.
-    left_out
-        Planes that the job tells not to use.
-    check
-        Check runs, in the units and at the speeds of the job, or None.
-    check_mounted
-        Whether `check.weights` say what was mounted in the check runs; else the proposed corrections were.
-    rotor
-        The model that the job names, or None.
-    plane_nodes
-        Node of each plane that has one in the model.
-    sensor_places
-        Node and direction (degrees with the rotation from the model's x) of each sensor that has a node.
-    radii
-        Radius, m, of each plane that has one: it converts between masses and unbalances.
-    """
-
-    trials: Trials
-    influence: Influence | None
-    conventions: Conventions
-    files: tuple[Path, ...]
-    planes: tuple[str, ...] = ()
-    limits: Limits | None = None
-    row_weights: NDArray[np.float64] | None = None
-    left_out: tuple[str, ...] = ()
-    check: Trials | None = None
-    check_mounted: bool = False
-    rotor: Rotor | None = None
-    plane_nodes: Mapping[str, int] = field(default_factory=dict)
-    sensor_places: Mapping[str, Sensor] = field(default_factory=dict)
-    radii: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def used(self) -> tuple[str, ...]:
-        """Planes that are not left out."""
-        return tuple(p for p in self.planes if p not in self.left_out)
-
-    def limits_of(self, planes: Sequence[str]) -> Limits | None:
-        """Limits of these planes only, in their order, at all speeds."""
-        if self.limits is None:
-            return None
-        return self.limits.pick(range(len(self.trials.speeds)), [self.planes.index(p) for p in planes])
+__all__ = ["Job", "job_from_files", "read_job"]
 
 
 def read_job(
@@ -181,7 +100,7 @@ def read_job(
     sign = 1 if job is None else job.conventions.angle_sign
     model = read_model(extra.rotor, planes, sensors, sign, problems, named="rotor" in top)
     if job is not None:
-        job = _completed(job, model, extra, settings, top, planes, sensors, problems)
+        job = completed(job, model, extra, settings, top, planes, sensors, problems)
     problems.stop()
     assert job is not None
     return job
@@ -227,74 +146,12 @@ def job_from_files(
     problems = Problems()
     paths = [Path(file) for file in files]
     overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
-    settings = Settings(
-        as_phase(phase) if phase else None,
-        as_angles(angles) if angles else None,
-        DEFAULT_TOLERANCE,
-        overrides.errors(None),
-    )
+    settings = overrides.settings()
     stored = None if influence is None else Path(influence)
     job = _assemble(None, paths[0], paths[1] if len(paths) == 2 else None, stored, settings, problems)
     problems.stop()
     assert job is not None
     return job
-
-
-def _completed(
-    job: Job,
-    model: Model,
-    extra: Extra,
-    settings: Settings,
-    top: Section,
-    plane_keys: Mapping[str, PlaneKeys],
-    sensor_keys: Mapping[str, SensorKeys],
-    problems: Problems,
-) -> Job:
-    """The job with limits, weights, model and check runs; problems are noted."""
-    trials = job.trials
-    radii = {name: keys.radius for name, keys in plane_keys.items() if keys.radius is not None}
-    planes = (*job.planes, *(name for name in model.plane_nodes if name not in job.planes))
-    if not job.planes and model.rotor is not None:
-        complain_about_places(trials.sensors, model, top, plane_keys)
-        trials = weight_unit_without_weights(trials, planes, radii)
-    if planes:
-        _complain_about_names(top.source, "planes", tuple(plane_keys), planes, problems)
-    _complain_about_names(top.source, "sensors", tuple(sensor_keys), trials.sensors, problems)
-    left_out = tuple(name for name in planes if name in plane_keys and not plane_keys[name].use)
-    if planes and len(left_out) == len(planes):
-        top.complain("planes", "at least one plane without use = false", value=False)
-    tolerance = settings.speed_tolerance_percent
-    limits = make_limits(trials, planes, plane_keys, sensor_keys, tolerance)
-    row_weights = make_row_weights(trials, sensor_keys, top, extra.speed_weights, tolerance)
-    check = None
-    if extra.check is not None:
-        tables, known = (extra.check, extra.check_weights), job.conventions
-        check = read_check(*tables, known, settings.errors, trials, planes, problems)
-    more = (*model.files, *(file for file in (extra.check, extra.check_weights) if file is not None))
-    return replace(
-        job,
-        trials=trials,
-        files=job.files + more,
-        planes=planes,
-        limits=limits,
-        row_weights=row_weights,
-        left_out=left_out,
-        check=check,
-        check_mounted=check is not None and extra.check_weights is not None,
-        rotor=model.rotor,
-        plane_nodes=model.plane_nodes,
-        sensor_places=model.sensor_places,
-        radii=radii,
-    )
-
-
-def _complain_about_names(
-    source: str, key: str, named: Sequence[str], known: Sequence[str], problems: Problems
-) -> None:
-    for name in named:
-        if name not in known:
-            expected = f"one of the job's {key}, {listing(known, 'and')}{did_you_mean(name, known)}"
-            problems.add(source, None, f"{key}.{name}", name, expected)
 
 
 def _read_tables(
@@ -335,11 +192,12 @@ def _assemble(
     if found is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
         influence = fit_to_readings(found.influence, trials, tolerance, str(stored), problems)
-    if influence is not None and trials is not None:
-        trials = replace(trials, labels=influence.labels)
     if trials is None or len(problems):
         return None
-    trials = replace(trials, warnings=notes + trials.warnings)
+    labels = conventions.on(trials.labels if influence is None else influence.labels)
+    if influence is not None:
+        influence = replace(influence, labels=labels)
+    trials = replace(trials, labels=labels, warnings=notes + trials.warnings)
     read = (job, runs, weights, stored)
     files = tuple(file for file in read if isinstance(file, Path))
     planes = trials.planes if influence is None else influence.planes

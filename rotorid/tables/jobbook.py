@@ -14,8 +14,8 @@ from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.sheet import find_sheet, read_workbook
 
 SHEETS = ("runs", "weights", "planes", "sensors", "settings")
-FLAG = "use"
-"""The one setting that is true or false."""
+FLAGS = ("use", "remove")
+"""The settings that are true or false."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _read_settings(
     at = [i for i, name in enumerate(grid.header) if name.casefold() in ("key", "setting", "value")]
     for row, cells in grid.rows:
         key = show(cells[at[0]])
-        value = _flag(cells[at[1]]) if key.endswith(f".{FLAG}") else cells[at[1]]
+        value = _flag(cells[at[1]]) if key.rpartition(".")[2] in FLAGS else cells[at[1]]
         if not key:
             problems.add(grid.source, row, grid.header[at[0]], "", "the name of a setting")
         elif isinstance(value, BadCell) or value == "":
@@ -195,7 +195,7 @@ def _read_named(
             if not column or column == key or column.casefold().startswith(REMARKS) or cell == "":
                 continue
             where[f"{name}.{item}.{column}"] = (grid.source, row, column)
-            value = _flag(cell) if column == FLAG else cell
+            value = _flag(cell) if column in FLAGS else cell
             if isinstance(value, BadCell):
                 problems.add(grid.source, row, column, value.value, value.expected)
             else:

@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rotorid.tables import units
-from rotorid.tables.number import NotANumber, check_size, parse_number
+from rotorid.tables.jobholes import HOLE_COLUMNS, HoleKeys, read_holes
+from rotorid.tables.jobquantity import Quantity, measured, number
 from rotorid.tables.tomlfile import Section
-from rotorid.tables.units import Unit
-
-# Keys of the interface that later versions obey; until then each is refused by name.
-PLANES_LATER = ("trial_radius_mm", "holes_deg", "holes", "first_hole_deg", "available_g", "remove")
-JOB_LATER = ("key_phasor", "slow_roll")
 
 RADIUS = {name: units.LENGTH[name] for name in ("mm", "m", "in")}
 PLANES_USUAL = (
     "max_mass_g",
     "max_unbalance_g_mm",
     "radius_mm",
+    "trial_radius_mm",
     "forbidden_deg",
+    "holes",
+    "first_hole_deg",
+    "holes_deg",
+    "available_g",
+    "remove",
     "node",
     "station",
     "use",
@@ -46,7 +47,8 @@ COLUMNS = {
                 *(f"max_mass_{unit}" for unit in units.MASS),
                 *(f"max_unbalance_{unit}" for unit in units.UNBALANCE),
                 *(f"radius_{unit}" for unit in RADIUS),
-                *PLANES_LATER,
+                *(f"trial_radius_{unit}" for unit in RADIUS),
+                *HOLE_COLUMNS,
             )
         ),
     ),
@@ -61,19 +63,6 @@ _PAIRS = "pairs [from, to] of different angles from -360 to 360 degrees, such as
 _PAIRS_TEXT = f"{_PAIRS}, in a sheet 20-60; 300-340"
 
 
-class Quantity(NamedTuple):
-    """A number with the key that holds it and its unit."""
-
-    key: str
-    value: float
-    unit: Unit
-
-    @property
-    def si(self) -> float:
-        """In SI."""
-        return self.unit.to_si(self.value)
-
-
 @dataclass(frozen=True)
 class PlaneKeys:
     """One section [planes.NAME]; `forbidden` in the job's degrees, `place` a node or a station."""
@@ -84,6 +73,9 @@ class PlaneKeys:
     forbidden: tuple[Pair, ...] = ()
     place: int | str | None = None
     use: bool = True
+    holes: HoleKeys | None = None
+    remove: bool = False
+    trial_radius: Quantity | None = None
 
 
 @dataclass(frozen=True)
@@ -99,14 +91,26 @@ class SensorKeys:
 
 def read_plane(section: Section) -> PlaneKeys:
     """Take all keys of a plane; problems are noted with the section."""
-    section.later(*PLANES_LATER)
-    limit = _measured(section, ("max_mass", units.MASS, "g"), ("max_unbalance", units.UNBALANCE, "g_mm"))
-    radius = _measured(section, ("radius", RADIUS, "mm"))
+    limit = measured(section, ("max_mass", units.MASS, "g"), ("max_unbalance", units.UNBALANCE, "g_mm"))
+    radius = measured(section, ("radius", RADIUS, "mm"))
+    trial_radius = measured(section, ("trial_radius", RADIUS, "mm"))
     use = "use" not in section or section.flag("use")
+    remove = section.flag("remove")
     forbidden = _forbidden(section)
     place = _place(section)
+    holes = read_holes(section)
     section.finish()
-    return PlaneKeys(section, limit, None if radius is None else radius.si, forbidden, place, use)
+    return PlaneKeys(
+        section,
+        limit,
+        None if radius is None else radius.si,
+        forbidden,
+        place,
+        use,
+        holes,
+        remove,
+        trial_radius,
+    )
 
 
 def read_sensor(section: Section) -> SensorKeys:
@@ -145,48 +149,29 @@ def by_speed(section: Section, key: str, what: str, *, above_zero: bool) -> dict
             section.complain(key, "each speed once")
             return {}
     if not isinstance(value, dict):
-        number = _plain(value, above_zero=above_zero)
-        if number is None:
+        single = _plain(value, above_zero=above_zero)
+        if single is None:
             section.complain(key, example)
             return {}
-        return {"": number}
+        return {"": single}
     numbers: dict[str, float] = {}
     for speed, entry in value.items():
-        number = _plain(entry, above_zero=above_zero)
+        size = _plain(entry, above_zero=above_zero)
         if _plain(speed, above_zero=True) is None:
             section.complain(key, f"speeds above 0, not {speed!r}: {example}")
-        elif number is None:
+        elif size is None:
             section.complain(key, f"{what}, not {entry!r} at speed {speed}")
         else:
-            numbers[speed] = number
+            numbers[speed] = size
     if not value:
         section.complain(key, example)
     return numbers
 
 
 def _plain(value: object, *, above_zero: bool) -> float | None:
-    """A finite number ≥ 0 (or > 0) from a number or its text; else None."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        return None
-    try:
-        number = parse_number(value) if isinstance(value, str) else float(value)
-        check_size(number)
-    except (NotANumber, OverflowError):
-        return None
-    return number if number > 0 or (number == 0 and not above_zero) else None
-
-
-def _measured(section: Section, *stems: tuple[str, dict[str, Unit], str]) -> Quantity | None:
-    """The one key of the given stems with a unit in its name."""
-    by_key = {f"{stem}_{name}": unit for stem, known, _ in stems for name, unit in known.items()}
-    for stem, _, usual in stems:
-        section.take(f"{stem}_{usual}")  # known, so that a misspelt one gets it as a suggestion
-    keys = [key for key in section.keys if key in by_key]
-    values = {key: section.number(key, low=sys.float_info.min) for key in keys}
-    found = [Quantity(key, value, by_key[key]) for key, value in values.items() if value is not None]
-    for key in keys[1:]:
-        section.complain(key, f"one key of them; {keys[0]} says it already")
-    return found[0] if found and len(keys) == 1 else None
+    """A number ≥ 0 (or > 0) from a number or its text; else None."""
+    read = number(value)
+    return None if read is None or read < 0 or (above_zero and read == 0) else read
 
 
 def _place(section: Section) -> int | str | None:

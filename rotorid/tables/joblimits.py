@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from balancing.limits import Arc, Limits
 from balancing.trials import Trials
 from rotorid.tables import units
-from rotorid.tables.jobkeys import Pair, PlaneKeys, Quantity, SensorKeys
+from rotorid.tables.jobkeys import Pair, PlaneKeys, SensorKeys
+from rotorid.tables.jobquantity import Quantity, to_job_weight
 from rotorid.tables.number import NotANumber, check_size, parse_number
 from rotorid.tables.problems import did_you_mean, listing
 from rotorid.tables.speeds import same_speed, show_speed
@@ -54,7 +55,7 @@ def make_limits(
             else:
                 amount[name] = value
         if plane.forbidden:
-            arcs[name] = tuple(arc(pair, labels.angle_sign) for pair in plane.forbidden)
+            arcs[name] = tuple(arc(pair, labels.angle_sign, remove=plane.remove) for pair in plane.forbidden)
     residual: dict[str, float | FloatArray] = {}
     for name, sensor in sensor_keys.items():
         if name in trials.sensors and sensor.limits:
@@ -113,24 +114,16 @@ def at_speeds(
     return out
 
 
-def arc(pair: Pair, sign: int) -> Arc:
+def arc(pair: Pair, sign: int, *, remove: bool = False) -> Arc:
     """A pair of degrees, from → to in the job's direction, as first angle and width in rad with the rotation.
 
-    Against the rotation an angle a of the job is −a here, and what begins there ends here.
+    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material is
+    removed the arc says where nothing can be taken away; the weight that would have to be added instead
+    stands opposite, and so does the arc of the correction (`remove`).
     """
     first, last = pair
-    start = first if sign > 0 else -last
+    start = (first if sign > 0 else -last) + (180.0 if remove else 0.0)
     return math.radians(start % 360.0), math.radians((last - first) % 360.0)
-
-
-def to_job_weight(limit: Quantity, weight_unit: str, radius: float | None) -> float | None:
-    """A largest mass or unbalance as the job's weights are (kg or kg·m); None: a radius is needed."""
-    wanted = units.weight(weight_unit).kind
-    if limit.unit.kind == wanted:
-        return limit.si
-    if radius is None:
-        return None
-    return limit.si * radius if wanted == "unbalance" else limit.si / radius
 
 
 def _other_kind(weight_unit: str) -> str:
@@ -156,7 +149,7 @@ def with_limits(job: Job, max_mass: str | None, limits: Sequence[str]) -> Job:
     Returns
     -------
     Job
-        With new `limits`.
+        With new `limits`; holes keep to the largest weight of their plane.
 
     Raises
     ------
@@ -176,7 +169,13 @@ def with_limits(job: Job, max_mass: str | None, limits: Sequence[str]) -> Job:
         for name, text in _assignments(option, _OPTION_LIMIT, "sensor", trials.sensors, several=False):
             at = slice(None) if name is None else trials.sensors.index(name)
             residual[:, at] = _amplitude(text, trials.labels.vibration_unit)
-    return replace(job, limits=Limits(weight, residual, old.forbidden))
+    holes = {}
+    for name, own in job.holes.items():
+        try:
+            holes[name] = replace(own, max_weight=float(weight[job.planes.index(name)]))
+        except ValueError as error:
+            raise ValueError(f"{_OPTION_MASS} {max_mass!r}: plane {name!r}: {error}") from None
+    return replace(job, limits=Limits(weight, residual, old.forbidden), holes=holes)
 
 
 def _assignments(

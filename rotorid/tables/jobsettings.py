@@ -6,21 +6,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from balancing.labels import Angles, Phase
 from rotorid.tables.conventions import (
-    ANGLES,
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
     PHASES,
-    Angles,
     Conventions,
-    Phase,
     StatedErrors,
+    Turning,
     as_angles,
     as_phase,
+    check_angles,
+    read_key_phasor,
+    read_turning,
+    resolve_angles,
 )
 from rotorid.tables.influence import Stored
-from rotorid.tables.jobkeys import JOB_LATER, by_speed
+from rotorid.tables.jobkeys import by_speed
 from rotorid.tables.problems import Problems
+from rotorid.tables.slowroll import SlowRollKeys, take_slow_roll
 from rotorid.tables.tomlfile import Section
 
 
@@ -29,9 +33,14 @@ class Settings:
     """What a job's settings say, before its tables are read; conventions that nobody states are None."""
 
     phase: Phase | None
-    angles: Angles | None
+    turning: Turning
     speed_tolerance_percent: float
     errors: StatedErrors | None
+
+    @property
+    def angles(self) -> Angles | None:
+        """With or against the rotation."""
+        return self.turning.angles
 
 
 @dataclass(frozen=True)
@@ -44,8 +53,22 @@ class Overrides:
     phase_error_deg: float | None
 
     def __post_init__(self) -> None:
-        Conventions(as_phase(self.phase or "lead"), as_angles(self.angles or "with rotation"))
+        Conventions(as_phase(self.phase or "lead"))
+        if self.angles is not None:
+            check_angles(self.angles)
         self.errors(None)
+
+    def settings(self) -> Settings:
+        """Of a job that has no job file.
+
+        Raises
+        ------
+        ValueError
+            For angles clockwise or counter-clockwise: only a job file says how the rotor turns.
+        """
+        turning = Turning() if self.angles is None else Turning(resolve_angles(self.angles, None))
+        phase = as_phase(self.phase) if self.phase else None
+        return Settings(phase, turning, DEFAULT_TOLERANCE, self.errors(None))
 
     def errors(self, stated: StatedErrors | None) -> StatedErrors | None:
         """Stated errors with the replacements."""
@@ -61,12 +84,26 @@ class Overrides:
 
 @dataclass(frozen=True)
 class Extra:
-    """What else a job may name: rotor model, check runs with their weights, weights of the speeds."""
+    """What else a job may say: rotor model, check runs with their weights, weights of the speeds, and more.
+
+    Attributes
+    ----------
+    rotor, check, check_weights
+        Files.
+    speed_weights
+        Weight in the fit by speed.
+    slow_roll
+        Vectors to subtract from all readings.
+    key_phasor
+        Direction, in the job's degrees.
+    """
 
     rotor: Path | None
     check: Path | None
     check_weights: Path | None
     speed_weights: Mapping[str, float]
+    slow_roll: SlowRollKeys | None = None
+    key_phasor: float = 0.0
 
 
 def read_extra(top: Section, job: Path) -> Extra:
@@ -74,12 +111,13 @@ def read_extra(top: Section, job: Path) -> Extra:
     rotor, check, weights = (file_of(top, key, job) for key in ("rotor", "check", "check_weights"))
     if "check_weights" in top and "check" not in top:
         top.complain("check_weights", 'the check runs too, check = "check.csv"')
+    slow_roll, key_phasor = take_slow_roll(top, job), read_key_phasor(top)
+    by: Mapping[str, float] = {}
     if "speed_weights" in top and not isinstance(top.take("speed_weights"), (dict, str)):
         top.complain("speed_weights", 'a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }')
-        return Extra(rotor, check, weights, {})
-    return Extra(
-        rotor, check, weights, by_speed(top, "speed_weights", "a weight of 0 or more", above_zero=False)
-    )
+    else:
+        by = by_speed(top, "speed_weights", "a weight of 0 or more", above_zero=False)
+    return Extra(rotor, check, weights, by, slow_roll, key_phasor)
 
 
 def file_of(top: Section, key: str, job: Path) -> Path | None:
@@ -100,14 +138,13 @@ def file_of(top: Section, key: str, job: Path) -> Path | None:
 def read_settings(top: Section, overrides: Overrides, problems: Problems) -> Settings:
     """Take conventions, tolerance and errors, with what the caller says in their place."""
     phase = top.choice("phase", PHASES, "")
-    angles = top.choice("angles", ANGLES, "")
+    turning = read_turning(top, overrides.angles)
     tolerance = top.number("speed_tolerance_percent", DEFAULT_TOLERANCE, low=0.0, high=LARGEST_TOLERANCE)
     errors = _errors(top, problems)
-    top.later(*JOB_LATER)
-    phase, angles = overrides.phase or phase, overrides.angles or angles
+    phase = overrides.phase or phase
     return Settings(
         as_phase(phase) if phase else None,
-        as_angles(angles) if angles else None,
+        turning,
         DEFAULT_TOLERANCE if tolerance is None else tolerance,
         overrides.errors(errors),
     )
@@ -158,4 +195,8 @@ def settle_conventions(
             f"the readings are taken with phase = {settings.phase}, as stated, and the coefficients with "
             f"phase = {said['phase']}, as {stored} says"
         )
-    return Conventions(phase, angles, settings.speed_tolerance_percent), tuple(notes)
+    t = settings.turning
+    return (
+        Conventions(phase, angles, settings.speed_tolerance_percent, t.rotation, t.view, t.clock),
+        tuple(notes),
+    )

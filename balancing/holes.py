@@ -1,0 +1,267 @@
+"""What can be mounted in one plane: positions (holes), pieces, what is there already.
+
+Angles count with the rotation, in rad; weights are kg (mass at the plane's radius) or kg·m (unbalance).
+A hole in which something is mounted cannot be used further. What is mounted is part of the readings already,
+therefore not of the correction D; it counts only where the plane's total is limited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+__all__ = ["Holes", "Mounting", "equal_holes", "from_list", "mounting"]
+
+_SAME_ANGLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Holes:
+    """Positions and pieces of one plane; checked when it is made.
+
+    Attributes
+    ----------
+    angles
+        Of the holes, rad with the rotation, −2π … 4π, in any order, different from each other, shape (H,).
+    pieces
+        Weights of which each can be mounted, > 0, each size listed once, shape (K,). Empty: amounts are free,
+        in multiples of `step` (or any where that is 0), in one hole or two neighbouring free holes.
+    per_hole
+        Pieces in one hole at most; has no meaning for free amounts.
+    step
+        Smallest step of a free amount; 0 for any amount.
+    taken
+        Weight that is in each hole already, shape (H,); a hole with more than 0 cannot be used.
+    stock
+        How many of each piece there are for the whole plane, shape (K,); None: enough.
+    names
+        Of the holes; "1", "2", … by default.
+    max_weight
+        Largest |Σ weights e^{iφ}| of the plane, what is taken included.
+
+    Raises
+    ------
+    ValueError
+        Where numbers are not finite, negative, repeated or do not fit, or nothing at all can be mounted.
+    """
+
+    angles: FloatArray
+    pieces: FloatArray
+    per_hole: int = 1
+    step: float = 0.0
+    taken: FloatArray = field(default_factory=lambda: np.zeros(0))
+    stock: IntArray | None = None
+    names: tuple[str, ...] = ()
+    max_weight: float = np.inf
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__  # the class is frozen
+        put(self, "angles", _numbers(self.angles, "angles of the holes"))
+        put(self, "pieces", _numbers(self.pieces, "pieces"))
+        count = len(self.angles)
+        taken = _numbers(self.taken, "weights already mounted")
+        put(self, "taken", taken if taken.size else np.zeros(count))
+        put(self, "names", tuple(self.names) or tuple(str(k + 1) for k in range(count)))
+        _check_positions(self)
+        _check_pieces(self)
+        if self.stock is not None:
+            put(self, "stock", _stock(self.stock, len(self.pieces)))
+        _check_something_fits(self)
+
+    @property
+    def free(self) -> BoolArray:
+        """Holes that can be used, shape (H,)."""
+        return np.asarray(self.taken <= 0)
+
+    @property
+    def free_amounts(self) -> bool:
+        """Whether amounts are free (in steps, perhaps) instead of sums of pieces."""
+        return not len(self.pieces)
+
+    @property
+    def mounted(self) -> complex:
+        """Vector Σ taken e^{iφ} of what is there already."""
+        return complex(self.taken @ np.exp(1j * self.angles))
+
+    def allows(self, vector: ArrayLike) -> BoolArray:
+        """Whether the plane's total stays within `max_weight` with these vectors added."""
+        total = np.abs(self.mounted + np.asarray(vector, dtype=complex))
+        return np.asarray(total <= self.max_weight * (1 + 1e-9))
+
+
+@dataclass(frozen=True, eq=False)
+class Mounting:
+    """What goes where in one plane.
+
+    Attributes
+    ----------
+    counts
+        Pieces of each size in each hole, shape (H, K); (H, 0) where amounts are free.
+    amounts
+        Weight added in each hole, shape (H,).
+    vector
+        Σ amounts e^{iφ}.
+    """
+
+    counts: IntArray
+    amounts: FloatArray
+    vector: complex
+
+
+def equal_holes(n: int, first: float = 0.0, direction: int = 1) -> FloatArray:
+    """Angles of n equally spaced holes, 0 … 2π, shape (n,).
+
+    Parameters
+    ----------
+    n
+        Number of holes.
+    first
+        Angle of hole 1, rad with the rotation.
+    direction
+        +1 where the numbers grow with the rotation, −1 against it.
+
+    Raises
+    ------
+    ValueError
+        For fewer than one hole, an angle that is not finite, another direction.
+    """
+    if isinstance(n, bool) or n != int(n) or n < 1:
+        raise ValueError(f"the number of holes must be a whole number of 1 or more; got {n}")
+    if direction not in (1, -1):
+        raise ValueError(f"the holes are numbered with (+1) or against (−1) the rotation; got {direction}")
+    if not np.isfinite(first):
+        raise ValueError("the angle of the first hole must be a finite number")
+    angles = np.mod(first + direction * 2 * np.pi * np.arange(int(n)) / int(n), 2 * np.pi)
+    return np.where(angles >= 2 * np.pi, 0.0, angles)
+
+
+def from_list(
+    angles: ArrayLike,
+    pieces: ArrayLike = (),
+    *,
+    per_hole: int = 1,
+    step: float = 0.0,
+    taken: ArrayLike | None = None,
+    stock: ArrayLike | None = None,
+    names: Sequence[str] = (),
+    max_weight: float = np.inf,
+) -> Holes:
+    """Holes from plain lists; the parameters are the attributes of `Holes`, which says what it raises."""
+    return Holes(
+        angles=np.asarray(angles, dtype=np.float64),
+        pieces=np.asarray(pieces, dtype=np.float64),
+        per_hole=per_hole,
+        step=float(step),
+        taken=np.zeros(0) if taken is None else np.asarray(taken, dtype=np.float64),
+        stock=None if stock is None else np.asarray(stock),
+        names=tuple(names),
+        max_weight=float(max_weight),
+    )
+
+
+def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike | None = None) -> Mounting:
+    """The mounting of `counts` (H, K) of the pieces or, where amounts are free, of `amounts` (H,)."""
+    if holes.free_amounts:
+        number = np.zeros((len(holes.angles), 0), dtype=np.int64)
+        weight = np.zeros(len(holes.angles)) if amounts is None else np.asarray(amounts, dtype=np.float64)
+    else:
+        shape = (len(holes.angles), len(holes.pieces))
+        number = np.zeros(shape, dtype=np.int64) if counts is None else np.asarray(counts, dtype=np.int64)
+        weight = number @ holes.pieces
+    return Mounting(number, weight, complex(weight @ np.exp(1j * holes.angles)))
+
+
+def _numbers(values: ArrayLike, what: str) -> FloatArray:
+    array = np.array(values, dtype=np.float64)
+    if array.ndim != 1:
+        raise ValueError(f"the {what} must be a plain list of numbers")
+    if not np.isfinite(array).all():
+        raise ValueError(f"the {what} must be finite numbers; number {_first(~np.isfinite(array))} is not")
+    return array
+
+
+def _check_positions(holes: Holes) -> None:
+    angles, count = holes.angles, len(holes.angles)
+    if not count:
+        raise ValueError("the plane has no holes: give at least one angle")
+    if len(holes.names) != count or len(set(holes.names)) != count:
+        raise ValueError(f"the names of the holes must be {count} different names, one for each hole")
+    outside = (angles < -2 * np.pi * (1 + 1e-12)) | (angles > 4 * np.pi * (1 + 1e-12))
+    if outside.any():
+        name = holes.names[int(np.argmax(outside))]
+        raise ValueError(
+            f"hole {name} stands outside −360° … 720°: give its angle in degrees within one turn"
+        )
+    order = np.argsort(np.mod(angles, 2 * np.pi), kind="stable")
+    turned = np.mod(angles[order], 2 * np.pi)
+    apart = np.diff(turned, append=turned[0] + 2 * np.pi)
+    if count > 1 and apart.min() < _SAME_ANGLE:
+        k = int(np.argmin(apart))
+        pair = sorted((int(order[k]), int(order[(k + 1) % count])))
+        raise ValueError(
+            f"holes {holes.names[pair[0]]} and {holes.names[pair[1]]} stand at the same angle: list each once"
+        )
+    if holes.taken.shape != (count,):
+        raise ValueError(
+            f"there must be one weight already mounted for each of the {count} holes (0 where it is free)"
+        )
+    if (holes.taken < 0).any():
+        name = holes.names[int(np.argmax(holes.taken < 0))]
+        raise ValueError(f"the weight already mounted in hole {name} is negative: give 0 where it is free")
+
+
+def _check_pieces(holes: Holes) -> None:
+    pieces = holes.pieces
+    if (pieces <= 0).any():
+        raise ValueError(f"pieces must weigh more than 0; number {_first(pieces <= 0)} does not")
+    if len(np.unique(pieces)) != len(pieces):
+        raise ValueError("a piece is listed twice: list each size once and give how many there are as stock")
+    if isinstance(holes.per_hole, bool) or holes.per_hole != int(holes.per_hole) or holes.per_hole < 1:
+        raise ValueError(f"the number of pieces in one hole must be a whole number ≥ 1; got {holes.per_hole}")
+    if not (np.isfinite(holes.step) and holes.step >= 0):
+        raise ValueError("the smallest step of a weight must be a finite number ≥ 0 (0 for any amount)")
+    if len(pieces) and holes.step > 0:
+        raise ValueError("give either pieces or a smallest step of free amounts, not both")
+    if not holes.max_weight >= 0:  # NaN is not ≥ 0
+        raise ValueError("the largest weight of the plane must be a number ≥ 0")
+    if not len(pieces) and holes.stock is not None:
+        raise ValueError("a stock needs pieces: list the pieces, or leave the stock out")
+
+
+def _stock(values: ArrayLike, count: int) -> IntArray:
+    stock = np.asarray(values, dtype=np.float64)
+    if stock.shape != (count,):
+        raise ValueError(f"the stock must be one whole number for each of the {count} pieces")
+    if not np.isfinite(stock).all() or (stock < 0).any() or (stock != np.rint(stock)).any():
+        raise ValueError("the stock must be whole numbers ≥ 0, how many of each piece there are")
+    return stock.astype(np.int64)
+
+
+def _check_something_fits(holes: Holes) -> None:
+    if not holes.free.any():
+        raise ValueError("nothing can be mounted: something is mounted in every hole already")
+    if holes.max_weight <= 0:
+        raise ValueError("nothing can be mounted: the largest weight of the plane is 0")
+    usable = holes.pieces if holes.stock is None else holes.pieces[holes.stock > 0]
+    if not holes.free_amounts and not len(usable):
+        raise ValueError("nothing can be mounted: the stock is empty")
+    if holes.mounted != 0:
+        return  # what is added may make the total smaller
+    if holes.free_amounts:
+        smallest, what = holes.step, "the smallest step"
+    else:
+        smallest, what = float(usable.min()), "the lightest piece"
+    # several pieces can together be lighter as a vector than the lightest one of them
+    if smallest > holes.max_weight * (1 + 1e-9) and (holes.free_amounts or holes.free.sum() == 1):
+        raise ValueError(f"nothing can be mounted: {what} is heavier than the largest weight of the plane")
+
+
+def _first(where: BoolArray) -> int:
+    return int(np.argmax(where)) + 1

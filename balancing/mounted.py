@@ -1,0 +1,150 @@
+"""A correction as it can really be mounted: pieces in holes, all planes together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from balancing.baseline import match_speeds, starting_point
+from balancing.correction import Correction
+from balancing.discrete import Discrete, solve_discrete
+from balancing.errors import reading_covariance
+from balancing.holes import Holes, Mounting
+from balancing.influence import Influence
+from balancing.propagation import prediction_covariance
+from balancing.split import split
+from balancing.trials import Trials
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class Mounted:
+    """Pieces in holes that leave the least vibration.
+
+    Attributes
+    ----------
+    correction
+        The continuous one, in the same planes.
+    holes
+        Of each plane; None: any weight at any angle.
+    found
+        Pieces of each plane, and how near the optimum they are known to be.
+    after
+        Predicted vibration with them, (S, C).
+    after_covariance
+        Of a reading in a check run around it, (S, C, 2, 2); None where errors are unknown.
+    """
+
+    correction: Correction
+    holes: tuple[Holes | None, ...]
+    found: Discrete
+    after: ComplexArray
+    after_covariance: FloatArray | None
+
+    @property
+    def weights(self) -> ComplexArray:
+        """What the pieces of each plane add up to, (P,)."""
+        return self.found.weights
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units and conventions."""
+        from balancing.mountedsheet import mounted_dict
+
+        return mounted_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per hole that gets something: plane, hole, angle_deg, mass, unit, pieces."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            self.to_dict()["holes"], columns=["plane", "hole", "angle_deg", "mass", "unit", "pieces"]
+        )
+
+    def summary(self) -> str:
+        """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""
+        from balancing.mountedsheet import summary
+
+        return summary(self)
+
+
+def mount(
+    correction: Correction,
+    influence: Influence,
+    baseline: Trials | ArrayLike | None,
+    holes: Mapping[str, Holes],
+    *,
+    row_weights: FloatArray | None = None,
+    time_limit: float = 5.0,
+) -> Mounted:
+    """Choose pieces for all planes together that leave the least vibration.
+
+    Parameters
+    ----------
+    correction
+        The continuous correction; its method decides what "least" means (by errors: rows count by the inverse
+        of their errors at the continuous correction).
+    influence, baseline, row_weights
+        As they were given to `correct`.
+    holes
+        By plane; planes without get any weight at any angle.
+    time_limit
+        s, for the proof of the optimum.
+
+    Raises
+    ------
+    ValueError
+        Where no plane has holes, or nothing that can be mounted keeps the limits.
+    """
+    planes = correction.planes
+    own = tuple(holes.get(plane) for plane in planes)
+    if not any(own):
+        raise ValueError("no plane has holes: holes = N or holes_deg = [...] in [planes.NAME] of the job")
+    start = starting_point(influence, baseline)
+    at = match_speeds(correction.speeds, influence.speeds)
+    chosen = [influence.planes.index(plane) for plane in planes]
+    W = influence.W[at][..., chosen].reshape(-1, len(chosen))
+    Y = correction.before
+    channels = None
+    if start.covariance is not None and correction.errors is not None:
+        index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
+        channels = start.covariance[at][..., index[:, None], index].reshape(-1, len(index), len(index))
+    rows = None if row_weights is None else row_weights[at].ravel()
+    if correction.method == "weighted" and channels is not None:
+        variance = np.trace(prediction_covariance(correction.weights, channels), axis1=1, axis2=2) / 2
+        rows = (1.0 if rows is None else rows) / np.sqrt(np.maximum(variance, 1e-6 * variance.max()))
+    found = solve_discrete(
+        W,
+        Y.ravel(),
+        own,
+        method="minmax" if correction.method == "minmax" else "least-squares",
+        row_weights=rows,
+        limits=correction.limits,
+        time_limit=time_limit,
+        names=planes,
+    )
+    found = replace(found, mountings=tuple(map(_fewest, found.mountings, own)))
+    after = Y + (W @ found.weights).reshape(Y.shape)
+    after_covariance = None
+    if channels is not None and correction.errors is not None:
+        single = reading_covariance(after, correction.errors)
+        after_covariance = single + prediction_covariance(found.weights, channels).reshape(single.shape)
+    return Mounted(correction, own, found, after, after_covariance)
+
+
+def _fewest(chosen: Mounting | None, holes: Holes | None) -> Mounting | None:
+    """The same vector with the fewest pieces: opposite ones that cancel are left out."""
+    if chosen is None or holes is None or holes.free_amounts:
+        return chosen
+    same = split(chosen.vector, holes)
+    if abs(same.error) > 1e-9 * max(abs(chosen.vector), float(holes.pieces.min())):
+        return chosen
+    return same.mounting if same.pieces < int(chosen.counts.sum()) else chosen

@@ -1,0 +1,122 @@
+"""Pieces in holes as people read them: text, and JSON types, in the job's units and conventions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from balancing.sheet import figures, table
+
+if TYPE_CHECKING:
+    from balancing.holes import Holes, Mounting
+    from balancing.mounted import Mounted
+
+
+def mounted_dict(m: Mounted) -> dict[str, Any]:
+    """`Mounted.to_dict`."""
+    c, labels = m.correction, m.correction.labels
+    size, angle = labels.weight(m.weights)
+    after, phase = labels.vibration(m.after)
+    covariance = None if m.after_covariance is None else labels.vibration_covariance(m.after_covariance)
+    return {
+        "planes": [
+            {
+                "plane": plane,
+                "mass": float(size[p]),
+                "unit": labels.weight_unit,
+                "angle_deg": float(angle[p]),
+                "action": "remove" if plane in c.remove else "add",
+            }
+            for p, plane in enumerate(c.planes)
+        ],
+        "holes": [row for p in range(len(c.planes)) for row in _holes(m, p)],
+        "residuals": [
+            {
+                "speed_rpm": float(f"{speed * 30 / np.pi:.12g}"),
+                "sensor": sensor,
+                "after": float(after[s, k]),
+                "after_phase_deg": float(phase[s, k]),
+                "after_covariance": None if covariance is None else covariance[s, k].tolist(),
+            }
+            for s, speed in enumerate(c.speeds)
+            for k, sensor in enumerate(c.sensors)
+        ],
+        "rms_after": float(np.sqrt(np.mean(after**2))),
+        "max_after": float(after.max()),
+        "proven": m.found.proven,
+        "gap": float(m.found.gap),
+        "objective": float(m.found.objective),
+        "objective_plane_by_plane": _number(m.found.rounded_objective),
+    }
+
+
+def summary(m: Mounted) -> str:
+    """`Mounted.summary`."""
+    c, labels = m.correction, m.correction.labels
+    unit = labels.weight_unit
+    rows = [["plane", "hole", "angle", unit, "pieces"]]
+    rows += [
+        [r["plane"], r["hole"], f"{r['angle_deg']:.1f}°", figures(r["mass"]), r["pieces"]]
+        for p in range(len(c.planes))
+        for r in _holes(m, p)
+    ]
+    lines = ["What to mount, all planes together" if not c.remove else "What to mount or to remove"]
+    lines.append(table(rows, left=2) if len(rows) > 1 else "  nothing: every piece would make it worse")
+    after = labels.vibration(m.after)[0]
+    free = labels.vibration(c.after)[0]
+    lines.append(
+        f"{labels.vibration_unit} left: rms {figures(float(np.sqrt(np.mean(after**2))), 3)}, largest "
+        f"{figures(float(after.max()), 3)}".strip()
+        + f"; with any weights rms {figures(float(np.sqrt(np.mean(free**2))), 3)}, largest "
+        + figures(float(free.max()), 3)
+    )
+    found = m.found
+    if np.isfinite(found.rounded_objective) and found.objective > 0:
+        lines.append(
+            f"Plane by plane the nearest pieces would leave {found.rounded_objective / found.objective:.3g} "
+            "times as much."
+        )
+    lines.append(
+        "No other choice of pieces is better (proven)."
+        if found.proven
+        else f"A better choice, if there is one, is better by at most {100 * found.gap:.2g} %."
+    )
+    return "\n".join(lines)
+
+
+def _holes(m: Mounted, p: int) -> list[dict[str, Any]]:
+    """A row for each hole of a plane that gets something; one without hole where any angle is possible."""
+    labels, plane = m.correction.labels, m.correction.planes[p]
+    gone = 180.0 if plane in m.correction.remove else 0.0
+    holes = m.holes[p]
+    if holes is None:
+        size, angle = labels.weight(m.weights[p])
+        return [_row(plane, "any", float(angle + gone) % 360, float(size), labels.weight_unit, "")]
+    mounting = m.found.mountings[p]
+    assert mounting is not None
+    out = []
+    for h in np.flatnonzero(mounting.amounts > 0):
+        vector = mounting.amounts[h] * np.exp(1j * holes.angles[h])
+        size, angle = labels.weight(vector)
+        words = _pieces(holes, mounting, int(h), labels.weight_scale)
+        out.append(
+            _row(plane, holes.names[h], float(angle + gone) % 360, float(size), labels.weight_unit, words)
+        )
+    return out
+
+
+def _row(plane: str, hole: str, angle: float, mass: float, unit: str, pieces: str) -> dict[str, Any]:
+    return {"plane": plane, "hole": hole, "angle_deg": angle, "mass": mass, "unit": unit, "pieces": pieces}
+
+
+def _pieces(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
+    return " + ".join(
+        f"{int(count)} × {figures(float(piece) * scale)}" if count > 1 else figures(float(piece) * scale)
+        for piece, count in zip(holes.pieces, mounting.counts[h], strict=True)
+        if count
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,167 @@
+"""The proposed trial weight as people read it: text of 80 columns, JSON types, a polar picture."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from balancing.labels import Labels
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class TrialWeight:
+    """A proposed trial weight for one plane.
+
+    Attributes
+    ----------
+    plane
+        Name.
+    amount
+        kg (with `radius`) or kg·m.
+    angle
+        rad with the rotation; None where nothing is known to choose it by.
+    angle_reach
+        How far the best angle may be from it, rad, either side; 0 from coefficients; None as before.
+    basis
+        Where amount and angle come from, in words.
+    radius
+        m; None where the amount is an unbalance.
+    speed
+        rad/s, the highest at which it will turn.
+    load
+        N, that the plane carries; None: unknown.
+    speeds, sensors, before, expected
+        Readings (S, C) without and with it; None where there are no coefficients.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    plane: str
+    amount: float
+    angle: float | None
+    angle_reach: float | None
+    basis: str
+    radius: float | None
+    speed: float
+    load: float | None = None
+    speeds: FloatArray | None = None
+    sensors: tuple[str, ...] = ()
+    before: ComplexArray | None = None
+    expected: ComplexArray | None = None
+    labels: Labels = field(default_factory=Labels)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def force(self) -> float | None:
+        """Centrifugal force at the highest speed, N; None for masses without a radius."""
+        if self.radius is None and not self.labels.weight_unit.endswith(("_mm", "_m", "_in")):
+            return None
+        return self.amount * (1.0 if self.radius is None else self.radius) * self.speed**2
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        known = self.angle is not None
+        return {
+            "plane": self.plane,
+            "mass": float(size),
+            "unit": self.labels.weight_unit,
+            "angle_deg": float(angle) if known else None,
+            "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
+            "basis": self.basis,
+            "radius_m": self.radius,
+            "speed_rpm": round(self.speed * 30 / math.pi, 9),
+            "force_N": self.force,
+            "load_N": self.load,
+            "force_percent": None
+            if self.force is None or self.load is None
+            else 100 * self.force / self.load,
+            "expected": self._expected(),
+            "conventions": self.labels.conventions(),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and sensor with the expected readings; one row without coefficients."""
+        import pandas as pd
+
+        found = self.to_dict()
+        weight = {
+            "plane": self.plane,
+            "mass": found["mass"],
+            "unit": found["unit"],
+            "angle_deg": found["angle_deg"],
+        }
+        frame = pd.DataFrame([{**weight, **row} for row in found["expected"] or [{}]])
+        return frame.astype({"angle_deg": float})
+
+    def summary(self) -> str:
+        """Text of 80 columns."""
+        found = self.to_dict()
+        lines = [textwrap.fill(f"Warning: {w}", 80, subsequent_indent="  ") for w in self.warnings]
+        at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
+        angle = "at any angle (no phase, or no lag, is known)"
+        if found["angle_deg"] is not None:
+            angle = f"at {found['angle_deg']:.0f}° {self.labels.angle_words}"
+            if self.angle_reach:
+                angle += f" (± {math.degrees(self.angle_reach):.0f}°)"
+        head = f"Trial weight in plane {self.plane}: {found['mass']:.4g} {found['unit']}{at}, {angle}"
+        lines += [textwrap.fill(head, 80), textwrap.fill(f"Basis: {self.basis}", 80)]
+        if self.force is not None:
+            share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
+            lines.append(f"Force at {found['speed_rpm']:.6g} rpm: {self.force:.4g} N{share}")
+        if found["expected"]:
+            unit = self.labels.vibration_unit or "-"
+            lines += ["", f"{'Expected':24} {'now':>18} {'with it':>18} {'change':>10}   {unit}"]
+        for row in found["expected"] or ():
+            name = f"{row['sensor']}, {row['speed_rpm']:.6g} rpm"
+            now = f"{row['before']:.4g} @ {row['before_phase_deg']:.0f}°"
+            then = f"{row['after']:.4g} @ {row['after_phase_deg']:.0f}°"
+            lines.append(f"{name:24} {now:>18} {then:>18} {row['change']:10.4g}")
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Polar picture of the plane: the weight, and how far its best angle may be away.
+
+        Raises
+        ------
+        ValueError
+            Without an angle.
+        """
+        from balancing.plots_tolerance import trial_arrow
+
+        return trial_arrow(self, ax)
+
+    def _expected(self) -> list[dict[str, Any]] | None:
+        if self.speeds is None or self.before is None or self.expected is None:
+            return None
+        old, old_phase = self.labels.vibration(self.before)
+        new, new_phase = self.labels.vibration(self.expected)
+        change = np.abs(self.expected - self.before) * self.labels.vibration_scale
+        return [
+            {
+                "speed_rpm": round(speed * 30 / math.pi, 9),
+                "sensor": name,
+                "before": float(old[s, c]),
+                "before_phase_deg": float(old_phase[s, c]),
+                "after": float(new[s, c]),
+                "after_phase_deg": float(new_phase[s, c]),
+                "change": float(change[s, c]),
+            }
+            for s, speed in enumerate(self.speeds.tolist())
+            for c, name in enumerate(self.sensors)
+        ]

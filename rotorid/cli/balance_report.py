@@ -1,0 +1,96 @@
+"""What `rotorid balance` prints, writes and draws beside the correction itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from balancing import Correction, Influence
+    from balancing.check import CheckComparison
+    from balancing.mounted import Mounted
+    from balancing.subset import Subsets
+    from balancing.tradeoff import TradeOff
+    from balancing.verdict import Verdict
+    from rotorid.tables import Job
+
+
+@dataclass
+class Report:
+    """A correction and what was asked for beside it."""
+
+    result: Correction
+    influence: Influence
+    check: CheckComparison | None = None
+    subsets: Subsets | None = None
+    curve: TradeOff | None = None
+    mounted: Mounted | None = None
+    verdict: Verdict | None = None
+
+    def add_trade_off(self, job: Job) -> None:
+        """Residual against total weight, in the planes used."""
+        from balancing.tradeoff import trade_off
+
+        W, Y, rows = self._stack(job, self.result.planes)
+        self.curve = trade_off(
+            W,
+            Y,
+            self.result.planes,
+            criterion="max" if self.result.method == "minmax" else "rms",
+            row_weights=rows,
+            labels=self.result.labels,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        parts = {
+            "mounting": self.mounted,
+            "check": self.check,
+            "verdict": self.verdict,
+            "best_planes": self.subsets,
+            "trade_off": self.curve,
+        }
+        return {
+            **self.result.to_dict(),
+            **{key: part.to_dict() for key, part in parts.items() if part is not None},
+        }
+
+    def frame(self) -> pd.DataFrame:
+        """The weights, or what goes into each hole."""
+        return self.result.to_frame() if self.mounted is None else self.mounted.to_frame()
+
+    def text(self) -> str:
+        """For the terminal."""
+        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve)
+        blocks = [part.summary() for part in parts if part is not None]
+        if self.result.limits is not None and (self.subsets or self.curve):
+            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
+        return "\n\n".join(blocks)
+
+    def figure(self) -> Figure:
+        """The correction, or the discs with their holes or the trade-off where they were asked for."""
+        from balancing import plots, plots_discs, plots_tradeoff
+
+        m = self.mounted
+        if m is not None:
+            planes = self.result.planes
+            return plots_discs.discs(
+                self.result,
+                {p: h for p, h in zip(planes, m.holes, strict=True) if h is not None},
+                {p: k for p, k in zip(planes, m.found.mountings, strict=True) if k is not None},
+                clockwise=self.result.labels.drawn_sign < 0,
+            )
+        return plots.overview(self.result) if self.curve is None else plots_tradeoff.overview(self.curve)
+
+    def _stack(self, job: Job, planes: tuple[str, ...]) -> tuple[Any, Any, Any]:
+        """W (N, P), Y (N,) and row weights (N,) of the speeds used."""
+        from balancing.baseline import match_speeds
+
+        at = match_speeds(self.result.speeds, self.influence.speeds)
+        columns = [self.influence.planes.index(p) for p in planes]
+        W = self.influence.W[at][..., columns].reshape(-1, len(columns))
+        rows = None if job.row_weights is None else job.row_weights[at].ravel()
+        return W, self.result.before.ravel(), rows

@@ -1,0 +1,179 @@
+"""Permissible residual unbalance and its share per plane, against calculations by hand."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from balancing.tolerance import GRADES, parse_grade, tolerance
+
+RPM3000 = 100 * pi
+TOTAL = 1000 * 2.5 * 500 / RPM3000  # g·mm, 3978.87
+
+
+def shares(found):
+    return found.limits * 1e6 / TOTAL
+
+
+def rotor(**places):
+    return tolerance(500, RPM3000, "G2.5", **places)
+
+
+def test_500_kg_at_3000_rpm():
+    found = rotor()
+    assert round(found.total * 1e6) == 3979
+    assert round(found.eccentricity * 1e6, 2) == 7.96
+    assert found.to_dict()["permissible_g_mm"] == pytest.approx(3978.8736, rel=1e-7)
+    assert found.limits.size == 0
+    assert "3979 g·mm" in found.summary()
+
+
+@pytest.mark.parametrize(
+    ("grade", "rpm", "micrometres"),
+    # eω = G: the standard's diagram passes 1 g·mm/kg for G6.3 at 60160 rpm, 10 for G1 at 955 rpm
+    [("G6.3", 60160.6, 1.0), ("G1", 954.93, 10.0), ("G0.4", 95493, 0.04), ("G4000", 95.493, 400000.0)],
+)
+def test_specific_unbalance(grade, rpm, micrometres):
+    assert tolerance(1, rpm * pi / 30, grade).eccentricity * 1e6 == pytest.approx(micrometres, rel=1e-5)
+
+
+def test_imperial_form():
+    # U = 6.015 G W / N in oz·in, lb, rpm (quoted in the trade press)
+    found = tolerance(100 * 0.45359237, 3600 * pi / 30, "G6.3").total
+    assert found / (0.45359237 / 16 * 0.0254) == pytest.approx(6.015 * 6.3 * 100 / 3600, rel=2e-4)
+
+
+def test_one_plane_has_all_and_two_planes_of_a_symmetric_rotor_half_each():
+    assert shares(rotor(planes={"disc": None})) == pytest.approx([1.0])
+    assert shares(rotor(planes={"left": None, "right": None})) == pytest.approx([0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("centre", "expected"),
+    [
+        (0.5, [0.5, 0.5]),  # symmetric
+        (0.4, [0.6, 0.4]),  # lever: the nearer plane has more
+        (0.1, [0.7, 0.3]),  # 0.9 : 0.1, limited
+        (0.95, [0.3, 0.7]),
+        (1.0, [0.3, 0.7]),  # over the bearing: still between
+        (1.2, [0.3, 1.2]),  # overhung by 0.2: 0.2 and 1.2, the smaller raised to 0.3
+        (1.35, [0.35, 1.3]),  # 0.35 and 1.35, the larger cut to 1.3
+        (-0.25, [1.25, 0.3]),
+    ],
+)
+def test_tolerance_planes_by_the_lever_rule(centre, expected):
+    found = rotor(planes={"A": 0.0, "B": 1.0}, centre=centre)
+    assert shares(found) == pytest.approx(expected)
+    # in which order and from which origin positions are counted does not matter
+    turned = rotor(planes={"B": 7 - 1.0, "A": 7 - 0.0}, centre=7 - centre)
+    assert shares(turned) == pytest.approx(expected[::-1])
+    cut = abs(expected[0] - abs(1 - centre)) + abs(expected[1] - abs(centre)) > 1e-9
+    assert bool(found.warnings) == cut
+
+
+def test_correction_planes_at_the_bearings_keep_their_tolerances():
+    found = rotor(planes={"A": 0.0, "B": 1.0}, bearings=(0.0, 1.0), centre=0.4)
+    assert shares(found) == pytest.approx([0.6, 0.4])
+
+
+def test_correction_planes_between_the_bearings():
+    # 0.75 u₁ + 0.25 u₂ = 0.6, 0.25 u₁ + 0.75 u₂ = 0.4 → u = 0.7, 0.3
+    found = rotor(planes={"A": 0.25, "B": 0.75}, bearings=(0.0, 1.0), centre=0.4)
+    assert shares(found) == pytest.approx([0.7, 0.3])
+
+
+def test_planes_close_to_each_other_neither_gets_nothing():
+    # at the left bearing, 0.9 u₁ + 0.8 u₂ ≤ 0.5, binds alone: each half of it
+    found = rotor(planes={"A": 0.1, "B": 0.2}, bearings=(0.0, 1.0), centre=0.5)
+    assert shares(found) == pytest.approx([0.25 / 0.9, 0.25 / 0.8])
+
+
+def test_overhung_rotor():
+    # disc with two planes at 1.2 and 1.4, centre of mass 1.3: U_A = 0.3, U_B = 1.3
+    # T = |−0.2 −0.4; 1.2 1.4|: A alone gives 0.75, 0.375, at B 1.2·0.75 + 1.4·0.375 = 1.425 > 1.3
+    # B alone: 0.541667, 0.464286, at A 0.29405 ≤ 0.3
+    found = rotor(planes={"A": 1.2, "B": 1.4}, bearings=(0.0, 1.0), centre=1.3)
+    assert found.bearing_limits * 1e6 / TOTAL == pytest.approx([0.3, 1.3])
+    assert shares(found) == pytest.approx([0.65 / 1.2, 0.65 / 1.4])
+
+
+def test_planes_on_either_side_of_the_bearings():
+    # planes at −0.2 and 1.2: T = |1.2 −0.2; −0.2 1.2|, both tolerances 0.5: u = 0.5/1.4 each
+    found = rotor(planes={"A": -0.2, "B": 1.2}, bearings=(0.0, 1.0), centre=0.5)
+    assert shares(found) == pytest.approx([0.5 / 1.4, 0.5 / 1.4])
+
+
+def test_planes_are_safe_at_the_bearings_and_no_pair_has_a_larger_product():
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        positions = rng.uniform(-0.5, 1.5, 2)
+        planes = dict(zip("AB", positions, strict=True))
+        found = rotor(planes=planes, bearings=(0.0, 1.0), centre=rng.uniform(-0.5, 1.5))
+        limits = found.bearing_limits
+        phase = np.exp(2j * pi * rng.uniform(size=(2, 500)))
+        worst = np.abs(found.transfer @ (found.limits[:, None] * phase)).max(axis=1)
+        assert (worst <= limits * (1 + 1e-9)).all()
+        assert (found.limits > 0).all()
+        # the best of a grid of safe pairs
+        T = np.abs(found.transfer)
+        first = np.linspace(0, (limits / T[:, 0]).min(), 400)
+        second = ((limits[:, None] - T[:, :1] * first) / T[:, 1:]).min(axis=0)
+        best = (first * second).max()
+        assert best <= np.prod(found.limits) * (1 + 1e-9)
+        assert best >= 0.99 * np.prod(found.limits)
+
+
+def test_residuals_at_the_bearings():
+    found = rotor(planes={"A": 0.25, "B": 1.5}, bearings=(0.0, 1.0), centre=0.5)
+    assert found.at_bearings([1.0, 0.0]) == pytest.approx([0.75, 0.25])
+    assert found.at_bearings([0.0, 2j]) == pytest.approx([-1j, 3j])
+    with pytest.raises(ValueError, match="one residual for each of 2 planes"):
+        found.at_bearings([1.0])
+    with pytest.raises(ValueError, match="positions of planes and bearings are not known"):
+        rotor(planes={"A": None}).at_bearings([1.0])
+
+
+def test_grades():
+    assert [parse_grade(f"G{g:g}") for g in GRADES] == list(GRADES)
+    assert parse_grade("g 2,5") == parse_grade(2.5) == 2.5
+    with pytest.raises(ValueError, match=r"'G3': the nearest are G2.5 and G6.3; .*G4000"):
+        parse_grade("G3")
+    with pytest.raises(ValueError, match=r"nearest are G4000;"):
+        parse_grade("G5000")
+    with pytest.raises(ValueError, match=r"no balance quality grade 'fine': the grades are G0.4"):
+        parse_grade("fine")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"mass": 0}, "mass of the rotor must be a finite number above 0"),
+        ({"speed": float("nan")}, "service speed"),
+        ({"planes": {"A": 0.0, "B": 0.0}, "centre": 1.0}, "both planes are at the same place"),
+        ({"planes": {"A": 0.0, "B": None}, "centre": 1.0}, "position of both planes, or of none"),
+        ({"planes": {"A": 0.0, "B": 1.0}}, "needs the position of the centre of mass"),
+        ({"planes": {"A": None, "B": None}, "bearings": (0, 1), "centre": 0.5}, "give those of the planes"),
+        ({"planes": {"A": 0.0, "B": 1.0}, "bearings": (1, 1), "centre": 1.0}, "both bearings"),
+        ({"planes": dict.fromkeys("ABC")}, "not 3: choose two"),
+        ({"centre": 1.0}, "says nothing without"),
+        ({"planes": {"A": 0.0, "B": float("inf")}, "centre": 1.0}, "finite numbers"),
+    ],
+)
+def test_what_cannot_be_is_refused(arguments, words):
+    usual = {"mass": 500, "speed": RPM3000, "grade": "G2.5"}
+    with pytest.raises(ValueError, match=words):
+        tolerance(**{**usual, **arguments})
+
+
+def test_table_and_picture():
+    found = rotor(planes={"left": 0.1, "right": 0.7}, bearings=(0.0, 1.0), centre=0.4)
+    frame = found.to_frame()
+    assert list(frame["place"]) == ["whole rotor", "bearing A", "bearing B", "plane left", "plane right"]
+    assert frame.limit_g_mm.to_numpy()[3:] == pytest.approx(found.limits * 1e6)
+    assert frame.position_mm.to_numpy()[1:] == pytest.approx([0, 1000, 100, 700])
+    ax = found.plot()
+    circles = [line.get_ydata()[0] for line in ax.lines]
+    assert circles == pytest.approx(found.limits * 1e6)
+    whole = rotor().plot()
+    assert whole.lines[0].get_ydata() == pytest.approx(np.full(361, TOTAL))
+    assert max(len(line) for line in found.summary().splitlines()) <= 80

@@ -1,0 +1,228 @@
+"""First trial weights: amount against the formula, angle against simulated signals and a rotor model."""
+
+from math import degrees, inf, pi, radians
+
+import numpy as np
+import pytest
+
+from balancing import Influence, Labels, ReadingErrors
+from balancing.modelled import model_influence
+from balancing.trial_angle import expected_lag, opposing_angle
+from balancing.trial_weight import force_amount, trial_from_coefficients, trial_from_force
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+RPM3000 = 100 * pi
+GRAMS = Labels(weight_unit="g", weight_scale=1e3)
+
+
+def test_amount_makes_a_tenth_of_the_load():
+    mass, load = force_amount(RPM3000, 0.2, rotor_mass=500)
+    assert load == pytest.approx(500 * 9.80665)
+    # 490.3325 N / (0.2 m · 98696.04 s⁻²)
+    assert mass == pytest.approx(0.02484054, rel=1e-6)
+    assert mass * 0.2 * RPM3000**2 == pytest.approx(0.1 * load)
+    assert force_amount(RPM3000, 0.2, rotor_mass=500, planes=2)[0] == pytest.approx(mass / 2)
+    assert force_amount(RPM3000, 0.2, bearing_load=2500, fraction=0.05)[0] == pytest.approx(125 / 19739.2088)
+
+
+@pytest.mark.parametrize(
+    ("speed", "radius", "options", "words"),
+    [
+        (RPM3000, 0.0, {"rotor_mass": 500}, "radius must be a finite number above 0, not 0"),
+        (0.0, 0.2, {"rotor_mass": 500}, "speed must be"),
+        (RPM3000, 0.2, {"rotor_mass": -1}, "mass of the rotor must be"),
+        (RPM3000, 0.2, {"bearing_load": inf}, "load of the bearing must be"),
+        (RPM3000, 0.2, {"rotor_mass": 1, "fraction": 0}, "fraction of the load must be"),
+        (RPM3000, 0.2, {}, "one of them"),
+        (RPM3000, 0.2, {"rotor_mass": 1, "bearing_load": 1}, "one of them"),
+    ],
+)
+def test_impossible_loads(speed, radius, options, words):
+    with pytest.raises(ValueError, match=words):
+        force_amount(speed, radius, **options)
+
+
+def simulated_phase(heavy, eta, zeta, sensor, key, quantity):
+    """Phase lead of what an instrument reads: one mode, both directions alike, sampled in time."""
+    omega = 2.0
+    response = eta**2 / (1 - eta**2 + 2j * zeta * eta)
+    t = np.linspace(0, 2 * pi / omega, 720, endpoint=False)  # from the pulse of the key phasor
+    mark = key + omega * t
+    place = response * np.exp(1j * (mark + heavy))  # x + i y of the shaft
+    read = (place * np.exp(-1j * sensor)).real
+    derivatives = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
+    for _ in range(derivatives):
+        read = (np.roll(read, -1) - np.roll(read, 1)) / (2 * (t[1] - t[0]))
+    return np.angle(np.sum(read * np.exp(-1j * omega * t)))
+
+
+@pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
+@pytest.mark.parametrize("eta", [0.4, 1.0, 1.7])
+def test_angle_is_opposite_to_the_heavy_spot_in_a_simulation(quantity, eta):
+    rng = np.random.default_rng(3)
+    for heavy, sensor, key in rng.uniform(-pi, pi, (5, 3)):
+        phase = simulated_phase(heavy, eta, 0.08, sensor, key, quantity)
+        lag = expected_lag(ratio=eta, damping=0.08)
+        angle = opposing_angle(phase, lag.expected, sensor_angle=sensor, key_phasor=key, quantity=quantity)
+        assert 0 <= angle < 2 * pi
+        assert abs(np.exp(1j * angle) + np.exp(1j * heavy)) < 1e-9
+
+
+def test_lags():
+    below, at, above = (expected_lag(word) for word in ("below", "at", "above"))
+    assert [degrees(x.low) for x in (below, at, above)] == pytest.approx([0, 90, 90])
+    assert [degrees(x.high) for x in (below, at, above)] == pytest.approx([90, 90, 180])
+    assert [degrees(x.expected) for x in (below, at, above)] == pytest.approx([45, 90, 135])
+    assert degrees(expected_lag(degrees=37).expected) == pytest.approx(37)
+    assert degrees(expected_lag(ratio=1.0).expected) == pytest.approx(90)
+    # 2·0.05·0.5 / (1 − 0.25) = 0.0666…
+    assert np.tan(expected_lag(ratio=0.5).expected) == pytest.approx(0.05 / 0.75)
+    assert degrees(expected_lag(ratio=20.0).expected) == pytest.approx(180, abs=0.5)
+    for wrong in ({}, {"degrees": 10, "ratio": 1.0}, {"degrees": 400}, {"ratio": 0}, {"where": "near"}):
+        with pytest.raises(ValueError, match=r"critical speed|lag"):
+            expected_lag(**wrong)
+
+
+def test_angle_by_the_model_and_by_the_lag_agree_below_the_critical_speed():
+    rotor = read_rotor(sample_data() / "rotor23.csv")
+    for angle, key in ((0.0, 0.0), (50.0, 0.0), (-30.0, 70.0)):
+        influence = model_influence(rotor, {"mid": 12}, {"s": (12, angle)}, [60.0], key_phasor=key)
+        heavy = 2.0 * np.exp(1j * radians(130))
+        Y = influence.W[..., 0] * heavy
+        found = trial_from_coefficients(influence, Y, "mid", share=0.5)
+        assert np.exp(1j * found.angle) == pytest.approx(np.exp(1j * radians(310)), abs=1e-9)
+        assert found.amount == pytest.approx(1.0)  # half of the unbalance halves the reading
+        assert found.expected == pytest.approx(Y / 2)
+        guessed = opposing_angle(np.angle(Y[0, 0]), 0.0, sensor_angle=radians(angle), key_phasor=radians(key))
+        assert np.exp(1j * guessed) == pytest.approx(np.exp(1j * found.angle), abs=1e-6)
+
+
+def influence(W, **options):
+    W = np.asarray(W, dtype=complex)
+    options = {"labels": GRAMS, "speeds": [RPM3000], **options}
+    return Influence(sensors=("a", "b"), planes=("left", "right"), W=W, **options)
+
+
+COEFFICIENTS = [[[4.0, 1j], [1.0, -2.0]]]
+READINGS = np.array([[1.0 + 1j, 0.5j]]) * 0.05
+
+
+def test_sensitivity_changes_the_largest_reading_by_the_share():
+    found = trial_from_coefficients(influence(COEFFICIENTS), READINGS, "left", share=0.4)
+    assert abs(found.expected[0, 0] - READINGS[0, 0]) == pytest.approx(0.4 * abs(READINGS[0, 0]))
+    assert found.amount == pytest.approx(0.4 * abs(READINGS[0, 0]) / 4)
+    assert found.warnings == ()
+    # no other angle leaves less, rms
+    turn = np.exp(1j * np.linspace(0, 2 * pi, 721))
+    left = [np.linalg.norm(READINGS[0] + np.array([4, 1]) * found.amount * z) for z in turn]
+    assert np.linalg.norm(found.expected) <= min(left) + 1e-12
+    row = found.to_dict()["expected"][0]
+    assert row["change"] == pytest.approx(0.4 * row["before"])
+    assert found.to_dict()["mass"] == pytest.approx(1e3 * found.amount)
+
+
+def test_no_reading_changes_by_more_than_the_share_of_the_largest():
+    # the plane acts on the largest reading ("a") hardly, and much on the other one
+    found = trial_from_coefficients(influence([[[0.1, 1.0], [8.0, 1.0]]]), READINGS, "left", share=0.4)
+    change = np.abs(found.expected - READINGS)
+    assert change[0] == pytest.approx(0.4 * abs(READINGS[0, 0]) * np.array([0.1 / 8, 1.0]))
+    assert "changes sensor 'b' at 3000 rpm by 40 % of the largest reading" in found.basis
+
+
+def test_limit_cuts_what_follows_from_the_share_and_refuses_what_is_stated():
+    W = influence(COEFFICIENTS)
+    cut = trial_from_coefficients(W, READINGS, "left", limit=0.006)
+    assert cut.amount == 0.006
+    assert "would need more than the largest weight of plane 'left'" in cut.warnings[0]
+    with pytest.raises(ValueError, match=r"trial weight of 7 g is larger .* plane 'left', 6 g"):
+        trial_from_coefficients(W, READINGS, "left", amount=0.007, limit=0.006)
+    assert trial_from_coefficients(W, READINGS, "left", amount=0.006, limit=0.006).amount == 0.006
+    with pytest.raises(ValueError, match=r"24.84 g is larger .* 20 g: take at most 8.05 % of the load"):
+        trial_from_force("A", RPM3000, 0.2, rotor_mass=500, limit=0.02, labels=GRAMS)
+
+
+def test_weights_too_small_or_too_large_are_named():
+    W = influence(COEFFICIENTS)
+    small = trial_from_coefficients(W, READINGS, "left", amount=1e-3)
+    assert "changes no reading by 30 % or 30°" in small.warnings[0]
+    errors = ReadingErrors(amplitude=0.05, phase=0.05)
+    lost = trial_from_coefficients(W, READINGS, "left", amount=1e-3, errors=errors)
+    assert "no reading by more than the errors of two readings" in lost.warnings[0]
+    large = trial_from_coefficients(W, READINGS, "left", amount=0.1)
+    assert "would read more than the largest reading" in large.warnings[0]
+    heavy = trial_from_coefficients(W, READINGS, "left", radius=0.2, load=100.0)
+    assert heavy.force == pytest.approx(heavy.amount * 0.2 * RPM3000**2)
+    assert "% of the load, more than 25 %" in heavy.warnings[0]
+    assert trial_from_force("A", RPM3000, 0.2, rotor_mass=5, fraction=0.25).warnings == ()
+    assert "26 % of the load" in trial_from_force("A", RPM3000, 0.2, rotor_mass=5, fraction=0.26).warnings[0]
+
+
+def test_trial_radius_different_from_that_of_the_coefficients():
+    W = influence(COEFFICIENTS)
+    usual = trial_from_coefficients(W, READINGS, "left", radius=0.2)
+    outside = trial_from_coefficients(W, READINGS, "left", radius=0.2, trial_radius=0.25)
+    assert outside.amount == pytest.approx(0.8 * usual.amount)
+    assert outside.expected == pytest.approx(usual.expected)
+    assert outside.force == pytest.approx(usual.force)
+    stated = trial_from_coefficients(
+        W, READINGS, "left", amount=outside.amount, radius=0.2, trial_radius=0.25
+    )
+    assert stated.amount == pytest.approx(outside.amount)
+    assert stated.expected == pytest.approx(usual.expected)
+    with pytest.raises(ValueError, match=r"5 g is larger .* 4.8 g"):
+        trial_from_coefficients(W, READINGS, "left", amount=0.005, limit=0.006, radius=0.2, trial_radius=0.25)
+    with pytest.raises(ValueError, match="needs the radius of the coefficients"):
+        trial_from_coefficients(W, READINGS, "left", trial_radius=0.25)
+
+
+def test_what_cannot_be_is_refused():
+    W = influence(COEFFICIENTS)
+    for options, words in (
+        ({"plane": "middle"}, "no plane 'middle'; the planes are 'left', 'right'"),
+        ({"readings": READINGS[:, :1]}, "must have shape"),
+        ({"readings": 0 * READINGS}, "all initial readings are zero"),
+        ({"share": 0.0}, "share of the largest reading"),
+        ({"amount": -1.0}, "trial weight must be"),
+        ({"limit": 0.0}, "largest weight of the plane must be"),
+    ):
+        arguments = {"influence": W, "readings": READINGS, "plane": "left", **options}
+        with pytest.raises(ValueError, match=words):
+            trial_from_coefficients(**arguments)
+    with pytest.raises(ValueError, match="plane 'left' acts on no reading"):
+        trial_from_coefficients(influence([[[0.0, 1.0], [0.0, 1.0]]]), READINGS, "left")
+    with pytest.raises(ValueError, match="needs both the phase"):
+        trial_from_force("A", RPM3000, 0.2, rotor_mass=5, phase=1.0)
+    with pytest.raises(ValueError, match="quantity must be one of"):
+        opposing_angle(0.0, 0.0, quantity="speed")
+
+
+def test_force_with_an_angle_in_the_conventions_of_the_job():
+    labels = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
+    found = trial_from_force(
+        "A",
+        RPM3000,
+        0.2,
+        rotor_mass=500,
+        phase=radians(30),
+        lag=expected_lag("below"),
+        labels=labels,
+    )
+    assert degrees(found.angle) == pytest.approx(255)  # 30 + 45 + 180
+    assert found.to_dict()["angle_deg"] == pytest.approx(105)
+    assert found.to_dict()["angle_reach_deg"] == pytest.approx(45)
+    assert found.to_dict()["force_percent"] == pytest.approx(10)
+    text = found.summary()
+    assert "24.84 g" in text
+    assert "105° against rotation (± 45°)" in " ".join(text.split())
+    assert max(len(line) for line in text.splitlines()) <= 80
+    frame = found.to_frame()
+    assert frame.mass[0] == pytest.approx(24.84, abs=0.005)
+    arrow = found.plot().lines[0]
+    assert arrow.get_xdata()[1] == pytest.approx(radians(105))
+    assert arrow.get_ydata()[1] == pytest.approx(24.84, abs=0.005)
+    without = trial_from_force("A", RPM3000, 0.2, rotor_mass=500, labels=labels)
+    assert without.to_dict()["angle_deg"] is None
+    assert "any angle" in without.summary()
+    with pytest.raises(ValueError, match="has no angle to draw"):
+        without.plot()

@@ -1,0 +1,238 @@
+"""Pass, fail, not decidable: regions against closed forms, residual unbalance against what is mounted."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from balancing_data import complex_normal, synthetic
+
+from balancing import Labels, ReadingErrors, correct, estimate_influence
+from balancing.judgement import judge, judge_unbalance
+from balancing.limits import Limits
+from balancing.tolerance import tolerance
+from balancing.verdict import verdict_of_check, verdict_of_prediction
+
+RADIUS = 2.447746830680816  # √χ²(2, 0.95)
+ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
+
+
+def rigid(limit, **options):
+    """A tolerance of `limit` kg·m in each of the planes A and B."""
+    return tolerance(
+        2 * limit * 100 * pi / 2.5e-3, 100 * pi, "G2.5", planes={"A": None, "B": None}, **options
+    )
+
+
+def test_a_round_region():
+    found = judge("plane", "A", 3 + 4j, 5.0, 0.04 * np.eye(2))
+    assert found.low == pytest.approx(5 - 0.2 * RADIUS, rel=1e-6)
+    assert found.high == pytest.approx(5 + 0.2 * RADIUS, rel=1e-6)
+    assert found.verdict == "not decidable"
+    assert judge("plane", "A", 3 + 4j, 5.49, 0.04 * np.eye(2)).verdict == "pass"
+    assert judge("plane", "A", 3 + 4j, 5.48, 0.04 * np.eye(2)).verdict == "not decidable"
+    assert judge("plane", "A", 3 + 4j, 4.50, 0.04 * np.eye(2)).verdict == "fail"
+    assert judge("plane", "A", 3 + 4j, 4.52, 0.04 * np.eye(2)).verdict == "not decidable"
+
+
+def test_an_oblong_region():
+    # on the axis: 10 ± 0.1 ρ along, 3 ρ across: the farthest points are off the axis
+    found = judge("sensor", "s", 10.0, 20.0, np.diag([0.01, 9.0]))
+    a, b = 0.1 * RADIUS, 3 * RADIUS
+    cos = -10 * a / (a**2 - b**2)  # stationary point of |10 + a cos t + i b sin t|²
+    assert found.high == pytest.approx(np.hypot(10 + a * cos, b * np.sqrt(1 - cos**2)), rel=1e-6)
+    assert found.low == pytest.approx(10 - a, rel=1e-6)
+    # around zero nothing is excluded
+    assert judge("sensor", "s", 0.1, 1.0, np.eye(2)).low == 0.0
+    # few degrees of freedom widen the region: ρ² = 2 F(2, 3; 0.95) = 2 · 9.5521
+    few = judge("sensor", "s", 10.0, 20.0, np.eye(2), dof=3)
+    assert few.high == pytest.approx(10 + np.sqrt(2 * 9.552094), rel=1e-6)
+
+
+def test_unknown_errors_and_no_errors():
+    assert judge("sensor", "s", 1.0, 2.0, None).verdict == "not decidable"
+    assert judge("sensor", "s", 1.0, 2.0, np.zeros((2, 2))).verdict == "pass"
+    assert judge("sensor", "s", 1.0, 0.9, np.zeros((2, 2))).verdict == "fail"
+    with pytest.raises(ValueError, match="limit of sensor 's' must be"):
+        judge("sensor", "s", 1.0, float("nan"), None)
+
+
+def test_planes_bearings_and_radii():
+    found = tolerance(100, 300, "G2.5", planes={"A": 0.25, "B": 0.75}, bearings=(0, 1), centre=0.5)
+    assert found.bearing_limits == pytest.approx([found.total / 2] * 2)
+    u = found.total * np.array([0.6, -0.2])  # A over its half, but together below at the bearings
+    exact = np.zeros((4, 4))
+    rows = judge_unbalance(u / [0.2, 0.4], exact, found, ("A", "B"), radii={"A": 0.2, "B": 0.4})
+    assert [(r.kind, r.name, r.verdict) for r in rows] == [
+        ("plane", "A", "fail"),
+        ("plane", "B", "pass"),
+        ("bearing", "A", "pass"),
+        ("bearing", "B", "pass"),
+    ]
+    # 0.75·0.6 − 0.25·0.2 = 0.4, 0.25·0.6 − 0.75·0.2 = 0
+    assert [r.size / found.total for r in rows[2:]] == pytest.approx([0.4, 0.0], abs=1e-12)
+    assert rows[0].limit == pytest.approx(found.total / 2 / 0.2)
+    turned = judge_unbalance(u[::-1], exact, found, ("B", "A"))
+    assert [r.size / found.total for r in turned[2:]] == pytest.approx([0.4, 0.0], abs=1e-12)
+    # errors of A alone: at bearing A 0.75 of them
+    some = judge_unbalance(u, np.diag([1, 1, 0, 0]) * (0.1 * found.total) ** 2, found, ("A", "B"))
+    assert some[2].high / found.total == pytest.approx(0.4 + 0.075 * RADIUS, rel=1e-6)
+    with pytest.raises(ValueError, match="name the same planes in both"):
+        judge_unbalance(u, None, found, ("A", "C"))
+    with pytest.raises(ValueError, match="radius of plane 'B'"):
+        judge_unbalance(u, None, found, ("A", "B"), radii={"A": 0.2})
+
+
+@pytest.fixture
+def job():
+    made, W, Y0 = synthetic(np.random.default_rng(5), errors=ERRORS)
+    return made, W, Y0, estimate_influence(made)
+
+
+def check_run(made, W, residual, errors=ERRORS):
+    readings = np.einsum("scp,p->sc", W, residual)[None]
+    return replace(
+        made, runs=("check",), readings=readings, weights=np.zeros((1, 0)), planes=(), errors=errors
+    )
+
+
+def test_residual_unbalance_of_a_check_run(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    check = check_run(made, W, residual)
+    found = verdict_of_check(influence, check, tolerance=rigid(1.5e-4))
+    assert [r.value for r in found.rows] == pytest.approx(residual, rel=1e-9)
+    assert [r.verdict for r in found.rows] == ["fail", "pass"]
+    assert found.overall == "fail"
+    assert verdict_of_check(influence, check, tolerance=rigid(3e-4)).overall == "pass"
+    close = verdict_of_check(influence, check, tolerance=rigid(2e-4))
+    assert close.rows[0].verdict == "not decidable"
+    assert close.overall == "not decidable"
+    assert "lies on both sides" in close.summary()
+    # what was mounted does not matter
+    mounted = replace(check, planes=made.planes, weights=np.array([[1e-3, 2e-3]]))
+    again = verdict_of_check(influence, mounted, tolerance=rigid(2e-4))
+    assert again.to_dict() == close.to_dict()
+    unknown = verdict_of_check(
+        replace(influence, errors=None, covariance=None), replace(check, errors=None), tolerance=rigid(1)
+    )
+    assert unknown.overall == "not decidable"
+
+
+def test_vibration_that_the_planes_do_not_explain_is_named(job):
+    made, W, Y0, influence = job
+    check = check_run(made, W, np.array([2e-4, 1e-4j]))
+    assert verdict_of_check(influence, check, tolerance=rigid(1e-3)).warnings == ()
+    more = replace(check, readings=check.readings + 0.3 * Y0)
+    found = verdict_of_check(influence, more, tolerance=rigid(1e-3))
+    assert "does not explain the readings within their errors" in found.warnings[0]
+    assert found.summary().startswith("Warning: unbalance in these planes")
+    # one plane alone does not explain what two leave
+    one = tolerance(1, 100, "G1", planes={"A": None})
+    assert len(verdict_of_check(influence, check, tolerance=one).warnings) == 1
+
+
+def test_region_holds_the_true_residual_in_95_of_100_jobs():
+    rng = np.random.default_rng(11)
+    made, W, _ = synthetic(rng, errors=ReadingErrors(floor=1.0), sensors=3, speeds=1)
+    residual = np.array([1e-3, -2e-3j])
+    inside, jobs = 0, 400
+    exact = check_run(made, W, residual)
+    for _ in range(jobs):
+        trials = replace(made, readings=made.readings + 1e-2 * complex_normal(rng, made.readings.shape))
+        trials = replace(trials, errors=ReadingErrors(floor=1e-2))
+        noisy = replace(
+            exact,
+            readings=exact.readings + 1e-2 * complex_normal(rng, exact.readings.shape),
+            errors=ReadingErrors(floor=1e-2),
+        )
+        row = verdict_of_check(estimate_influence(trials), noisy, tolerance=rigid(1.0)).rows[0]
+        # inside the ellipse, seen from its centre: the edge in that direction is farther
+        away = residual[0] - row.value
+        edge = row.region - row.value
+        nearest = edge[np.argmin(np.abs(np.angle(edge / away)))]
+        inside += abs(nearest) >= abs(away)
+    # binomial, 400 × 0.95: 380 ± 4.4
+    assert 363 <= inside <= 395
+
+
+def test_readings_against_limits(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    check = check_run(made, W, residual)
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0, "s3": 1e-3})
+    found = verdict_of_check(influence, check, limits=limits)
+    assert [(r.name, r.speed) for r in found.rows] == [(s, v) for v in made.speeds for s in ("s1", "s3")]
+    for row in found.rows:
+        s, c = list(made.speeds).index(row.speed), made.sensors.index(row.name)
+        size = abs(W[s, c] @ residual)
+        assert row.size == pytest.approx(size)
+        assert row.high == pytest.approx(size * (1 + 0.01 * RADIUS), rel=1e-3)
+        assert row.verdict == ("pass" if size * (1 + 0.01 * RADIUS) < row.limit else "fail")
+    assert {row.verdict for row in found.rows} == {"pass", "fail"}
+    with pytest.raises(ValueError, match="nothing to judge by"):
+        verdict_of_check(influence, check)
+
+
+def test_part_of_the_sensors_and_speeds(job):
+    made, W, _, influence = job
+    residual = np.array([2e-4, 1e-4j])
+    whole = check_run(made, W, residual)
+    part = replace(
+        whole, sensors=("s2", "s0"), speeds=made.speeds[1:2], readings=whole.readings[:, :, 1:2, [2, 0]]
+    )
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s2": 1.0})
+    found = verdict_of_check(influence, part, tolerance=rigid(3e-4), limits=limits)
+    assert [r.value for r in found.rows[:2]] == pytest.approx(residual, rel=1e-9)
+    assert [r.name for r in found.rows] == ["A", "B", "s2"]
+    with pytest.raises(ValueError, match="no coefficients of sensor 'far'"):
+        verdict_of_check(influence, replace(part, sensors=("s2", "far")), limits=limits)
+
+
+def test_prediction(job):
+    made, W, Y0, influence = job
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 5.0})
+    c = correct(influence, limits=limits)
+    wide = 10 * np.sqrt(np.trace(c.covariance))
+    found = verdict_of_prediction(c, tolerance=rigid(wide))
+    assert [r.size for r in found.rows[:2]] == [0.0, 0.0]
+    assert found.rows[0].high == pytest.approx(
+        RADIUS * np.sqrt(np.linalg.eigvalsh(c.covariance[:2, :2])[-1]), rel=1e-6
+    )
+    assert [r.kind for r in found.rows] == ["plane"] * 2 + ["sensor"] * 3
+    assert found.rows[0].verdict == "pass"
+    assert verdict_of_prediction(c, tolerance=rigid(wide / 1e3)).rows[0].verdict == "not decidable"
+    # pieces 5 tolerances off
+    mounted = c.weights + np.array([5 * wide, 0])
+    off = verdict_of_prediction(c, tolerance=rigid(wide), mounted=mounted, after=Y0 + W @ mounted)
+    assert off.rows[0].verdict == "fail"
+    assert off.rows[2].value == pytest.approx((Y0 + W @ mounted)[0, 1])
+
+
+def test_words_table_and_picture(job):
+    made, W, _, influence = job
+    check = check_run(made, W, np.array([2e-4, 1e-4j]))
+    labels = Labels(vibration_unit="um", vibration_scale=1.0, weight_unit="g", weight_scale=1e3)
+    limits = Limits.of(3, made.sensors, made.planes, residual={"s1": 0.2})
+    found = verdict_of_check(
+        replace(influence, labels=labels),
+        replace(check, labels=labels),
+        tolerance=rigid(1.5e-4),
+        limits=limits,
+    )
+    rows = found.to_dict()["rows"]
+    assert rows[0]["size"] == pytest.approx(0.2)
+    assert rows[0]["limit"] == pytest.approx(0.15)
+    assert rows[0]["unit"] == "g"
+    assert rows[1]["angle_deg"] == pytest.approx(90)
+    assert rows[0]["low"] < rows[0]["size"] < rows[0]["high"]
+    text = found.summary()
+    assert "Verdict (check run check): fail" in text
+    assert "plane A: 0.2 g" in text
+    assert max(len(line) for line in text.splitlines()) <= 80
+    frame = found.to_frame()
+    assert list(frame.verdict[:2]) == ["fail", "pass"]
+    ax = found.plot()
+    assert ax.lines[0].get_ydata() == pytest.approx(np.full(361, 0.15))
+    with pytest.raises(ValueError, match="no planes to draw"):
+        verdict_of_check(influence, check, limits=limits).plot()

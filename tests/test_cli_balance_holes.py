@@ -1,0 +1,112 @@
+"""`rotorid balance --split`: pieces in holes, planes where material is removed, and bad holes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from balancing import correct, estimate_influence
+from balancing.mounted import mount
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+
+TURBO = sample_data() / "turbo_job"
+HOLES = TURBO / "holes.toml"
+
+
+def vector(rows):
+    return sum(r["mass"] * np.exp(1j * np.deg2rad(r["angle_deg"])) for r in rows)
+
+
+@pytest.mark.parametrize(("method", "gain"), [("least-squares", 2.0), ("minmax", 2.2), ("weighted", 1.05)])
+def test_all_planes_together_are_better_than_one_by_one(cli, method, gain):
+    found = cli("balance", HOLES, "--split", "--method", method, "--json")
+    assert found.code == 0, found.err
+    m = found.json["mounting"]
+    assert m["proven"] is True
+    assert m["gap"] < 1e-8
+    assert m["objective_plane_by_plane"] > gain * m["objective"]
+    for plane in m["planes"]:
+        own = [r for r in m["holes"] if r["plane"] == plane["plane"]]
+        assert all(r["mass"] in (pytest.approx(150), pytest.approx(300)) for r in own)
+        assert all(abs((r["angle_deg"] + 15) % 30 - 15) < 1e-6 for r in own)
+        total = plane["mass"] * np.exp(1j * np.deg2rad(plane["angle_deg"]))
+        assert vector(own) == pytest.approx(total, abs=1e-6)
+
+
+def test_prediction_of_what_is_mounted():
+    job = read_job(HOLES)
+    influence = estimate_influence(job.trials)
+    found = correct(influence)
+    m = mount(found, influence, None, job.holes)
+    np.testing.assert_allclose(m.after, found.before + influence.W @ m.weights, rtol=1e-12)
+    assert m.after_covariance.shape == (*m.after.shape, 2, 2)
+    assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
+    text = m.summary()
+    assert "No other choice of pieces is better (proven)." in text
+    assert "2 × 150.0" in text or "150.0" in text
+
+
+def job_with(tmp_path, text):
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_text((TURBO / name).read_text())
+    path = tmp_path / "job.toml"
+    path.write_text((TURBO / "job.toml").read_text() + text)
+    return path
+
+
+def test_material_removed_is_on_the_other_side(cli, tmp_path):
+    hole = "holes = 12\navailable_g_mm = [150]\nper_hole = 2\nstock = [5]\n"
+    added = cli("balance", HOLES, "--split", "--json").json
+    path = job_with(
+        tmp_path, "".join(f"[planes.{p}]\n{hole}remove = true\n" for p in ("left", "middle", "right"))
+    )
+    gone = cli("balance", path, "--split", "--json").json
+    for a, b in zip(added["corrections"], gone["corrections"], strict=True):
+        assert b["action"] == "remove"
+        assert b["remove_at_deg"] == pytest.approx((a["angle_deg"] + 180) % 360)
+        assert (a["mass"], a["angle_deg"]) == (b["mass"], b["angle_deg"])
+    # twelve holes are symmetric: the pieces come out of the opposite holes
+    places = {
+        (r["plane"], round((r["angle_deg"] + 180) % 360) % 360, round(r["mass"]))
+        for r in added["mounting"]["holes"]
+    }
+    assert {
+        (r["plane"], round(r["angle_deg"]) % 360, round(r["mass"])) for r in gone["mounting"]["holes"]
+    } == places
+    assert "(remove)" in cli("balance", path).out
+
+
+def test_table_of_holes_is_written(cli, tmp_path):
+    target = tmp_path / "holes.csv"
+    assert cli("balance", HOLES, "--split", "--output", target).code == 0
+    head = target.read_text(encoding="utf-8-sig").splitlines()[0]
+    assert head == "plane,hole,angle_deg,mass,unit,pieces"
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ("holes_deg = [0, 90, 90]\navailable_g_mm = [10]", "90"),
+        ("holes_deg = [0, 400]\navailable_g_mm = [10]", "400"),
+        ("holes_deg = []\navailable_g_mm = [10]", "holes_deg"),
+        ("holes = 0\navailable_g_mm = [10]", "holes"),
+        ("holes = 12\navailable_g_mm = []", "available_g_mm"),
+        ("holes = 12\navailable_g_mm = [-5]", "-5"),
+        ("holes = 12\navailable_g = [5]", "available"),
+        ("holes = 12\navailable_g_mm = [5]\nradius_mm = 0", "radius_mm"),
+        ("holes = 12\nholes_deg = [0, 10]\navailable_g_mm = [5]", "holes"),
+    ],
+)
+def test_bad_holes(cli, tmp_path, keys, words):
+    outcome = cli("balance", job_with(tmp_path, f"[planes.left]\n{keys}\n"), "--split")
+    assert outcome.code == 2
+    assert "planes.left" in outcome.err
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+
+
+def test_job_without_holes(cli):
+    outcome = cli("balance", TURBO / "job.toml", "--split")
+    assert outcome.code == 2
+    assert "no plane has holes" in outcome.err

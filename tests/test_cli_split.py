@@ -1,0 +1,209 @@
+"""`rotorid split`: what it prints and writes, and what it refuses."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from rotorid.cli.amounts import vectors_of
+from rotorid.cli.split import split
+
+
+@pytest.fixture
+def run(cli, monkeypatch):
+    """Run `rotorid split ARGS` (the command is added where it is not registered yet)."""
+    from rotorid.cli import app
+
+    if not any(command.name == "split" for command in app.registered_commands):
+        monkeypatch.setattr(app, "registered_commands", list(app.registered_commands))
+        app.command("split")(split)
+
+    def call(*args):
+        return cli("split", *args)
+
+    return call
+
+
+def vector(rows):
+    return sum(r["mass"] * np.exp(1j * np.radians(r["angle_deg"])) for r in rows)
+
+
+def test_holes_pieces_and_what_is_taken(run, tmp_path):
+    args = ("35g@120", "--holes", "24", "--pieces", "10g,20g", "--taken", "9:10g", "--most-pieces", "3")
+    document = run(*args, "--json").json
+    assert document["method"] == "holes"
+    assert document["unit"] == "g"
+    assert document["proven"] is True
+    assert "9" not in [row["hole"] for row in document["holes"]]
+    for row in document["holes"]:
+        assert row["angle_deg"] == pytest.approx(15 * (int(row["hole"]) - 1))
+    target = 35 * np.exp(2j * np.pi / 3)
+    error = vector(document["holes"]) - target
+    assert document["error"]["mass"] == pytest.approx(abs(error), rel=1e-9)
+    assert document["relative_error"] == pytest.approx(abs(error) / 35, rel=1e-9)
+    outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.csv")
+    assert outcome.code == 0, outcome.err
+    for words in document["words"]:
+        assert words in outcome.out
+    assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
+    table = pd.read_csv(tmp_path / "t.csv", encoding="utf-8-sig")
+    assert list(table["mass_g"]) == [row["mass"] for row in document["holes"]]
+
+
+def test_against_the_rotation_is_the_same_split_with_the_same_numbers(run):
+    args = ("35g@120", "--holes", "24", "--first-hole", "7.5", "--pieces", "10g,20g", "--good-enough", "3")
+    one, other = (run(*args, "--angles", way, "--json").json for way in ("with rotation", "against rotation"))
+    assert one["mounted"]["mass"] == pytest.approx(other["mounted"]["mass"], rel=1e-9)
+    assert one["relative_error"] <= 0.03
+    assert [r["angle_deg"] for r in one["holes"]] == pytest.approx([r["angle_deg"] for r in other["holes"]])
+    assert other["angles"] == "against rotation"
+
+
+def test_units_mix_over_the_radius(run):
+    mass = run(
+        "35g@120", "--holes", "12", "--pieces", "1000g_mm,2000g_mm", "--radius", "100mm", "--json"
+    ).json
+    same = run("35g@120", "--holes", "12", "--pieces", "10g,20g", "--json").json
+    assert mass["holes"] == same["holes"]
+    unbalance = run(
+        "3500g_mm@120", "--holes", "12", "--pieces", "10g,20g", "--radius", "100mm", "--json"
+    ).json
+    assert unbalance["unit"] == "g_mm"
+    assert [r["hole"] for r in unbalance["holes"]] == [r["hole"] for r in same["holes"]]
+
+
+def test_free_amounts_with_a_step_between_listed_holes(run):
+    rows = run("35g@50", "--holes", "0,40,75,200", "--step", "0.5g", "--json").json["holes"]
+    assert [r["hole"] for r in rows] == ["2", "3"]
+    assert all(math.isclose(r["mass"] / 0.5, round(r["mass"] / 0.5), abs_tol=1e-9) for r in rows)
+    assert abs(vector(rows) - 35 * np.exp(1j * np.radians(50))) < 0.5
+
+
+def test_two_weights_at_free_angles(run, tmp_path):
+    document = run("35g@120", "--two", "20g,30g", "--json").json
+    for solution in document["solutions"]:
+        a, b = np.exp(1j * np.radians(solution["angles_deg"]))
+        assert 20 * a + 30 * b == pytest.approx(35 * np.exp(2j * np.pi / 3), rel=1e-9)
+    outcome = run("35g@120", "--two", "20g,30g", "--plot", tmp_path / "two.svg")
+    assert "20 g at 178.8° and 30 g at 85.2°" in outcome.out
+
+
+@pytest.mark.parametrize("way", ["--radial", "--axial"])
+def test_drilling_takes_away_opposite(run, way, tmp_path):
+    args = ("35g@120", "--drill", "8mm", "--depth", "12mm", "--radius", "100mm", "--density", "7800", way)
+    document = run(*args, "--json").json
+    assert document["way"] == way[2:]
+    assert document["depth_m"] <= 0.012
+    taken = [{"mass": 1e6 * document["unbalance_of_one_kg_m"], **hole} for hole in document["holes"]]
+    assert vector(taken) == pytest.approx(3500 * np.exp(1j * np.radians(300)), rel=1e-9)
+    outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.xlsx")
+    assert outcome.code == 0, outcome.err
+    assert "take away opposite" in outcome.out
+
+
+def test_a_single_shallow_hole_and_grinding(run):
+    small = run("0.05g@10", "--drill", "8mm", "--radius", "100mm")
+    assert "only the tip goes in" in small.out
+    assert "1 hole of diameter 8 mm at 190.0°" in small.out
+    ground = run("3500g_mm@120", "--grind", "--radius", "100mm", "--json").json
+    assert ground["mass_kg"] == pytest.approx(0.035)
+    assert ground["angle_deg"] == pytest.approx(300)
+
+
+def test_combining_trimming_and_rounding(run):
+    both = run("3g@0+4g@90", "--json").json
+    assert both["weight"] == {
+        "mass": pytest.approx(5),
+        "angle_deg": pytest.approx(math.degrees(math.atan2(4, 3))),
+    }
+    rest = run("3g@0+4g@90", "--mounted", "3g@0", "--json").json
+    assert rest["weight"] == {"mass": pytest.approx(4), "angle_deg": pytest.approx(90)}
+    rounded = run("34.7g@121.3", "--step", "0.5g", "--angle-step", "5", "--json").json
+    assert rounded["weight"] == {"mass": 34.5, "angle_deg": pytest.approx(120)}
+    assert rounded["error"]["mass"] == pytest.approx(
+        abs(34.5 * np.exp(1j * np.radians(120)) - 34.7 * np.exp(1j * np.radians(121.3)))
+    )
+    assert rounded["error"]["mass"] <= rounded["largest_possible_error"]
+    assert "34.5 g at 120.0°" in run("34.7g@121.3", "--step", "0.5g", "--angle-step", "5").out
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ("35@120 --grind", "a weight needs its unit, such as 35g@120"),
+        ("35g --grind", "a weight at an angle in degrees"),
+        ("35gg@120 --grind", "expected a unit of weight"),
+        ("-35g@120 --grind", "No such option"),
+        ("35g@500 --grind", "no angle from -360 to 360"),
+        ("35g@x --grind", "no angle from -360 to 360"),
+        ("1e999g@1 --grind", "expected a finite number"),
+        ("3g@0+4g_mm@90", "cannot be added"),
+        ("35g@120", "say how to mount the weight"),
+        ("0g@120 --holes 4", "there is nothing to mount"),
+        ("35g@120 --holes 4 --two 3g,4g", "different ways to mount a weight"),
+        ("35g@120 --two 20g,30g --pieces 3g", "--pieces means something only with --holes"),
+        ("35g@120 --grind --step 3g", "--step means something only with --holes"),
+        ("35g@120 --grind --angle-step 3", "--angle-step means something not with --grind"),
+        ("35g@120 --holes 0,90,30", "in the order of their angles"),
+        ("35g@120 --holes 0,90,90", "listed twice"),
+        ("35g@120 --holes 0,90,400", "no angle from -360 to 360"),
+        ("35g@120 --holes 0,90,360", "a full turn or more apart"),
+        ("35g@120 --holes -90,90,280", "a full turn or more apart"),
+        ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
+        ("35g@120 --holes 4 --first-hole 500", "--first-hole"),
+        ("35g@120 --holes 4 --pieces 0g", "a weight must be above 0"),
+        ("35g@120 --holes 4 --pieces 10", "a weight needs its unit"),
+        ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),
+        ("35g@120 --holes 4 --pieces 10g --step 1g", "either --pieces or a --step"),
+        ("35g@120 --holes 4 --pieces 10g_mm", "converts only with --radius"),
+        ("35g@120 --holes 4 --pieces 10g --stock x", "a whole number for each of the pieces"),
+        ("35g@120 --holes 4 --pieces 10g --stock 0", "the stock is empty"),
+        ("35g@120 --holes 4 --pieces 10g --per-hole 0", "number of pieces in one hole"),
+        ("35g@120 --holes 4 --pieces 10g --most-pieces 0", "1 or more"),
+        ("35g@120 --holes 4 --pieces 10g --good-enough -1", "no error from 0 to 100"),
+        ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),
+        ("35g@120 --holes 4 --taken 1:10g,1:3g", "listed twice"),
+        ("35g@120 --holes 2 --taken 1:3g,2:3g", "nothing can be mounted"),
+        ("35g@120 --holes 2 --taken 1:3g --max-mass 1g", "no admissible weight at all"),
+        ("35g@120 --drill 8mm --radius 0mm", "a length must be above 0"),
+        ("35g@120 --drill 8mm", "--drill needs --radius"),
+        ("35g@120 --drill 8 --radius 100mm", "expected one of the units"),
+        ("35g@120 --drill 8mm --radius 100mm --depth 1mm", "use a larger drill or depth"),
+        ("35g@120 --drill 8mm --radius 100mm --density 0", "density must be positive"),
+        ("35g@120 --drill 8mm --radius 100mm --tip-angle 200", "tip angle"),
+        ("35g@120 --two 2g,3g", "together make from 1 to 5 g, not 35 g"),
+        ("35g@120 --two 2g", "give two weights"),
+        ("35g@120 --mounted 3g_mm@0", "both masses or both unbalances"),
+        ("35g@120 --step 1g --angle-step 400", "no step of an angle"),
+    ],
+)
+def test_bad_input_gives_one_message(run, args, words):
+    outcome = run(*args.split())
+    assert outcome.code == 2
+    assert words in " ".join(outcome.err.split())
+    assert "Traceback" not in outcome.err
+    assert not outcome.out
+
+
+def test_wrong_way_of_angles(run):
+    outcome = run("35g@120", "--grind", "--radius", "1m", "--angles", "sideways")
+    assert (outcome.code, "--angles must be" in outcome.err) == (2, True)
+
+
+def test_vectors_are_read_exactly():
+    labels, (one,) = vectors_of("1e+1g@90", "against rotation")
+    assert one == -0.01j
+    assert labels.weight_unit == "g"
+    _, several = vectors_of("2g@0 + 3g@-90°", "with rotation")
+    assert several == [0.002, -0.003j]
+
+
+def test_help_has_an_example():
+    app = typer.Typer()
+    app.command()(split)
+    shown = CliRunner().invoke(app, ["--help"])
+    assert shown.exit_code == 0
+    assert "rotorid split 35g@120 --holes 24 --pieces 10g,20g" in " ".join(shown.output.split())

@@ -1,0 +1,91 @@
+"""`rotorid tolerance`."""
+
+import pandas as pd
+import pytest
+
+USUAL = ("tolerance", "--mass", "500kg", "--speed", "3000rpm", "--grade", "G2.5")
+SHAFT = ("--planes", "left=100mm,right=600mm", "--bearings", "0mm,700mm", "--centre", "350mm")
+
+
+def test_the_known_example(cli):
+    outcome = cli(*USUAL)
+    assert outcome.code == 0
+    assert "3979 g·mm" in outcome.out
+    assert "7.96" in outcome.out
+    found = cli(*USUAL, "--json").json
+    assert found["permissible_g_mm"] == pytest.approx(3978.87, abs=0.01)
+    assert found["specific_um"] == pytest.approx(7.958, abs=0.001)
+    assert found["grade"] == "G2.5"
+    assert found["planes"] == []
+    assert found["bearings"] is None
+    assert found["provenance"]["options"]["speed"] == "3000rpm"
+
+
+def test_units_are_converted(cli):
+    pounds = cli("tolerance", "--mass", "1102.3113 lb", "--speed", "50Hz", "--grade", "2,5", "--json").json
+    assert pounds["permissible_g_mm"] == pytest.approx(3978.87, abs=0.01)
+
+
+def test_planes(cli, tmp_path):
+    found = cli(*USUAL, *SHAFT, "--json").json
+    # symmetric about 350 mm: half at each bearing, 1989.4; planes at 100 and 600 as well
+    assert [b["limit_g_mm"] for b in found["bearings"]] == pytest.approx([1989.44, 1989.44], abs=0.01)
+    assert [p["plane"] for p in found["planes"]] == ["left", "right"]
+    # 6/7 u₁ + 1/7 u₂ = 0.5 and mirrored: 0.5 each
+    assert [p["limit_g_mm"] for p in found["planes"]] == pytest.approx([1989.44, 1989.44], abs=0.01)
+    half = cli(*USUAL, "--planes", "left,right", "--json").json
+    assert half["planes"][1]["limit_g_mm"] == pytest.approx(1989.44, abs=0.01)
+    table, picture = tmp_path / "t.csv", tmp_path / "t.png"
+    outcome = cli(*USUAL, *SHAFT, "--output", table, "--plot", picture)
+    assert outcome.code == 0
+    assert f"written: {picture}" in outcome.out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert pd.read_csv(table)["limit_g_mm"].tolist()[-2:] == pytest.approx([1989.44, 1989.44], abs=0.01)
+
+
+def test_an_overhung_rotor(cli):
+    found = cli(
+        *USUAL, "--planes", "fan=1200mm,hub=1000mm", "--bearings", "0mm,800mm", "--centre", "1.1m", "--json"
+    ).json
+    # levers 0.375 and 1.375, the larger cut to 1.3
+    assert [b["limit_g_mm"] / found["permissible_g_mm"] for b in found["bearings"]] == pytest.approx(
+        [0.375, 1.3]
+    )
+    assert "0.375 and 1.38" in found["warnings"][0]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"--grade": "G3"}, "'G3': the nearest are G2.5 and G6.3"),
+        ({"--mass": "500"}, "--mass '500': a number with its unit (kg, g, mg, oz, lb) is needed"),
+        ({"--mass": "heavy"}, "--mass 'heavy': a number with its unit"),
+        ({"--mass": "500N"}, "--mass '500N'"),
+        ({"--mass": "0kg"}, "mass of the rotor must be a finite number above 0"),
+        ({"--speed": "0rpm"}, "service speed must be a finite number above 0"),
+        ({"--speed": "fast"}, "not a range"),
+        ({"--planes": "left=1,right=2"}, "--planes left '1': a number with its unit"),
+        ({"--planes": "left=,right"}, "names with positions or without"),
+        ({"--planes": "left,left"}, "the plane 'left' stands twice"),
+        ({"--planes": "a,b,c"}, "one or two planes, not 3"),
+        ({"--planes": "a=0mm,b=100mm"}, "needs the position of the centre of mass"),
+        ({"--bearings": "0mm"}, "--bearings '0mm': two positions are needed"),
+        ({"--plot": "picture.gif"}, "cannot write this kind of file"),
+    ],
+)
+def test_bad_input_is_one_message(cli, options, words):
+    given = {"--mass": "500kg", "--speed": "3000rpm", "--grade": "G2.5", **options}
+    outcome = cli("tolerance", *(part for pair in given.items() for part in pair))
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1
+    assert outcome.out == ""
+
+
+def test_help_has_examples(cli):
+    outcome = cli("tolerance", "--help")
+    assert outcome.code == 0
+    assert "Example: rotorid tolerance --mass 500kg --speed 3000rpm --grade G2.5" in " ".join(
+        outcome.out.split()
+    )

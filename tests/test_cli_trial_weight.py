@@ -1,0 +1,192 @@
+"""`rotorid trial-weight`."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.samples import sample_data
+
+FORCE = ("--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "200mm")
+ANGLE = ("--reading-phase", "120", "--lag", "below")
+MODEL = sample_data() / "model_job" / "job.toml"
+TURBO = sample_data() / "turbo_job" / "job.toml"
+BK = sample_data() / "bk_two_plane" / "job.toml"
+
+
+@pytest.fixture
+def weights(cli):
+    def run(*args):
+        outcome = cli("trial-weight", *args, "--json")
+        assert outcome.code == 0, outcome.err
+        return outcome.json["trial_weights"]
+
+    return run
+
+
+def test_amount_from_the_load(weights):
+    (found,) = weights(*FORCE)
+    # 0.1 · 500 · 9.80665 / (0.2 · (100π)²)
+    assert found["mass"] == pytest.approx(24.8405, abs=1e-3)
+    assert found["unit"] == "g"
+    assert found["force_N"] == pytest.approx(490.33, abs=0.01)
+    assert found["force_percent"] == pytest.approx(10)
+    assert found["angle_deg"] is None
+    assert found["expected"] is None
+    (half,) = weights(*FORCE, "--carried-by", "2", "--fraction", "20")
+    assert half["mass"] == pytest.approx(found["mass"])
+    (ounces,) = weights(
+        "--bearing-load", "1102.31131lbf", "--speed", "50Hz", "--radius", "7.874015748in", "--unit", "oz"
+    )
+    assert ounces["mass"] == pytest.approx(24.8405 / 28.349523, rel=1e-4)
+    (kilo,) = weights("--bearing-load", "2.5kN", "--speed", "314.159265", "--radius", "0.2m")
+    assert kilo["mass"] == pytest.approx(1e3 * 250 / (0.2 * 314.159265**2))
+
+
+def test_angle_from_phase_and_lag(weights):
+    (found,) = weights(*FORCE, *ANGLE)
+    assert found["angle_deg"] == pytest.approx(345)  # 120 + 45 + 180
+    assert found["angle_reach_deg"] == pytest.approx(45)
+    # the same shaft and sensor, all written the other way
+    (other,) = weights(
+        *FORCE, "--reading-phase", "240", "--lag", "45", "--phase", "lag", "--angles", "against rotation"
+    )
+    assert other["angle_deg"] == pytest.approx(15)
+    (placed,) = weights(*FORCE, *ANGLE, "--sensor-angle", "30", "--key-phasor", "-10")
+    assert placed["angle_deg"] == pytest.approx(25)
+    (velocity,) = weights(*FORCE, *ANGLE, "--measures", "velocity")
+    assert velocity["angle_deg"] == pytest.approx(255)
+    (at,) = weights(*FORCE, "--reading-phase", "120", "--critical", "3000rpm")
+    assert at["angle_deg"] == pytest.approx(30)
+    (below,) = weights(*FORCE, "--reading-phase", "120", "--critical", "6000rpm", "--damping", "0.1")
+    assert below["angle_deg"] == pytest.approx(300 + np.degrees(np.arctan(0.1 / 0.75)))
+
+
+def test_angle_and_expected_change_from_a_job(weights):
+    found = weights(BK)
+    # the coefficients, in g and in the numbers of the application note
+    names = [row["plane"] for row in found]
+    assert len(names) == 2
+    for row in found:
+        change = [r["change"] for r in row["expected"]]
+        assert max(change) == pytest.approx(0.4 * 13.5, rel=1e-6)
+        before = np.hypot(*[r["before"] for r in row["expected"]])
+        after = np.hypot(*[r["after"] for r in row["expected"]])
+        assert after < before
+    (stated,) = weights(BK, "--plane", names[0], "--mass", "2.5g")
+    assert stated["mass"] == pytest.approx(2.5)
+    # the trial run of the note, at another angle, changed reading 1 as much: from 7.2 at 238° to 4.9 at 114°
+    shift = abs(4.9 * np.exp(1j * np.deg2rad(114)) - 7.2 * np.exp(1j * np.deg2rad(238)))
+    assert stated["expected"][0]["change"] == pytest.approx(shift)
+
+
+def test_a_computed_and_a_measured_job_agree(weights):
+    computed, measured = weights(MODEL), weights(TURBO)
+    assert [row["plane"] for row in computed] == ["left", "middle", "right"]
+    for a, b in zip(computed, measured, strict=True):
+        assert a["mass"] == pytest.approx(b["mass"], rel=0.02)
+        assert a["angle_deg"] == pytest.approx(b["angle_deg"], abs=2)
+        # g·mm: the force needs no radius
+        assert a["force_N"] == pytest.approx(a["mass"] * 1e-6 * (5400 * np.pi / 30) ** 2)
+        assert max(r["change"] for r in a["expected"]) == pytest.approx(0.4 * 59.7, rel=1e-6)
+
+
+def test_radius_of_the_job(weights, tmp_path):
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_bytes((BK.parent / name).read_bytes())
+    job = tmp_path / "job.toml"
+    text = BK.read_text()
+    plain = weights(BK, "--plane", "1", "--radius", "100mm")[0]
+    assert plain["radius_m"] == pytest.approx(0.1)
+    assert plain["force_N"] == pytest.approx(plain["mass"] * 1e-3 * 0.1 * (100 * np.pi) ** 2)
+    job.write_text(text + "\n[planes.1]\nradius_mm = 100\n")
+    (moved,) = weights(job, "--plane", "1", "--radius", "125mm")
+    assert moved["mass"] == pytest.approx(0.8 * plain["mass"])
+    assert moved["expected"] == plain["expected"]
+    assert moved["force_N"] == pytest.approx(plain["force_N"])
+
+
+def test_limit_of_a_plane(cli, weights):
+    (cut,) = weights(TURBO, "--plane", "left", "--max-mass", "100")
+    assert cut["mass"] == pytest.approx(100)
+    assert any("would need more than the largest weight" in w for w in cut["warnings"])
+    outcome = cli("trial-weight", TURBO, "--plane", "left", "--max-mass", "100", "--mass", "150g_mm")
+    assert outcome.code == 2
+    assert (
+        "the trial weight of 150 g_mm is larger than the largest weight of plane 'left', 100 g_mm"
+        in outcome.err
+    )
+    outcome = cli("trial-weight", *FORCE, "--max-mass", "20g")
+    assert outcome.code == 2
+    assert "24.84 g is larger than the largest weight of plane '1', 20 g: take at most 8.05 %" in outcome.err
+
+
+def test_force_beyond_the_load_is_named(weights):
+    (found,) = weights(*FORCE, "--fraction", "30")
+    assert any("30 % of the load, more than 25 %" in w for w in found["warnings"])
+    (found,) = weights(TURBO, "--plane", "left", "--bearing-load", "100N")
+    assert any("of the load, more than 25 %" in w for w in found["warnings"])
+
+
+def test_files(cli, tmp_path):
+    table, picture = tmp_path / "t.csv", tmp_path / "t.png"
+    outcome = cli("trial-weight", TURBO, "--output", table, "--plot", picture)
+    assert outcome.code == 0
+    assert "Trial weight in plane middle" in outcome.out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    frame = pd.read_csv(table)
+    assert len(frame) == 3 * 20
+    assert set(frame["plane"]) == {"left", "middle", "right"}
+    assert cli("trial-weight", *FORCE, "--output", table).code == 0
+    assert pd.read_csv(table)["mass"][0] == pytest.approx(24.8405, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        ((), "without a job, give --rotor-mass (or --bearing-load) and --speed and --radius"),
+        (
+            ("--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "0mm"),
+            "radius must be a finite number above 0",
+        ),
+        (
+            ("--rotor-mass", "500", "--speed", "3000rpm", "--radius", "1mm"),
+            "--rotor-mass '500': a number with its",
+        ),
+        ((*FORCE, "--bearing-load", "1N"), "choose one"),
+        ((*FORCE, "--fraction", "0"), "fraction of the load must be"),
+        ((*FORCE, "--reading-phase", "120"), "needs both the phase"),
+        ((*FORCE, "--reading-phase", "500", "--lag", "at"), "--reading-phase 500: an angle from -360 to 360"),
+        ((*FORCE, "--reading-phase", "1", "--lag", "high"), "--lag 'high': below, at or above, or degrees"),
+        ((*FORCE, *ANGLE, "--critical", "1rpm"), "choose one"),
+        (
+            (*FORCE, "--reading-phase", "1", "--critical", "0rpm"),
+            "--critical '0rpm': a critical speed above 0",
+        ),
+        ((*FORCE, "--measures", "noise"), "--measures 'noise' is not known"),
+        ((*FORCE, "--unit", "stone"), "one of the units kg, g, mg, oz"),
+        ((*FORCE, "--plane", "left"), "--plane needs a job"),
+        ((*FORCE, "--plot", "x.png"), "--plot needs an angle"),
+        ((*FORCE, "--phase", "late"), "phase must be 'lead' or 'lag'"),
+        ((TURBO, "--speed", "3000rpm"), "--speed is for a trial weight without a job"),
+        ((TURBO, "--plane", "top"), "no plane 'top'; the planes are 'left', 'middle', 'right'"),
+        ((TURBO, "--mass", "5g"), "--mass '5g': a number with its unit"),
+        ((TURBO, "--share", "0"), "share of the largest reading must be"),
+        ((BK, "--radius", "0mm"), "--radius '0mm': a radius above 0"),
+        ((TURBO, "--radius", "200mm"), "--radius is for weights as masses"),
+        ((TURBO, "--rotor-mass", "0kg"), "the load must be above 0"),
+    ],
+)
+def test_bad_input_is_one_message(cli, args, words):
+    outcome = cli("trial-weight", *args)
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert "Traceback" not in outcome.err
+    assert len(outcome.err.strip().splitlines()) == 1
+    assert outcome.out == ""
+
+
+def test_help_has_examples(cli):
+    outcome = cli("trial-weight", "--help")
+    assert outcome.code == 0
+    text = " ".join(outcome.out.split())
+    assert "Example: rotorid trial-weight --rotor-mass 500kg --speed 3000rpm --radius 200mm" in text

@@ -1,0 +1,265 @@
+"""One machine, written down in all combinations of conventions: always the same weight at the same place.
+
+The instrument here works as instruments do: it takes the pulse of the key phasor, samples one turn of what
+the probe sees, and reports the angle that the rotor turns from the pulse to the positive peak.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from fem_rotors import rotor23
+from tables_data import write_csv
+from whirl_rotors import machine
+
+import fem
+from balancing import correct, estimate_influence
+from balancing.check import compare_check
+from balancing.modelled import model_influence
+from rotorid.tables import read_job, write_rotor
+
+SPEEDS_RPM = (1500, 4200)
+NODES = {"A": 4, "B": 20, "C": 12}
+PLANES = {"left": (7, 0.2), "right": (18, 0.25)}
+UNBALANCE = {"left": 3e-3 * np.exp(0.7j), "right": 2e-3 * np.exp(-2.1j)}
+PLACES = {"trial 1": ("left", 30.0, 40.0), "trial 2": ("right", 25.0, 250.0)}
+"""Of the trial weights: plane, grams, and degrees from the mark with the rotation, wherever one stands."""
+RUNOUT = {"A": 12e-6 * np.exp(1.9j), "B": 30e-6 * np.exp(-0.4j), "C": 5e-6 * np.exp(2.8j)}
+"""Of the probe's track, m, and where its hump stands, from the mark with the rotation."""
+EXPECTED = np.array([-UNBALANCE[name] / radius for name, (_, radius) in PLANES.items()])
+
+PHASES = ("lead", "lag")
+UNITS = {"um": 1e6, "um_pp": 2e6, "mil_rms": 1e6 / 25.4 / np.sqrt(2)}
+# The machine turns clockwise seen from the drive end, so counter-clockwise seen from the free end.
+DRIVE = 'rotation = "clockwise"\nview = "drive end"\n'
+FREE = 'rotation = "counter-clockwise"\nview = "free end"\n'
+STYLES = {
+    "with": ('angles = "with rotation"\n', 1),
+    "against": ('angles = "against rotation"\n' + DRIVE, -1),
+    "clockwise, drive end": ('angles = "clockwise"\n' + DRIVE, 1),
+    "counter-clockwise, drive end": ('angles = "counter-clockwise"\n' + DRIVE, -1),
+    "clockwise, free end": ('angles = "clockwise"\n' + FREE, -1),
+    "counter-clockwise, free end": ('angles = "counter-clockwise"\n' + FREE, 1),
+}
+SENSOR_ANGLES = ({"A": 0.0, "B": 0.0, "C": 0.0}, {"A": 45.0, "B": 315.0, "C": 110.0})
+KEY_PHASORS = (0.0, 65.0)
+SLOW_ROLLS = ("none", "vectors", "file")
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    """With damped bearings that differ in x and y: the direction of a probe matters."""
+    return machine()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, rotor):
+    folder = tmp_path_factory.mktemp("conventions")
+    write_rotor(folder / "rotor.toml", rotor)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def motion(rotor):
+    """Complex deflection along x and y of each probe's node: run → (speeds, sensors, 2)."""
+    corrected = {name: EXPECTED[p] for p, name in enumerate(PLANES)}
+    trial = {run: {plane: g / 1e3 * np.exp(1j * np.radians(a))} for run, (plane, g, a) in PLACES.items()}
+    mounted = {"initial": {}, **trial, "check": corrected}
+    out = {}
+    for run, weights in mounted.items():
+        total = {
+            node: UNBALANCE[name] + radius * weights.get(name, 0) for name, (node, radius) in PLANES.items()
+        }
+        response = fem.unbalance_response(rotor, total, np.array(SPEEDS_RPM) * np.pi / 30, method="exact")
+        along = [[response.at((node, angle)) for angle in (0.0, 90.0)] for node in NODES.values()]
+        out[run] = np.moveaxis(np.array(along), 2, 0)
+    return out
+
+
+def instrument(signal, omega, kappa):
+    """Peak amplitude and degrees turned from the pulse to the positive peak; the pulse comes at κ."""
+    pulse = np.radians(kappa) / omega
+    after = np.arange(64) / 64 * 2 * np.pi / omega
+    read = 2 * np.mean(signal(pulse + after) * np.exp(-1j * omega * after))
+    return abs(read), float(-np.degrees(np.angle(read)) % 360)
+
+
+class Shop:
+    """People who write down one machine in their own way."""
+
+    def __init__(self, folder, motion, phase, unit, style, betas, kappa, slow_roll):
+        self.folder, self.motion, self.phase, self.unit = folder, motion, phase, unit
+        self.words, self.turn = STYLES[style]
+        self.betas, self.kappa, self.slow_roll = betas, kappa, slow_roll
+
+    def angle(self, with_rotation):
+        """An angle as these people write it."""
+        return float(self.turn * with_rotation % 360)
+
+    def reading(self, run, s, sensor):
+        """Amplitude and phase as they write them; run "slow" is the run-out alone."""
+        omega, beta = SPEEDS_RPM[s] * np.pi / 30, np.radians(self.betas[sensor])
+        runout = 0.0 if self.slow_roll == "none" else RUNOUT[sensor]
+
+        def signal(t):
+            # the point of the track under the probe stands at β − ωt from the mark
+            seen = abs(runout) * np.cos(beta - omega * t - np.angle(runout))
+            if run != "slow":
+                x, y = (
+                    np.real(z * np.exp(1j * omega * t))
+                    for z in self.motion[run][s][list(NODES).index(sensor)]
+                )
+                seen = seen + x * np.cos(beta) + y * np.sin(beta)
+            return seen
+
+        size, lag = instrument(signal, omega, self.kappa)
+        return size * UNITS[self.unit], lag if self.phase == "lag" else (360 - lag) % 360
+
+    def table(self, runs, speeds=SPEEDS_RPM):
+        head = ["run", "speed_rpm", "sensor", f"amplitude_{self.unit}", "phase_deg"]
+        places = itertools.product(runs, enumerate(speeds), NODES)
+        return [head, *([run, rpm, c, *map(float, self.reading(run, s, c))] for run, (s, rpm), c in places)]
+
+    def job(self, more=""):
+        """Write all files and read the job."""
+        write_csv(self.folder / "runs.csv", self.table(["initial", "trial 1", "trial 2"]))
+        rows = [[run, plane, g, self.angle(a)] for run, (plane, g, a) in PLACES.items()]
+        write_csv(self.folder / "weights.csv", [["run", "plane", "mass_g", "angle_deg"], *rows])
+        text = f'runs = "runs.csv"\nweights = "weights.csv"\nrotor = "rotor.toml"\nphase = "{self.phase}"\n'
+        text += self.words + more
+        if self.slow_roll == "file":
+            write_csv(self.folder / "slow.csv", self.table(["slow"], [200]))
+            text += 'slow_roll = "slow.csv"\n'
+        for name, (node, radius) in PLANES.items():
+            text += f"[planes.{name}]\nnode = {node}\nradius_mm = {1e3 * radius}\n"
+        for name, node in NODES.items():
+            text += f"[sensors.{name}]\nnode = {node}\nangle_deg = {self.angle(self.betas[name])}\n"
+        if self.slow_roll == "vectors":
+            for name in NODES:
+                size, phase = self.reading("slow", 0, name)
+                text += f"[slow_roll.{name}]\namplitude = {float(size)!r}\nphase_deg = {float(phase)!r}\n"
+        if self.kappa:
+            text += f"[key_phasor]\nangle_deg = {self.angle(self.kappa)}\n"
+        (self.folder / "job.toml").write_text(text, encoding="utf-8")
+        return read_job(self.folder / "job.toml")
+
+    def place(self, found):
+        """The weights as they read them off the sheet, kg and with the rotation from the mark."""
+        grams, angle = found.labels.weight(found.weights)
+        return grams / 1e3 * np.exp(1j * np.radians(self.turn * angle))
+
+
+def computed(job):
+    """What `rotorid balance --coefficients computed` uses."""
+    return model_influence(
+        job.rotor,
+        job.plane_nodes,
+        {name: job.sensor_places[name] for name in job.trials.sensors},
+        job.trials.speeds,
+        radii=job.radii,
+        key_phasor=job.key_phasor,
+        labels=job.trials.labels,
+    )
+
+
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("phase", PHASES)
+def test_the_same_weight_at_the_same_place(folder, motion, phase, unit, style):
+    """36 ways to write numbers, each on 4 machines: probes, key phasor and, with all of these, slow roll."""
+    for k, (betas, kappa) in enumerate(itertools.product(SENSOR_ANGLES, KEY_PHASORS)):
+        slow_roll = SLOW_ROLLS[(k + list(UNITS).index(unit) + list(PHASES).index(phase)) % 3]
+        shop = Shop(folder, motion, phase, unit, style, betas, kappa, slow_roll)
+        job = shop.job()
+        by_trials = correct(estimate_influence(job.trials))
+        by_model = correct(computed(job), job.trials)
+        for found in (by_trials, by_model):
+            np.testing.assert_allclose(found.weights, EXPECTED, rtol=1e-6)
+            np.testing.assert_allclose(shop.place(found), EXPECTED, rtol=1e-6)
+            assert np.abs(found.after).max() < 1e-6 * np.abs(found.before).max()
+        assert by_trials.labels.conventions()["angles"] == style.partition(",")[0].replace(
+            "with", "with rotation"
+        ).replace("against", "against rotation")
+
+
+@pytest.mark.parametrize("slow_roll", SLOW_ROLLS)
+@pytest.mark.parametrize("style", ["against", "clockwise, free end"])
+def test_the_check_run_shows_a_balanced_rotor(folder, motion, style, slow_roll):
+    """Run-out is subtracted from the check run too; what was mounted is the proposed correction."""
+    shop = Shop(folder, motion, "lag", "um_pp", style, SENSOR_ANGLES[1], 65.0, slow_roll)
+    write_csv(folder / "check.csv", shop.table(["check"]))
+    grams, angle = np.abs(EXPECTED) * 1e3, np.degrees(np.angle(EXPECTED))
+    rows = [["check", n, float(g), shop.angle(a)] for n, g, a in zip(PLANES, grams, angle, strict=True)]
+    write_csv(folder / "mounted.csv", [["run", "plane", "mass_g", "angle_deg"], *rows])
+    job = shop.job('check = "check.csv"\ncheck_weights = "mounted.csv"\n')
+    np.testing.assert_allclose(job.check.weights, [EXPECTED], rtol=1e-12)
+    assert np.abs(job.check.readings).max() < 1e-9 * np.abs(job.trials.readings).max()
+    influence = estimate_influence(job.trials)
+    compared = compare_check(correct(influence), job.check, influence)
+    assert np.abs(compared.difference).max() < 1e-9 * np.abs(compared.before).max()
+
+
+def test_the_phase_that_a_probe_reads():
+    """Bearings alike in x and y: lag = δ + β − κ − α, as docs/conventions.md derives it."""
+    rotor, omega, alpha = rotor23(damping=1e6), 136.0, 25.0
+    U = 2e-3 * np.exp(1j * np.radians(alpha))
+    x, y = (fem.unbalance_response(rotor, {7: U}, [omega]).at((12, angle))[0] for angle in (0.0, 90.0))
+    delta = -np.degrees(np.angle(fem.influence(rotor, [7], [12], [omega]).W[0, 0, 0]))
+    assert 10 < delta < 170  # near a critical speed, where the sign of δ shows
+    for beta, kappa in itertools.product((0.0, 50.0, 200.0), (0.0, 130.0)):
+        cos, sin = np.cos(np.radians(beta)), np.sin(np.radians(beta))
+        _, lag = instrument(
+            lambda t, c=cos, s=sin: np.real((x * c + y * s) * np.exp(1j * omega * t)), omega, kappa
+        )
+        wanted = delta + beta - kappa - alpha
+        assert np.exp(1j * np.radians(lag)) == pytest.approx(np.exp(1j * np.radians(wanted)), rel=1e-9)
+
+
+def wrong_place(folder, motion, replaced, by_model):
+    """Largest relative error of the weights where one statement of the job is changed."""
+    shop = Shop(folder, motion, "lag", "um_pp", "against", SENSOR_ANGLES[1], 65.0, "vectors")
+    shop.job()
+    text = (folder / "job.toml").read_text(encoding="utf-8")
+    for old, new in replaced:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "job.toml").write_text(text, encoding="utf-8")
+    job = read_job(folder / "job.toml")
+    influence = computed(job) if by_model else estimate_influence(job.trials)
+    found = correct(influence, job.trials)
+    return float(np.abs(found.weights / EXPECTED - 1).max())
+
+
+LEAD = ('phase = "lag"', 'phase = "lead"')
+WITH = ('angles = "against rotation"', 'angles = "with rotation"')
+MISREAD = {
+    # one statement changed: whether trial runs, whether the model puts the weights elsewhere
+    "phase": ([LEAD], True, True),
+    "angles": ([WITH], True, True),
+    "key phasor": ([("[key_phasor]\nangle_deg = 295.0", "[key_phasor]\nangle_deg = 0.0")], False, True),
+    "sensor angle": ([("angle_deg = 315.0", "angle_deg = 335.0")], False, True),
+    "slow roll": ([("[slow_roll.B]\namplitude = ", "[slow_roll.B]\namplitude = 3")], True, True),
+}
+
+
+@pytest.mark.parametrize("what", MISREAD)
+def test_a_wrong_statement_puts_the_weights_elsewhere(folder, motion, what):
+    """The round trip could fail: every statement matters, save those that cancel in trial runs."""
+    replaced, trials_wrong, model_wrong = MISREAD[what]
+    for by_model, wrong in ((False, trials_wrong), (True, model_wrong)):
+        error = wrong_place(folder, motion, replaced, by_model)
+        assert error > 0.02 if wrong else error < 1e-6
+
+
+def test_both_directions_misread_cancel_in_trial_runs(folder, motion):
+    """Lag as lead and against as with: everything is mirrored, the numbers on the sheet are the same."""
+    shop = Shop(folder, motion, "lag", "um_pp", "against", SENSOR_ANGLES[1], 65.0, "vectors")
+    right = correct(estimate_influence(shop.job().trials))
+    assert wrong_place(folder, motion, [LEAD, WITH], by_model=False) > 0.02
+    mirrored = correct(estimate_influence(read_job(folder / "job.toml").trials))
+    for ours, theirs in zip(
+        right.labels.weight(right.weights), mirrored.labels.weight(mirrored.weights), strict=True
+    ):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9)
