@@ -23,7 +23,7 @@ BoolArray = NDArray[np.bool_]
 
 __all__ = ["DIRECTIONS", "LONGEST", "SAME", "Attainable", "PieceSums", "disc_lowest", "distinct"]
 
-LONGEST = 600_000
+LONGEST = 540_000
 """Sums of one half at most; where there are more, some of them are left out."""
 SAME = 1e-9
 DIRECTIONS = np.exp(2j * np.pi * np.arange(72) / 72)
@@ -99,24 +99,24 @@ class PieceSums:
         return np.asarray(np.exp(1j * turned))
 
     def _sums(self, part: IntArray, longest: int) -> _Half:
-        half = _Half.empty(self)
-        quantum = self.reach * SAME
+        half, quantum = _Half.empty(self), self.reach * SAME
         for hole in part:
             step = self.amounts_of * np.exp(1j * self.holes.angles[hole])
+            most = longest if half.complete else longest // 10 + 1
+            if len(half.sums) * len(step) > 3 * most:
+                half = half.some(3 * most // len(step) + 1)
             sums = (half.sums[:, None] + step).ravel()
             used = (half.used[:, None] + self.used_of).reshape(len(sums), -1)
             row, option = np.divmod(np.arange(len(sums)), len(step))
             fits = np.ones(len(sums), dtype=bool) if self.stock is None else (used <= self.stock).all(axis=1)
+            totals = (half.totals[:, None] + self.amounts_of).ravel()
             kept = np.flatnonzero(fits)
+            kept = kept[np.argsort(totals[kept], kind="stable")]  # the lightest of equal ones
             kept = kept[distinct(sums[kept], quantum, used[kept])]
-            complete = half.complete
-            if len(kept) > longest:
-                complete = False
-                some = np.random.default_rng(len(kept)).permutation(len(kept))[:longest]
-                ends = [int(np.argmax((sums[kept] * d.conj()).real)) for d in DIRECTIONS]
-                kept = kept[np.unique(np.concatenate((some, ends)))]
             picks = np.column_stack((half.picks[row[kept]], option[kept].astype(np.int16)))
-            half = _Half(sums[kept], used[kept], picks, complete)
+            half = _Half(sums[kept], used[kept], picks, totals[kept], half.complete)
+            if len(kept) > most:
+                half = half.some(most)
         return half
 
     def near(self, z: complex, low: float, high: float, most: int) -> tuple[ComplexArray, IntArray] | None:
@@ -158,7 +158,9 @@ class PieceSums:
             good &= np.abs(d + self.holes.mounted) <= self.max_weight * (1 + 1e-9)
         if self.stock is not None:
             good &= (self.halves[0].used[i] + self.halves[1].used[j] <= self.stock).all(axis=1)
-        i, j, d, distance = i[good], j[good], d[good], distance[good]
+        light = np.argsort(self.halves[0].totals[i[good]] + self.halves[1].totals[j[good]], kind="stable")
+        one = np.flatnonzero(good)[light]
+        i, j, d, distance = i[one], j[one], d[one], distance[one]
         one = distinct(d, self.reach * SAME)
         one = one[np.argsort(distance[one], kind="stable")]
         return d[one], np.column_stack((i[one], j[one], np.zeros(len(one), dtype=np.int64)))
@@ -197,19 +199,34 @@ class PieceSums:
 
 
 class _Half:
-    """Sums of one half of the holes: (n,), pieces of limited stock used (n, K or 0), options (n, holes)."""
+    """Sums of one half of the holes (n,).
 
-    def __init__(self, sums: ComplexArray, used: IntArray, picks: NDArray[np.int16], complete: bool) -> None:
-        self.sums, self.used, self.picks, self.complete = sums, used, picks, complete
+    With the pieces of limited stock used (n, K or 0), the option of each hole (n, holes), total weights (n,).
+    """
+
+    def __init__(
+        self, sums: ComplexArray, used: IntArray, picks: NDArray[np.int16], totals: FloatArray, complete: bool
+    ) -> None:
+        self.sums, self.used, self.picks, self.totals, self.complete = sums, used, picks, totals, complete
+
+    def some(self, count: int) -> _Half:
+        """A random part, with the outermost sums in every direction."""
+        if count >= len(self.sums):
+            return self
+        chosen = np.random.default_rng(count).permutation(len(self.sums))[:count]
+        ends = [int(np.argmax((self.sums * d.conj()).real)) for d in DIRECTIONS]
+        kept = np.unique(np.concatenate((chosen, ends, [int(np.argmin(np.abs(self.sums)))])))
+        return _Half(self.sums[kept], self.used[kept], self.picks[kept], self.totals[kept], False)
 
     def sorted(self) -> _Half:
         order = np.argsort(-self.sums.imag)
-        return _Half(self.sums[order], self.used[order], self.picks[order], self.complete)
+        n = order
+        return _Half(self.sums[n], self.used[n], self.picks[n], self.totals[n], self.complete)
 
     @classmethod
     def empty(cls, of: PieceSums) -> _Half:
         used = np.zeros((1, of.used_of.shape[1]), dtype=np.int64)
-        return cls(np.zeros(1, dtype=complex), used, np.zeros((1, 0), dtype=np.int16), True)
+        return cls(np.zeros(1, dtype=complex), used, np.zeros((1, 0), dtype=np.int16), np.zeros(1), True)
 
 
 def _options(holes: Holes) -> tuple[IntArray, IntArray]:

@@ -62,12 +62,11 @@ class Mounted:
         return mounted_dict(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per hole that gets something: plane, hole, angle_deg, mass, unit, pieces."""
+        """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
         import pandas as pd
 
-        return pd.DataFrame(
-            self.to_dict()["holes"], columns=["plane", "hole", "angle_deg", "mass", "unit", "pieces"]
-        )
+        columns = ["plane", "action", "hole", "angle_deg", "mass", "unit", "pieces"]
+        return pd.DataFrame(self.to_dict()["holes"], columns=columns)
 
     def summary(self) -> str:
         """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""

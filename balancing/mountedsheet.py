@@ -46,8 +46,9 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
         "max_after": float(after.max()),
         "proven": m.found.proven,
         "gap": float(m.found.gap),
-        "objective": float(m.found.objective),
-        "objective_plane_by_plane": _number(m.found.rounded_objective),
+        "plane_by_plane": _number(m.found.rounded_objective / m.found.objective)
+        if m.found.objective > 0
+        else None,
     }
 
 
@@ -57,7 +58,7 @@ def summary(m: Mounted) -> str:
     unit = labels.weight_unit
     rows = [["plane", "hole", "angle", unit, "pieces"]]
     rows += [
-        [r["plane"], r["hole"], f"{r['angle_deg']:.1f}°", figures(r["mass"]), r["pieces"]]
+        [_where(r), r["hole"], f"{r['angle_deg']:.1f}°", figures(r["mass"]), r["pieces"]]
         for p in range(len(c.planes))
         for r in _holes(m, p)
     ]
@@ -85,14 +86,19 @@ def summary(m: Mounted) -> str:
     return "\n".join(lines)
 
 
+def _where(row: dict[str, Any]) -> str:
+    return f"{row['plane']} (remove)" if row["action"] == "remove" else str(row["plane"])
+
+
 def _holes(m: Mounted, p: int) -> list[dict[str, Any]]:
     """A row for each hole of a plane that gets something; one without hole where any angle is possible."""
     labels, plane = m.correction.labels, m.correction.planes[p]
-    gone = 180.0 if plane in m.correction.remove else 0.0
+    action = "remove" if plane in m.correction.remove else "add"
+    gone = 180.0 if action == "remove" else 0.0
     holes = m.holes[p]
     if holes is None:
         size, angle = labels.weight(m.weights[p])
-        return [_row(plane, "any", float(angle + gone) % 360, float(size), labels.weight_unit, "")]
+        return [_row(plane, action, "any", float(angle + gone) % 360, float(size), labels.weight_unit, "")]
     mounting = m.found.mountings[p]
     assert mounting is not None
     out = []
@@ -100,14 +106,23 @@ def _holes(m: Mounted, p: int) -> list[dict[str, Any]]:
         vector = mounting.amounts[h] * np.exp(1j * holes.angles[h])
         size, angle = labels.weight(vector)
         words = _pieces(holes, mounting, int(h), labels.weight_scale)
-        out.append(
-            _row(plane, holes.names[h], float(angle + gone) % 360, float(size), labels.weight_unit, words)
-        )
+        at = float(angle + gone) % 360
+        out.append(_row(plane, action, holes.names[h], at, float(size), labels.weight_unit, words))
     return out
 
 
-def _row(plane: str, hole: str, angle: float, mass: float, unit: str, pieces: str) -> dict[str, Any]:
-    return {"plane": plane, "hole": hole, "angle_deg": angle, "mass": mass, "unit": unit, "pieces": pieces}
+def _row(
+    plane: str, action: str, hole: str, angle: float, mass: float, unit: str, pieces: str
+) -> dict[str, Any]:
+    return {
+        "plane": plane,
+        "action": action,
+        "hole": hole,
+        "angle_deg": angle,
+        "mass": mass,
+        "unit": unit,
+        "pieces": pieces,
+    }
 
 
 def _pieces(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:

@@ -1,7 +1,8 @@
 """Pictures of a correction. Nothing here is ever shown or saved: the caller does.
 
-In every polar picture the rotor turns counter-clockwise; angles are written as the job counts them, so with
-"against rotation" (or lag phases) the numbers run clockwise and the picture stays the same.
+In every polar picture of weights the rotor turns counter-clockwise, or as the job says it turns seen from the
+stated end; angles are written as the job counts them, so with "against rotation" (or lag phases) the numbers
+run clockwise and the picture stays the same.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def overview(c: Correction) -> Figure:
 
 def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     """Polar picture of the correction weights, one arrow per plane, with 95 % regions and largest weights."""
-    polar = _polar(ax, c.labels.angle_sign)
+    polar = _polar(ax, c.labels.angle_sign * c.labels.drawn_sign)
     mass, angle = c.labels.weight(c.weights)
     regions = _regions(c)
     for p, plane in enumerate(c.planes):
@@ -128,8 +129,7 @@ def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
 
 def _legend_words(c: Correction, regions: ComplexArray | None) -> str:
     """What the lines of the polar picture mean."""
-    turn = "with" if c.labels.angle_sign > 0 else "against"
-    words = [f"angles from the mark {turn} the rotation (↺)"]
+    words = [f"{c.labels.turning_in_words()} ({'↺' if c.labels.drawn_sign > 0 else '↻'})"]
     if regions is not None:
         words.append("closed lines: 95 % regions")
     if c.limits is not None and np.isfinite(c.limits.max_weight).any():

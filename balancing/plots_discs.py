@@ -85,10 +85,10 @@ def disc(
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     ax.plot(0, 0, "+", color="black", ms=7, mew=0.9)
     _dial(ax, labels, clockwise)
-    if holes is not None:
-        _draw_holes(ax, holes, turn, largest, clockwise)
     where = [turn * w for w in put]
     reach = _room(where)
+    if holes is not None:
+        _draw_holes(ax, holes, turn, reach / np.sqrt(largest), clockwise)
     for w in where:
         _draw_weight(ax, w, reach * np.sqrt(abs(w) / largest), clockwise, remove)
     _write_weights(ax, where, labels, clockwise, remove=remove, angles=bool(len(loose)))
@@ -193,8 +193,8 @@ def _dial(ax: Axes, labels: Labels, clockwise: bool) -> None:
     ax.plot(0.965, 0, marker=(3, 0, 90), color="black", ms=9, zorder=5)
 
 
-def _draw_holes(ax: Axes, holes: Holes, turn: float, largest: float, clockwise: bool) -> None:
-    """Numbered circles; hatched with its weight where something is mounted already."""
+def _draw_holes(ax: Axes, holes: Holes, turn: float, scale: float, clockwise: bool) -> None:
+    """Numbered circles; hatched, radius scale × √weight, where something is mounted already."""
     from matplotlib.patches import Circle
 
     count = len(holes.angles)
@@ -204,7 +204,7 @@ def _draw_holes(ax: Axes, holes: Holes, turn: float, largest: float, clockwise: 
         centre = _at(_HOLES * way, clockwise)
         ax.add_patch(Circle(centre, size, fc="white", ec="0.3", lw=0.9, zorder=2))
         if holes.taken[h] > 0:
-            reach = max(_LARGEST * np.sqrt(holes.taken[h] / largest), 0.035)
+            reach = max(scale * np.sqrt(holes.taken[h]), 0.035)
             ax.add_patch(Circle(centre, reach, fc="0.85", ec="0.3", hatch="////", lw=0.9, zorder=3))
         x, y = _at(_NUMBERS * way, clockwise)
         font = "x-small" if count <= 24 else "xx-small"

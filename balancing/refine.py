@@ -320,7 +320,7 @@ def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
             words.append(
                 f"the check runs move the coefficient of plane {plane!r} on sensor {alone.sensors[c]!r} at "
                 f"{alone.speeds[s] * 30 / np.pi:.6g} rpm{within} by {_percent(change)} and "
-                f"{np.degrees(turn):+.0f}°"
+                f"{round(np.degrees(turn)):+d}°"
             )
     if words:
         words.append(
@@ -342,4 +342,4 @@ def _unclear(influence: Influence, s: int, c: int, p: int) -> bool:
 
 
 def _percent(change: float) -> str:
-    return f"{100 * change:+.0f} %" if change < _TIMES else f"more than {_TIMES:g} times"
+    return f"{round(100 * change):+d} %" if change < _TIMES else f"more than {_TIMES:g} times"

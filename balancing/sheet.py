@@ -131,8 +131,7 @@ def _corrections(c: Correction) -> str:
                 row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
         rows.append(row)
     head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
-    turn = "with" if c.labels.angle_sign > 0 else "against"
-    foot = f"Angles from the mark {turn} the rotation; phases as {c.labels.phase}."
+    foot = _wrap(f"{_capital(c.labels.turning_in_words())}; phases as {c.labels.phase}.", "")
     return f"{head}\n{table(rows)}\n{foot}"
 
 
@@ -255,16 +254,16 @@ def _limits(c: Correction) -> dict[str, Any] | None:
         "max_weight": {p: _number(w) for p, w in zip(c.planes, weight, strict=True)},
         "amplitude": [_number(a) for a in amplitude],
         "forbidden_deg": {
-            p: [_degrees_of(c, arc) for arc in arcs]
+            p: [_degrees_of(c, arc, 180.0 if p in c.remove else 0.0) for arc in arcs]
             for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
             if arcs
         },
     }
 
 
-def _degrees_of(c: Correction, arc: tuple[float, float]) -> list[float]:
-    """From and to of an arc, in the job's direction."""
-    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign
+def _degrees_of(c: Correction, arc: tuple[float, float], turn: float) -> list[float]:
+    """From and to of an arc, in the job's direction; turned to where material is taken away."""
+    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign + turn
     return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
 
 
@@ -292,6 +291,10 @@ def table(rows: list[list[str]], left: int = 1) -> str:
 
 def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _small(value: float, scale: float) -> str:

@@ -36,8 +36,9 @@ MOST_SUMS = 600_000
 _MOST_PAIRS = 2_000_000
 _TIE = 1e-10
 _EQUAL = 1e-11
+_MIX = np.int64(6364136223846793005)
 _FULL = 150_000
-"""Sums of one half where not all holes can vary; a tenth where something is limited, which takes longer."""
+"""Sums of one half where not all holes can vary; a tenth where a stock makes it slower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +109,7 @@ def nearest_pieces(target: complex, holes: Holes, most_pieces: int | None) -> tu
                 "plane, and nothing that fits these holes makes it small enough"
             )
         counts, complete = found
-        return counts, np.inf if complete else _bound(task, free)[0]
+        return counts, np.inf if complete else _bound(task, free)
     return _restricted(task, free)
 
 
@@ -174,8 +175,13 @@ def _use(task: _Task, counts: NDArray[np.int16]) -> IntArray:
 
 def _different(sums: ComplexArray, pieces: IntArray, used: IntArray, step: float) -> NDArray[np.intp]:
     """Indices of sums that differ or use something else, each with the fewest pieces."""
-    keys = [np.round(sums.real / step), np.round(sums.imag / step), *used.T]
-    order = np.lexsort((pieces, *keys))
+    keys = [np.round(z / step).astype(np.int64) for z in (sums.real, sums.imag)] + [*used.T]
+    # a hash makes equal sums neighbours, which is quicker than to sort by all keys; it decides nothing else
+    mixed = np.zeros(len(sums), dtype=np.int64)
+    for key in keys:
+        mixed = (mixed ^ key) * _MIX
+    order = np.argsort(pieces.astype(np.int16), kind="stable")
+    order = order[np.argsort(mixed[order], kind="stable")]
     new = np.ones(len(order), dtype=bool)
     new[1:] = np.any([key[order][1:] != key[order][:-1] for key in keys], axis=0)
     return np.asarray(order[new])
@@ -271,26 +277,26 @@ def _lens(task: _Task, d: float) -> float:
     return float(np.hypot(R - x, np.sqrt(R * R - x * x)))
 
 
-def _bound(task: _Task, free: NDArray[np.intp]) -> tuple[float, FloatArray]:
-    """Distance of the target from free amounts up to each hole's largest content, and these amounts."""
+def _bound(task: _Task, free: NDArray[np.intp]) -> float:
+    """No allowed vector is nearer: neither do free amounts come nearer, nor does the disc reach nearer."""
+    aside = abs(nearest_allowed(task.target, task.holes) - task.target)
+    return max(_relaxed(task, free, task.target)[0] - 1e-9 * task.scale, aside, 0.0)
+
+
+def _relaxed(task: _Task, free: NDArray[np.intp], point: complex) -> tuple[float, FloatArray]:
+    """Distance of a point from free amounts up to each hole's largest content, and these (F,)."""
     from scipy.optimize import lsq_linear
 
     ways = np.exp(1j * task.holes.angles[free])
     most = float((task.options @ task.holes.pieces).max())
-    found = lsq_linear(
-        np.vstack((ways.real, ways.imag)),
-        [task.target.real / most, task.target.imag / most],
-        bounds=(0.0, 1.0),
-        method="bvls",
-    )
-    aside = abs(nearest_allowed(task.target, task.holes) - task.target)
-    distance = float(abs(found.x @ ways * most - task.target)) - 1e-9 * task.scale
-    return max(distance, aside, 0.0), found.x * most
+    rows = np.vstack((ways.real, ways.imag))
+    found = lsq_linear(rows, [point.real / most, point.imag / most], bounds=(0.0, 1.0), method="bvls")
+    return float(abs(found.x @ ways * most - point)), found.x * most
 
 
 def _restricted(task: _Task, free: NDArray[np.intp]) -> tuple[IntArray, float]:
     """The best where only so many holes as can be listed vary about the rounded continuous answer."""
-    bound, amounts = _bound(task, free)
+    amounts = _relaxed(task, free, nearest_allowed(task.target, task.holes))[1]
     weights = task.options @ task.holes.pieces
     most = weights.max()
     # partly filled holes vary, then holes evenly around the disc
@@ -317,4 +323,4 @@ def _restricted(task: _Task, free: NDArray[np.intp]) -> tuple[IntArray, float]:
             "no weight was found that the largest weight of the plane admits: there are too many "
             "combinations; allow fewer pieces or fewer holes"
         )
-    return found[0], bound
+    return found[0], _bound(task, free)

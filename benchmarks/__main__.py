@@ -15,6 +15,7 @@ BENCHMARKS = (
     "identification",
     "time_fit",
     "balancing_solvers",
+    "balancing_discrete",
 )
 
 

@@ -30,7 +30,7 @@ def everything(holes):
 
 
 def case(seed):
-    """Random coefficients, readings, planes and row weights; all sorts of holes, small enough to enumerate."""
+    """Random coefficients, readings, planes and row weights; all sorts of holes, few enough to enumerate."""
     rng = np.random.default_rng(seed)
     P = int(rng.integers(1, 4))
     N = int(rng.integers(P, 9))
@@ -91,12 +91,10 @@ def test_limits_of_amplitudes_equal_enumeration(seed, method):
     W, Y, planes, w = case(1000 + seed)
     D = grid(planes)
     sizes = np.abs(Y + D @ W.T)
-    reading = int(np.argmin(sizes[np.argmin(objectives(method, W, Y, w, D))]))
     residual = np.full((1, len(Y)), np.inf)
     free = solve_discrete(W, Y, planes, method=method, row_weights=w)
     worst = int(np.argmax(np.abs(free.residual) - sizes.min(axis=0)))
     residual[0, worst] = 0.5 * (sizes[:, worst].min() + abs(free.residual[worst])) * (1 + 1e-6)
-    assert 0 <= reading < len(Y)
     limits = Limits(np.full(W.shape[1], np.inf), residual, ((),) * W.shape[1])
     kept = (sizes <= residual[0]).all(axis=1)
     found = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=limits)
@@ -184,7 +182,7 @@ def test_more_vectors_than_can_be_listed_give_a_gap_that_holds():
         assert abs(some[0] - z) >= all_near - 1e-12
         assert part.mount(keys[0]).vector == pytest.approx(some[0], abs=1e-12)
         assert part.lowest(z) == pytest.approx(whole.lowest(z))
-    lots = from_list(rng.uniform(0, 2 * np.pi, 40), [0.01, 0.02, 0.05], per_hole=2)
+    lots = from_list(rng.uniform(0, 2 * np.pi, 20), [0.013, 0.02, 0.05], per_hole=2)
     W = rng.standard_normal((4, 1)) + 1j * rng.standard_normal((4, 1))
     Y = rng.standard_normal(4) + 1j * rng.standard_normal(4)
     found = solve_discrete(W, Y, [lots], time_limit=2.0)
@@ -205,6 +203,15 @@ def test_forbidden_arcs_and_largest_weights():
     every = everything(holes)
     best = np.abs(every[np.abs(every) <= 0.45] - 0.5).min()
     assert abs(vector - 0.5) == pytest.approx(best, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_pieces_where_nothing_vibrates(method):
+    planes = [from_list(equal_holes(12, 0.1), [0.01, 0.02])]
+    found = solve_discrete(np.ones((3, 1)), np.zeros(3), planes, method=method)
+    assert found.proven
+    assert found.objective == 0
+    assert not found.mountings[0].counts.any()
 
 
 def test_bad_input():

@@ -92,6 +92,11 @@ def test_more_than_can_be_listed_has_an_honest_bound():
     assert "more combinations than can be tried" in found.summary(GRAMS)
     plenty = split(0.05j, from_list(angles, [0.01, 0.02, 0.03], per_hole=2))
     assert abs(plenty.error) < 1e-4 * 0.05
+    # a plane limited to less than the target: nothing better than the limit's circle, nearly reached
+    limited = split(0.05j, from_list(angles, [0.01, 0.02, 0.03], per_hole=2, max_weight=0.03))
+    assert abs(limited.mounting.vector) <= 0.03 * (1 + 1e-9)
+    assert limited.bound == pytest.approx(0.02, rel=1e-9)
+    assert abs(limited.error) == pytest.approx(0.02, rel=1e-3)
     # out of reach of all holes: everything on its side is full, which the bound proves
     far = split(9.0, from_list(angles, [0.01, 0.02, 0.03], per_hole=2))
     full = 0.06 * np.exp(1j * angles[np.cos(angles) > 0]).sum()

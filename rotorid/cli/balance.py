@@ -144,6 +144,9 @@ def balance(
             help="Add the job's check runs to its trial runs: coefficients and trim from all of them.",
         ),
     ] = False,
+    history: Annotated[
+        bool, typer.Option("--history", help="All runs and check runs of the job in one table, too.")
+    ] = False,
     best_planes: Annotated[
         int | None,
         typer.Option(
@@ -234,6 +237,8 @@ def balance(
         )
     if job.check is not None and not refine:
         report.check = compare_check(result, job.check, found.influence, found.baseline)
+    if history:
+        report.add_history(job)
     tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes)
     report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
     if trade_off:

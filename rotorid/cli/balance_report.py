@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.check import CheckComparison
+    from balancing.history import History
     from balancing.mounted import Mounted
     from balancing.subset import Subsets
     from balancing.tradeoff import TradeOff
@@ -29,6 +30,18 @@ class Report:
     curve: TradeOff | None = None
     mounted: Mounted | None = None
     verdict: Verdict | None = None
+    history: History | None = None
+
+    def add_history(self, job: Job) -> None:
+        """Run by run, what was mounted and what vibrated."""
+        from balancing.history import history
+
+        checks = () if job.check is None else (job.check,)
+        mounted = None if job.check is None or job.check_mounted else self.result
+        limits = None
+        if job.limits is not None:
+            limits = job.limits_of(self.influence.planes)
+        self.history = history(job.trials, *checks, corrections=mounted, limits=limits)
 
     def add_trade_off(self, job: Job) -> None:
         """Residual against total weight, in the planes used."""
@@ -52,6 +65,7 @@ class Report:
             "verdict": self.verdict,
             "best_planes": self.subsets,
             "trade_off": self.curve,
+            "history": self.history,
         }
         return {
             **self.result.to_dict(),
@@ -64,7 +78,7 @@ class Report:
 
     def text(self) -> str:
         """For the terminal."""
-        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve)
+        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve, self.history)
         blocks = [part.summary() for part in parts if part is not None]
         if self.result.limits is not None and (self.subsets or self.curve):
             blocks.append("The comparison of planes and the trade-off do not look at the limits.")

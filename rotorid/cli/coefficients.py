@@ -121,6 +121,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     from dataclasses import replace
 
     from balancing.modelled import model_influence
+    from rotorid.tables.units import weight
 
     if job.rotor is None:
         raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
@@ -133,7 +134,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
             f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
         )
     labels = job.trials.labels
-    by_mass = stations is None and not labels.weight_unit.endswith(("_mm", "_m", "_in"))
+    by_mass = stations is None and weight(labels.weight_unit).kind == "mass"
     if stations is not None:
         labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
     if by_mass and (lost := [p for p in job.planes if p not in job.radii]):

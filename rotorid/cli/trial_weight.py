@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 MEASURES = ("displacement", "velocity", "acceleration")
 
 
+FRACTION, SHARE, DAMPING = 10.0, 40.0, 0.05
+"""Percent of the load, percent of the largest reading, and the damping ratio, if nobody says."""
+
+
 def trial_weight(
     job: Annotated[
         Path | None,
@@ -49,10 +53,10 @@ def trial_weight(
     ] = None,
     fraction: Annotated[
         float, typer.Option(metavar="PERCENT", help="Force of the weight, of the load (without a job).")
-    ] = 10.0,
+    ] = FRACTION,
     share: Annotated[
         float, typer.Option(metavar="PERCENT", help="Change, of the largest reading (with a job).")
-    ] = 40.0,
+    ] = SHARE,
     plane: Annotated[
         str | None,
         typer.Option(metavar="LIST", help="Planes of the job; default: all of them.", show_default=False),
@@ -85,7 +89,7 @@ def trial_weight(
     ] = None,
     damping: Annotated[
         float, typer.Option(metavar="RATIO", help="Damping ratio at the critical speed.")
-    ] = 0.05,
+    ] = DAMPING,
     sensor_angle: Annotated[
         float, typer.Option(metavar="DEGREES", help="Where the sensor is (without a job).")
     ] = 0.0,
@@ -127,7 +131,12 @@ def trial_weight(
     if load is not None and rotor is not None:
         raise ValueError("--rotor-mass and --bearing-load are two ways to the same load: choose one")
     if job is None:
-        _refuse({"--plane": plane, "--mass": mass}, "needs a job with coefficients")
+        own: dict[str, object] = {
+            "--plane": plane,
+            "--mass": mass,
+            "--share": share if share != SHARE else None,
+        }
+        _refuse(own, "needs a job with coefficients")
         found = [_from_force(asked, rotor, load)]
         files: Sequence[Path] = ()
     else:
@@ -136,6 +145,12 @@ def trial_weight(
             "--lag": lag,
             "--critical": critical,
             "--speed": speed,
+            "--fraction": fraction if fraction != FRACTION else None,
+            "--damping": damping if damping != DAMPING else None,
+            "--sensor-angle": sensor_angle or None,
+            "--key-phasor": key_phasor or None,
+            "--measures": measures if measures != MEASURES[0] else None,
+            "--unit": unit if unit != "g" else None,
         }
         _refuse(needless, "is for a trial weight without a job, which has phases, speeds and coefficients")
         found, files = _from_job(job, asked, rotor, load)

@@ -53,13 +53,19 @@ def judge(
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
     from balancing.verdict import verdict_of_check, verdict_of_prediction
+    from rotorid.tables.units import weight
 
     limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
     if tolerance is None and not limited:
         return None
-    radii = {p: job.radii[p] for p in result.planes if p in job.radii} or None
-    if result.labels.weight_unit.endswith(("_mm", "_m", "_in")):
-        radii = None
+    radii = None
+    if tolerance is not None and weight(result.labels.weight_unit).kind == "mass":
+        radii = {p: job.radii[p] for p in result.planes if p in job.radii}
+        if lost := [p for p in result.planes if p not in radii]:
+            raise ValueError(
+                "a tolerance is one of unbalances, and the weights are masses: give the radius of every "
+                f"plane, radius_mm in [planes.{lost[0]}] of the job"
+            )
     if job.check is not None:
         return verdict_of_check(
             influence,

@@ -12,8 +12,6 @@ from rotorid.tables.number import LARGEST
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.textfile import read_bytes
 
-NOT_SUPPORTED = "no such key: it is not supported by this version of rotorid"
-
 
 def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
     """The content of a TOML file, or None and a problem."""
@@ -67,7 +65,6 @@ class Section:
         self._prefix = prefix
         self._where = where or {}
         self._known: list[str] = []
-        self._later: list[str] = []
 
     def __contains__(self, key: str) -> bool:
         return key in self._data
@@ -178,19 +175,12 @@ class Section:
         """Note a problem with these settings as a whole."""
         self._problems.add(self.source, None, self._prefix.rstrip(".") or None, None, expected)
 
-    def later(self, *keys: str) -> None:
-        """Keys of the interface that this version cannot obey: it says so instead of passing over them."""
-        self._later.extend(keys)
-        for key in keys:
-            if self.take(key) is not None:
-                self.complain(key, NOT_SUPPORTED)
-
     def finish(self) -> None:
         """Complain about every key that nobody took."""
         for key in self._data:
             if key not in self._known:
                 hint = did_you_mean(key, self._known)
-                known = listing([k for k in self._known if k not in self._later], "and") or "none yet"
+                known = listing(self._known, "and") or "none yet"
                 self.complain(key, f"a known key{hint}; known are {known}")
 
 

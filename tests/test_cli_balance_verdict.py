@@ -1,0 +1,87 @@
+"""`rotorid balance` with a tolerance, limits, and check runs that refine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotorid.samples import sample_data
+
+TURBO = sample_data() / "turbo_job"
+BK = sample_data() / "bk_two_plane" / "job.toml"
+GRADE = ("--grade", "G2.5", "--rotor-mass", "50kg", "--service-speed", "3000rpm")
+
+
+def test_limits_of_a_check_run_are_judged(cli):
+    found = cli("balance", TURBO / "checked.toml", "--limit", "2", "--json")
+    assert found.code == 0, found.err
+    verdict = found.json["verdict"]
+    assert verdict["verdict"] == "pass"
+    tight = cli("balance", TURBO / "checked.toml", "--limit", "0.7", "--json").json["verdict"]
+    assert tight["verdict"] == "fail"
+    failing = [r for r in tight["rows"] if r["verdict"] == "fail"]
+    assert {r["speed_rpm"] for r in failing} <= {4950, 5400}
+
+
+def test_tolerance_of_planes(cli):
+    two = ("--planes", "left,right")
+    found = cli("balance", TURBO / "checked.toml", *two, *GRADE, "--json")
+    assert found.code == 0, found.err
+    rows = found.json["verdict"]["rows"]
+    assert [r["name"] for r in rows if r["kind"] == "plane"] == ["left", "right"]
+    # 2.5 mm/s · 50 kg / 314.16 rad/s = 397.9 g·mm, shared
+    assert [r["limit"] for r in rows if r["kind"] == "plane"] == pytest.approx([198.94, 198.94], abs=0.01)
+    assert "verdict" not in cli("balance", TURBO / "job.toml", "--json").json
+
+
+def test_masses_need_radii(cli):
+    outcome = cli("balance", BK, *GRADE)
+    assert outcome.code == 2
+    assert "radius_mm" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("--grade", "G3", *GRADE[2:]), "G2.5"),
+        (GRADE[:2], "together"),
+        (("--grade", "G2.5", "--rotor-mass", "heavy", "--service-speed", "3000rpm"), "number with its unit"),
+    ],
+)
+def test_bad_tolerances(cli, args, words):
+    outcome = cli("balance", BK, *args)
+    assert outcome.code == 2
+    assert words in outcome.err
+
+
+def test_a_grade_is_for_two_planes(cli):
+    outcome = cli("balance", TURBO / "job.toml", *GRADE)
+    assert outcome.code == 2
+    assert "one or two planes" in outcome.err
+
+
+def test_check_runs_refine_the_coefficients(cli):
+    plain = cli("balance", TURBO / "checked.toml", "--json").json
+    refined = cli("balance", TURBO / "checked.toml", "--refine", "--json")
+    assert refined.code == 0, refined.err
+    found = refined.json
+    for a, b in zip(plain["corrections"], found["corrections"], strict=True):
+        assert b["mass_std"] < 0.5 * a["mass_std"]
+    assert found["mounted_in_last_run"]["run"] == "check"
+    for mounted, add, total in zip(
+        found["mounted_in_last_run"]["weights"], found["add_to_mounted"], found["corrections"], strict=True
+    ):
+        z = [w["mass"] * np.exp(1j * np.deg2rad(w["angle_deg"])) for w in (mounted, add, total)]
+        assert z[0] + z[1] == pytest.approx(z[2], abs=1e-6)
+    outcome = cli("balance", TURBO / "job.toml", "--refine")
+    assert outcome.code == 2
+    assert "no check runs" in outcome.err
+
+
+def test_history_of_a_job_in_one_table(cli):
+    found = cli("balance", TURBO / "checked.toml", "--history", "--json")
+    assert found.code == 0, found.err
+    text = str(found.json["history"])
+    for run in ("baseline", "trial 1", "trial 3", "check"):
+        assert run in text
+    assert "check" in cli("balance", TURBO / "checked.toml", "--history").out

@@ -1,0 +1,110 @@
+"""Discs: what is drawn stands where it will be mounted, as large as it is."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from balancing.holes import equal_holes, from_list, mounting
+from balancing.labels import Labels
+from balancing.plots_discs import disc, discs, seen_from
+
+GRAMS = Labels(weight_unit="g", weight_scale=1e3)
+AGAINST = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
+HOLES = from_list(equal_holes(8), [0.01, 0.04], taken=[0.02, *[0.0] * 7])
+COUNTS = np.zeros((8, 2), dtype=int)
+COUNTS[2, 0] = COUNTS[5, 1] = 1
+MOUNTED = mounting(HOLES, COUNTS)
+
+
+def axes():
+    return Figure().add_subplot()
+
+
+def texts(ax):
+    return {t.get_text(): np.array(t.get_position()) for t in ax.texts}
+
+
+def circles(ax, colour):
+    """Centres and radii of the filled circles of one grey."""
+    found = [p for p in ax.patches if isinstance(p, Circle)]
+    grey = [p for p in found if p.get_fill() and np.isclose(p.get_facecolor()[0], colour)]
+    return [(complex(*p.center), p.radius) for p in grey]
+
+
+def test_weights_stand_in_their_holes_with_area_by_mass():
+    ax = disc(axes(), "left", HOLES, MOUNTED, GRAMS, weight=0.03j)
+    (small, r1), (large, r2) = circles(ax, 0.2)
+    assert np.angle(small) == pytest.approx(np.pi / 2)
+    assert np.angle(large) == pytest.approx(np.radians(225 - 360))
+    assert (r2 / r1) ** 2 == pytest.approx(4)
+    ((taken, r3),) = circles(ax, 0.85)
+    assert np.angle(taken) == pytest.approx(0)
+    assert (r3 / r2) ** 2 == pytest.approx(0.5)
+    assert {str(k) for k in range(1, 9)} <= set(texts(ax))
+    assert {"10 g", "40 g"} <= set(texts(ax))
+    assert ax.get_title() == "left: add"
+
+
+def test_removal_stands_opposite():
+    ax = disc(axes(), "left", HOLES, MOUNTED, GRAMS, remove=True, weight=0.03j)
+    weights = [c for c in circles(ax, 1.0) if c[1] > 0.051 and abs(c[0]) > 0.5]
+    assert sorted(np.round(np.degrees([np.angle(c) for c, _ in weights]))) == [-90, 45]
+    assert {"−10 g", "−40 g"} <= set(texts(ax))
+    assert ax.get_title() == "left: take away"
+    assert "like adding, wanted" in " ".join(texts(ax))
+
+
+def test_angles_are_written_as_the_job_counts_them():
+    same, mirrored = (texts(disc(axes(), "A", HOLES, MOUNTED, labels)) for labels in (GRAMS, AGAINST))
+    np.testing.assert_allclose(same["90°"], -mirrored["90°"], atol=1e-12)
+    assert same["90°"][1] > 1
+    np.testing.assert_allclose(same["3"], mirrored["3"])
+    behind = texts(disc(axes(), "A", HOLES, MOUNTED, GRAMS, clockwise=True))
+    np.testing.assert_allclose(behind["3"], same["3"] * [1, -1], atol=1e-12)
+    assert "turns clockwise" in seen_from(GRAMS, clockwise=True)
+    assert "counter-clockwise" in seen_from(AGAINST)
+    assert "against the rotation" in seen_from(AGAINST)
+
+
+def test_tolerance_is_a_circle_around_the_wanted_weight_in_its_scale():
+    ax = disc(axes(), "A", HOLES, MOUNTED, GRAMS, weight=0.08j, tolerance=0.02)
+    (ring,) = [p for p in ax.patches if isinstance(p, Circle) and not p.get_fill()]
+    assert ring.center[0] == pytest.approx(0, abs=1e-12)
+    assert ring.radius / ring.center[1] == pytest.approx(0.25)
+    words = " ".join(texts(ax))
+    assert "permissible (dotted): 20.00 g" in words
+    error = abs(MOUNTED.vector - 0.08j) * 1e3
+    assert f"error: {error:.2g} g" in words
+
+
+def test_many_equal_weights_share_a_text_and_neighbours_do_not_cover_each_other():
+    row = [0.005 * np.exp(0.1j * k) for k in range(6)]
+    ax = disc(axes(), "A", None, None, GRAMS, loose=row)
+    assert [t for t in texts(ax) if t.startswith("6 × 5 g")] == ["6 × 5 g\n14.3°"]
+    drawn = circles(ax, 0.2)
+    assert len(drawn) == 6
+    centres = np.array([c for c, _ in drawn])
+    assert np.diff(np.abs(centres)).max() < 1e-12
+    assert drawn[0][1] <= 0.06
+    apart = disc(axes(), "A", None, None, GRAMS, loose=[0.02, 0.01 * np.exp(0.2j)])
+    near, far = (texts(apart)[name] for name in ("20 g\n0.0°", "10 g\n11.5°"))
+    assert abs(np.hypot(*far) - np.hypot(*near)) > 0.15
+
+
+def test_all_planes_side_by_side(tmp_path):
+    correction = SimpleNamespace(
+        planes=("left", "right", "fan", "coupling"),
+        weights=np.array([0.03j, 0.02, -0.01, 0]),
+        labels=AGAINST,
+        remove=("right",),
+    )
+    fig = discs(correction, {"left": HOLES}, {"left": MOUNTED}, tolerances={"right": 0.005})
+    titles = [ax.get_title() for ax in fig.axes]
+    assert titles == ["left: add", "right: take away", "fan: add", "coupling: add"]
+    assert "−20 g\n180.0°" in texts(fig.axes[1])
+    assert fig.get_suptitle() == seen_from(AGAINST)
+    fig.savefig(tmp_path / "discs.png", dpi=50)
+    assert (tmp_path / "discs.png").stat().st_size > 5000
