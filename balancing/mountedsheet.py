@@ -47,7 +47,7 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
         "proven": m.found.proven,
         "gap": float(m.found.gap),
         "plane_by_plane": _number(m.found.rounded_objective / m.found.objective)
-        if m.found.objective > 0
+        if m.found.objective > 0 and all(h is not None for h in m.holes)
         else None,
     }
 
@@ -72,8 +72,11 @@ def summary(m: Mounted) -> str:
         + f"; with any weights rms {figures(float(np.sqrt(np.mean(free**2))), 3)}, largest "
         + figures(float(free.max()), 3)
     )
+    for p, plane in enumerate(c.planes):
+        if not _holes(m, p):
+            lines.append(f"Plane {plane}: nothing; no pieces that it can take make it better.")
     found = m.found
-    if np.isfinite(found.rounded_objective) and found.objective > 0:
+    if all(h is not None for h in m.holes) and np.isfinite(found.rounded_objective) and found.objective > 0:
         lines.append(
             f"Plane by plane the nearest pieces would leave {found.rounded_objective / found.objective:.3g} "
             "times as much."
