@@ -42,6 +42,8 @@ class Mounted:
         Predicted vibration with them, (S, C).
     after_covariance
         Of a reading in a check run around it, (S, C, 2, 2); None where errors are unknown.
+    on_top_of
+        Run whose weights stay mounted; None: everything is removed before.
     """
 
     correction: Correction
@@ -49,6 +51,7 @@ class Mounted:
     found: Discrete
     after: ComplexArray
     after_covariance: FloatArray | None
+    on_top_of: str | None = None
 
     @property
     def weights(self) -> ComplexArray:
@@ -83,6 +86,7 @@ def mount(
     *,
     row_weights: FloatArray | None = None,
     time_limit: float = 5.0,
+    on_top: bool = False,
 ) -> Mounted:
     """Choose pieces for all planes together that leave the least vibration.
 
@@ -97,6 +101,8 @@ def mount(
         By plane; planes without get any weight at any angle.
     time_limit
         s, for the proof of the optimum.
+    on_top
+        Whether what is mounted in the last run stays, and pieces are added to it; otherwise it is removed.
 
     Raises
     ------
@@ -112,6 +118,10 @@ def mount(
     chosen = [influence.planes.index(plane) for plane in planes]
     W = influence.W[at][..., chosen].reshape(-1, len(chosen))
     Y = correction.before
+    stays = correction.mounted if on_top else None
+    if stays is not None:
+        there = dict(zip(stays[1], stays[2], strict=True))
+        Y = Y + influence.W[at] @ np.array([there.get(plane, 0.0) for plane in influence.planes])
     channels = None
     if start.covariance is not None and correction.errors is not None:
         index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
@@ -136,7 +146,7 @@ def mount(
     if channels is not None and correction.errors is not None:
         single = reading_covariance(after, correction.errors)
         after_covariance = single + prediction_covariance(found.weights, channels).reshape(single.shape)
-    return Mounted(correction, own, found, after, after_covariance)
+    return Mounted(correction, own, found, after, after_covariance, None if stays is None else stays[0])
 
 
 def _fewest(chosen: Mounting | None, holes: Holes | None) -> Mounting | None:

@@ -143,12 +143,16 @@ def _add(c: Correction) -> str:
     more, more_angle = c.labels.weight(c.to_add)
     unit = c.labels.weight_unit
     rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
-    rows += [
-        [plane, figures(mass[p]), _degrees(angle[p]), figures(more[p]), _degrees(more_angle[p])]
-        for p, plane in enumerate(planes)
-    ]
+    for p, plane in enumerate(planes):
+        gone = plane in c.remove
+        name = f"{plane} (remove)" if gone else plane
+        more_at = _degrees(more_angle[p] + 180 * gone)
+        rows.append([name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at])
     head = _wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
-    return f"{head}\n{table(rows)}"
+    foot = ""
+    if any(plane in c.remove for plane in planes):
+        foot = "\nWhere material is removed, the last columns say how much and where."
+    return f"{head}\n{table(rows)}{foot}"
 
 
 def _vibration(c: Correction) -> str:

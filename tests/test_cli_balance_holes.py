@@ -110,3 +110,40 @@ def test_job_without_holes(cli):
     outcome = cli("balance", TURBO / "job.toml", "--split")
     assert outcome.code == 2
     assert "no plane has holes" in outcome.err
+
+
+def test_pieces_on_top_of_what_a_check_run_had(cli, tmp_path):
+    """The pieces of the first choice are mounted and checked; the next are a small trim in free holes."""
+    job = read_job(HOLES)
+    first = cli("balance", HOLES, "--split", "--json").json["mounting"]
+    influence = estimate_influence(job.trials)
+    rows = ["run,plane,unbalance_g_mm,angle_deg"]
+    keys = []
+    total = np.zeros(3, complex)
+    for p, plane in enumerate(influence.planes):
+        own = [r for r in first["holes"] if r["plane"] == plane]
+        z = vector(own)
+        total[p] = z * 1e-6
+        rows.append(f"check,{plane},{abs(z):.9g},{np.degrees(np.angle(z)) % 360:.9g}")
+        taken = ", ".join(f'"{r["hole"]}" = {r["mass"]:.9g}' for r in own)
+        hole = "holes = 12\navailable_g_mm = [10]\nper_hole = 2\n"
+        keys.append(f"[planes.{plane}]\n{hole}taken = {{ {taken} }}\n")
+    after = influence.baseline + influence.W @ total
+    check = ["run,speed_rpm,sensor,amplitude_um_pp,phase_deg"]
+    for s, speed in enumerate(influence.speeds * 30 / np.pi):
+        for c, sensor in enumerate(influence.sensors):
+            z = after[s, c] * 2e6
+            check.append(f"check,{speed:.9g},{sensor},{abs(z):.9g},{np.degrees(np.angle(z)) % 360:.9g}")
+    path = job_with(tmp_path, "".join(keys))
+    (tmp_path / "check.csv").write_text("\n".join(check) + "\n")
+    (tmp_path / "check_weights.csv").write_text("\n".join(rows) + "\n")
+    both = 'weights = "weights.csv"\ncheck = "check.csv"\ncheck_weights = "check_weights.csv"'
+    path.write_text(path.read_text().replace('weights = "weights.csv"', both))
+    found = cli("balance", path, "--refine", "--split", "--json")
+    assert found.code == 0, found.err
+    m = found.json["mounting"]
+    assert m["on_top_of"] == "check"
+    assert all(p["mass"] < 150 for p in m["planes"])  # of a total of 400
+    assert m["rms_after"] < first["rms_after"]
+    taken = {(r["plane"], r["hole"]) for r in first["holes"]}
+    assert not taken & {(r["plane"], r["hole"]) for r in m["holes"]}

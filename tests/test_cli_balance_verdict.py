@@ -85,3 +85,24 @@ def test_history_of_a_job_in_one_table(cli):
     for run in ("baseline", "trial 1", "trial 3", "check"):
         assert run in text
     assert "check" in cli("balance", TURBO / "checked.toml", "--history").out
+
+
+def test_positions_share_the_tolerance(cli, tmp_path):
+    picture = tmp_path / "residuals.png"
+    places = ("--positions", "left=0.8m,right=2.5m", "--bearings", "0.318m,2.9m", "--centre", "1.6m")
+    base = ("balance", TURBO / "checked.toml", "--planes", "left,right", *GRADE, *places)
+    outcome = cli(*base, "--plot", picture)
+    assert outcome.code == 0, outcome.err
+    assert picture.stat().st_size > 10_000
+    rows = cli(*base, "--json").json["verdict"]["rows"]
+    bearings = [r["limit"] for r in rows if r["kind"] == "bearing"]
+    # by the distance of the centre of mass: (2.9 − 1.6)/(2.9 − 0.318) of 397.9 g·mm at A
+    assert bearings == pytest.approx([397.887 * 1.3 / 2.582, 397.887 * 1.282 / 2.582], rel=1e-4)
+    assert "must name the planes" in cli(*base[:-6], "--positions", "left=1m", *places[2:]).err
+
+
+def test_pieces_do_not_go_with_ridge_or_truncation(cli):
+    for option in (("--ridge", "0.1"), ("--truncate", "2")):
+        outcome = cli("balance", TURBO / "holes.toml", "--split", *option)
+        assert outcome.code == 2
+        assert "would undo" in outcome.err

@@ -3,6 +3,8 @@
 import pandas as pd
 import pytest
 
+from rotorid.samples import sample_data
+
 USUAL = ("tolerance", "--mass", "500kg", "--speed", "3000rpm", "--grade", "G2.5")
 SHAFT = ("--planes", "left=100mm,right=600mm", "--bearings", "0mm,700mm", "--centre", "350mm")
 
@@ -89,3 +91,20 @@ def test_help_has_examples(cli):
     assert "Example: rotorid tolerance --mass 500kg --speed 3000rpm --grade G2.5" in " ".join(
         outcome.out.split()
     )
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ("tolerance", "--mass", "500kg", "--speed", "3000", "--grade", "G2.5"),
+        ("trial-weight", "--rotor-mass", "500kg", "--speed", "3000", "--radius", "200mm"),
+        (
+            *("balance", sample_data() / "turbo_job" / "job.toml", "--planes", "left,right"),
+            *("--grade", "G2.5", "--rotor-mass", "500kg", "--service-speed", "3000"),
+        ),
+    ],
+)
+def test_speeds_need_their_unit(cli, args):
+    outcome = cli(*args)
+    assert outcome.code == 2
+    assert "needs its unit" in outcome.err

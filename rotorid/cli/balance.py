@@ -168,6 +168,21 @@ def balance(
     service_speed: Annotated[
         str | None, typer.Option(metavar="SPEED", help="For --grade, such as 3000rpm.", show_default=False)
     ] = None,
+    positions: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.",
+            show_default=False,
+        ),
+    ] = None,
+    bearings: Annotated[
+        str | None, typer.Option(metavar="A,B", help="For --positions, 0mm,700mm.", show_default=False)
+    ] = None,
+    centre: Annotated[
+        str | None,
+        typer.Option(metavar="POSITION", help="For --positions: of the centre of mass.", show_default=False),
+    ] = None,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
@@ -187,12 +202,17 @@ def balance(
     from balancing.mounted import mount
     from rotorid.cli.balance_report import Report
     from rotorid.cli.coefficients import choose, compare_planes
-    from rotorid.cli.verdict import judge, tolerance_of
+    from rotorid.cli.verdict import Places, judge, tolerance_of
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.influence import influence_bytes
     from rotorid.tables.joblimits import with_limits
 
     _check_options(method, coefficients, ridge, truncate)
+    if split and (ridge is not None or truncate is not None):
+        raise ValueError(
+            "--split takes the planes as they are, and would undo --ridge and --truncate: use fewer planes "
+            "(--planes, --best-planes) instead"
+        )
     check_targets(plot, output, save_influence)
     targets = [path for path in (plot, output, save_influence) if path is not None]
     check_inputs(targets, [*files, *([influence] if influence is not None else [])])
@@ -234,12 +254,14 @@ def balance(
             job.holes,
             row_weights=job.row_weights,
             time_limit=split_seconds,
+            on_top=refine,
         )
     if job.check is not None and not refine:
         report.check = compare_check(result, job.check, found.influence, found.baseline)
     if history:
         report.add_history(job)
-    tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes)
+    places = Places(positions, bearings, centre)
+    tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes, places)
     report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
     if trade_off:
         report.add_trade_off(job)
@@ -265,6 +287,9 @@ def balance(
             "grade": grade,
             "rotor_mass": rotor_mass,
             "service_speed": service_speed,
+            "positions": positions,
+            "bearings": bearings,
+            "centre": centre,
         },
         figure=(plot, report.figure),
         table=(output, report.frame),

@@ -97,7 +97,21 @@ class Report:
                 {p: k for p, k in zip(planes, m.found.mountings, strict=True) if k is not None},
                 clockwise=self.result.labels.drawn_sign < 0,
             )
+        if self.verdict is not None and any(row.kind == "plane" for row in self.verdict.rows):
+            return self._with_tolerance(self.verdict)
         return plots.overview(self.result) if self.curve is None else plots_tradeoff.overview(self.curve)
+
+    def _with_tolerance(self, verdict: Verdict) -> Figure:
+        """Corrections, and residual unbalance inside or outside its tolerance circles."""
+        from matplotlib.figure import Figure
+
+        from balancing import plots
+        from balancing.plots_tolerance import residuals
+
+        figure = Figure(figsize=(11, 7.5), layout="constrained")
+        plots.corrections(self.result, figure.add_subplot(1, 2, 1, projection="polar"))
+        residuals(verdict, figure.add_subplot(1, 2, 2, projection="polar"))
+        return figure
 
     def _stack(self, job: Job, planes: tuple[str, ...]) -> tuple[Any, Any, Any]:
         """W (N, P), Y (N,) and row weights (N,) of the speeds used."""

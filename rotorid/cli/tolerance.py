@@ -58,12 +58,12 @@ def tolerance(
     from rotorid.tables import units
 
     check_targets(plot, output)
-    ends = None if bearings is None else _two(bearings)
+    ends = None if bearings is None else two_positions(bearings)
     found = permissible(
         quantity(mass, "--mass", units.MASS, "500kg"),
-        one_speed(speed, "--speed"),
+        speed_with_unit(speed, "--speed"),
         grade,
-        planes=None if planes is None else _planes(planes),
+        planes=None if planes is None else plane_positions(planes),
         bearings=ends,
         centre=None if centre is None else quantity(centre, "--centre", units.LENGTH, "350mm"),
     )
@@ -110,7 +110,21 @@ def quantity(text: str, what: str, known: Mapping[str, Unit], example: str) -> f
     return unit.to_si(value)
 
 
-def _planes(text: str) -> dict[str, float | None]:
+def speed_with_unit(text: str, what: str) -> float:
+    """Read "3000rpm" in rad/s.
+
+    Raises
+    ------
+    ValueError
+        Without a unit: a number alone would be taken for rad/s by one, and for rpm by the other.
+    """
+    if not any(letter.isalpha() for letter in text):
+        raise ValueError(f"{what} {text!r}: a speed needs its unit here, such as 3000rpm, 50Hz or 314rad_s")
+    return one_speed(text, what)
+
+
+def plane_positions(text: str) -> dict[str, float | None]:
+    """Read "left=100mm,right=600mm" in m; None where there is no position."""
     from rotorid.tables.units import LENGTH
 
     found: dict[str, float | None] = {}
@@ -127,7 +141,8 @@ def _planes(text: str) -> dict[str, float | None]:
     return found
 
 
-def _two(text: str) -> tuple[float, float]:
+def two_positions(text: str) -> tuple[float, float]:
+    """Read "0mm,700mm" in m."""
     from rotorid.tables.units import LENGTH
 
     parts = text.split(",")

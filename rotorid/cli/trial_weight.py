@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names, one_speed
-from rotorid.cli.tolerance import quantity
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names
+from rotorid.cli.tolerance import quantity, speed_with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -186,7 +186,7 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
     known = Conventions(as_phase(asked["phase"] or "lead"), as_angles(asked["angles"] or "with rotation"))
     shown = units.one_of(units.MASS)(asked["unit"])
     labels = Labels(weight_unit=shown.name, weight_scale=shown.scale, phase=known.phase, angles=known.angles)
-    speed = one_speed(asked["speed"], "--speed")
+    speed = speed_with_unit(asked["speed"], "--speed")
     phase = asked["reading_phase"]
     return trial_from_force(
         "1",
@@ -267,7 +267,7 @@ def _lag(asked: dict[str, Any], speed: float) -> Lag | None:
     if text is not None and critical is not None:
         raise ValueError("--lag and --critical are two ways to the same end: choose one")
     if critical is not None:
-        at = one_speed(critical, "--critical")
+        at = speed_with_unit(critical, "--critical")
         if not at > 0:
             raise ValueError(f"--critical {critical!r}: a critical speed above 0 is needed")
         return expected_lag(ratio=speed / at, damping=asked["damping"])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.cli.common import one_speed
-from rotorid.cli.tolerance import quantity
+from rotorid.cli.tolerance import plane_positions, quantity, speed_with_unit, two_positions
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
@@ -17,21 +17,30 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
 
 
+@dataclass(frozen=True)
+class Places:
+    """Where planes, bearings and the centre of mass are, as the command line says it."""
+
+    positions: str | None
+    bearings: str | None
+    centre: str | None
+
+
 def tolerance_of(
-    grade: str | None, mass: str | None, service_speed: str | None, planes: tuple[str, ...]
+    grade: str | None, mass: str | None, service_speed: str | None, planes: tuple[str, ...], places: Places
 ) -> Tolerance | None:
-    """Tolerance of one or two planes in equal parts; None where no grade is given.
+    """Tolerance of one or two planes; None where no grade is given.
 
     Raises
     ------
     ValueError
-        For some of the three options only, more than two planes, and values that cannot be.
+        For some of the options only, more than two planes, and values that cannot be.
     """
     from balancing.tolerance import tolerance
     from rotorid.tables import units
 
-    given = [value is not None for value in (grade, mass, service_speed)]
-    if not any(given):
+    along = (places.positions, places.bearings, places.centre)
+    if grade is None and mass is None and service_speed is None and not any(along):
         return None
     if grade is None or mass is None or service_speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
@@ -40,11 +49,16 @@ def tolerance_of(
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
+    at = dict.fromkeys(planes) if places.positions is None else plane_positions(places.positions)
+    if set(at) != set(planes):
+        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
     return tolerance(
         quantity(mass, "--rotor-mass", units.MASS, "500kg"),
-        one_speed(service_speed, "--service-speed"),
+        speed_with_unit(service_speed, "--service-speed"),
         grade,
-        planes=dict.fromkeys(planes),
+        planes=at,
+        bearings=None if places.bearings is None else two_positions(places.bearings),
+        centre=None if places.centre is None else quantity(places.centre, "--centre", units.LENGTH, "350mm"),
     )
 
 
@@ -79,6 +93,6 @@ def judge(
         result,
         tolerance=tolerance,
         radii=radii,
-        mounted=None if mounted is None else mounted.weights,
+        mounted=None if mounted is None or mounted.on_top_of is not None else mounted.weights,
         after=None if mounted is None else mounted.after,
     )
