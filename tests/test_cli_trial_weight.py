@@ -38,7 +38,7 @@ def test_amount_from_the_load(weights):
         "--bearing-load", "1102.31131lbf", "--speed", "50Hz", "--radius", "7.874015748in", "--unit", "oz"
     )
     assert ounces["mass"] == pytest.approx(24.8405 / 28.349523, rel=1e-4)
-    (kilo,) = weights("--bearing-load", "2.5kN", "--speed", "314.159265", "--radius", "0.2m")
+    (kilo,) = weights("--bearing-load", "2.5kN", "--speed", "314.159265rad_s", "--radius", "0.2m")
     assert kilo["mass"] == pytest.approx(1e3 * 250 / (0.2 * 314.159265**2))
 
 
