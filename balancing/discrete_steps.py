@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.discrete_sets import DIRECTIONS, LONGEST, SAME, Attainable, PieceSums, disc_lowest, distinct
-from balancing.holes import Holes, Mounting, mounting
+from balancing.holes import WIDEST, Holes, Mounting, mounting
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -55,7 +55,7 @@ class StepSums:
         pairs: list[tuple[int, int]] = []
         for k, gap in enumerate(after):
             following = int(where[(k + 1) % len(where)])
-            close = len(where) > 1 and gap < np.pi - 1e-6
+            close = len(where) > 1 and gap <= WIDEST
             pairs.append((int(where[k]), following if close else -1))
         self.pairs = pairs
         self.directions = np.exp(1j * holes.angles[where])

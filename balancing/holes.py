@@ -19,6 +19,8 @@ BoolArray = NDArray[np.bool_]
 
 __all__ = ["Holes", "Mounting", "equal_holes", "from_list", "mounting"]
 
+WIDEST = 2 * np.pi / 3 + 1e-6
+"""Angle between two holes that share a free amount, at most."""
 _SAME_ANGLE = 1e-6
 
 
@@ -32,7 +34,8 @@ class Holes:
         Of the holes, rad with the rotation, −2π … 4π, in any order, different from each other, shape (H,).
     pieces
         Weights of which each can be mounted, > 0, each size listed once, shape (K,). Empty: amounts are free,
-        in multiples of `step` (or any where that is 0), in one hole or two neighbouring free holes.
+        in multiples of `step` (or any where that is 0), in one hole or in two neighbouring free ones not more
+        than 120° apart (farther apart, amounts would be larger than what they make).
     per_hole
         Pieces in one hole at most; has no meaning for free amounts.
     step

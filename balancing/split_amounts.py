@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.holes import Holes
+from balancing.holes import WIDEST, Holes
 
 FloatArray = NDArray[np.float64]
 
@@ -77,14 +77,14 @@ def nearest_allowed(target: complex, holes: Holes) -> complex:
 
 
 def _neighbours(target: complex, holes: Holes, free: NDArray[np.intp]) -> list[tuple[int, int]]:
-    """Pairs of neighbouring free holes less than half a turn apart, the first one behind."""
+    """Pairs of neighbouring free holes at most `WIDEST` apart, the first one behind."""
     toward = np.cos(holes.angles - np.angle(target))
     turned = np.mod(holes.angles[free], 2 * np.pi)
     order = np.argsort(turned, kind="stable")
     pairs = []
     for k in range(len(order)):
         g, h = order[k], order[(k + 1) % len(order)]
-        if g != h and np.mod(turned[h] - turned[g], 2 * np.pi) < np.pi - 1e-9:
+        if g != h and np.mod(turned[h] - turned[g], 2 * np.pi) <= WIDEST:
             pairs.append((int(free[g]), int(free[h])))
     # the pair around the target first: its error leaves little to look for in the others
     return sorted(pairs, key=lambda pair: -(toward[pair[0]] + toward[pair[1]]))

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from balancing.holes import equal_holes, from_list
+from balancing.holes import WIDEST, equal_holes, from_list
 from balancing.labels import Labels
 from balancing.split import fewer_pieces, percent, split
 
@@ -128,7 +128,7 @@ def test_free_amounts_in_steps_equal_trying_everything(seed):
     multiples = np.arange(0, 61) * step
     best = np.inf
     for g, h in [(k, (k + 1) % H) for k in range(H)]:
-        if np.mod(angles[h] - angles[g], 2 * np.pi) < np.pi:
+        if np.mod(angles[h] - angles[g], 2 * np.pi) <= WIDEST:
             vectors = multiples[:, None] * np.exp(1j * angles[g]) + multiples * np.exp(1j * angles[h])
         else:
             vectors = multiples[:, None] * np.exp(1j * angles[[g, h]])
@@ -138,11 +138,11 @@ def test_free_amounts_in_steps_equal_trying_everything(seed):
 
 
 def test_free_amounts_fill_the_sector_between_neighbours():
-    holes = from_list(np.radians([0, 90, 200]))
+    holes = from_list(np.radians([0, 90, 200, 260]))
     found = split(3 + 4j, holes)
-    np.testing.assert_allclose(found.mounting.amounts, [3, 4, 0], atol=1e-12)
+    np.testing.assert_allclose(found.mounting.amounts, [3, 4, 0, 0], atol=1e-12)
     assert abs(found.error) < 1e-12
-    # 300° lies in the sector from 200° to 360°
+    # 300° lies in the sector from 260° to 360°
     assert abs(split(2 * np.exp(1j * np.radians(300)), holes).error) < 1e-12
     # limited: the nearest vector of that size
     limited = split(3 + 4j, from_list(np.radians([0, 90, 200]), max_weight=2.5))
