@@ -107,7 +107,8 @@ def mount(
     Raises
     ------
     ValueError
-        Where no plane has holes, or nothing that can be mounted keeps the limits.
+        Where no plane has holes, nothing that can be mounted keeps the limits, or weights stay in holes that
+        nobody names (`Holes.taken`).
     """
     planes = correction.planes
     own = tuple(holes.get(plane) for plane in planes)
@@ -121,6 +122,14 @@ def mount(
     stays = correction.mounted if on_top else None
     if stays is not None:
         there = dict(zip(stays[1], stays[2], strict=True))
+        unnamed = [
+            p for p, h in zip(planes, own, strict=True) if h and there.get(p, 0.0) and not h.taken.any()
+        ]
+        if unnamed:
+            raise ValueError(
+                f"the holes in which weights of run {stays[0]!r} stand are not named, and must stay free: "
+                f'taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
+            )
         Y = Y + influence.W[at] @ np.array([there.get(plane, 0.0) for plane in influence.planes])
     channels = None
     if start.covariance is not None and correction.errors is not None:

@@ -147,3 +147,8 @@ def test_pieces_on_top_of_what_a_check_run_had(cli, tmp_path):
     assert m["rms_after"] < first["rms_after"]
     taken = {(r["plane"], r["hole"]) for r in first["holes"]}
     assert not taken & {(r["plane"], r["hole"]) for r in m["holes"]}
+    # the same without saying in which holes the weights of the check run stand
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if not line.startswith("taken")))
+    outcome = cli("balance", path, "--refine", "--split")
+    assert outcome.code == 2
+    assert "not named" in outcome.err
