@@ -16,6 +16,7 @@ BENCHMARKS = (
     "time_fit",
     "balancing_solvers",
     "balancing_discrete",
+    "reduction",
 )
 
 

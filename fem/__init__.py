@@ -22,6 +22,7 @@ from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, 
 from fem.sensors import Sensor
 from fem.speedmap import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
+from fem.statespace import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.vibration import BearingForces, InfluenceCoefficients, Response
 from fem.whirl import WhirlModes, whirl_modes
@@ -48,6 +49,7 @@ __all__ = [
     "Sensor",
     "SpeedMap",
     "Stability",
+    "StateSpace",
     "StaticDeflection",
     "Support",
     "WhirlModes",
@@ -65,6 +67,7 @@ __all__ = [
     "required_margin",
     "speed_map",
     "stability_threshold",
+    "state_space",
     "static_deflection",
     "unbalance_response",
     "whirl_direction",

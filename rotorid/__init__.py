@@ -16,21 +16,29 @@ if TYPE_CHECKING:
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model
     from rotorid.harmonic import identify as identify
+    from rotorid.reduction import InputErrors as InputErrors
     from rotorid.reduction import Reduction as Reduction
+    from rotorid.reduction import compare_methods as compare_methods
     from rotorid.reduction import equivalent_masses as equivalent_masses
     from rotorid.reduction import mac as mac
     from rotorid.reduction import natural_frequencies as natural_frequencies
+    from rotorid.reduction import rank_nodes as rank_nodes
     from rotorid.reduction import reduce as reduce
+    from rotorid.reduction import reduce_measured as reduce_measured
+    from rotorid.reduction import small_rotor as small_rotor
     from rotorid.regression import least_squares as least_squares
     from rotorid.regression import stack as stack
     from rotorid.regression import stretch as stretch
     from rotorid.regression import unstretch as unstretch
     from rotorid.tables import InputError as InputError
     from rotorid.tables import Job as Job
+    from rotorid.tables import read_compliance as read_compliance
     from rotorid.tables import read_harmonic_model as read_harmonic_model
     from rotorid.tables import read_influence as read_influence
     from rotorid.tables import read_job as read_job
     from rotorid.tables import read_measurements as read_measurements
+    from rotorid.tables import read_modes as read_modes
+    from rotorid.tables import read_motion as read_motion
     from rotorid.tables import read_ode_model as read_ode_model
     from rotorid.tables import read_record as read_record
     from rotorid.tables import read_rotor as read_rotor
@@ -67,6 +75,11 @@ _HOME = {
     "Fit": "timedomain.result",
     # a rotor as a few masses
     "reduce": "reduction",
+    "reduce_measured": "reduction",
+    "rank_nodes": "reduction",
+    "compare_methods": "reduction",
+    "small_rotor": "reduction",
+    "InputErrors": "reduction",
     "Reduction": "reduction",
     "equivalent_masses": "reduction",
     "natural_frequencies": "reduction",
@@ -81,6 +94,9 @@ _HOME = {
     "read_job": "tables",
     "read_harmonic_model": "tables",
     "read_measurements": "tables",
+    "read_modes": "tables",
+    "read_compliance": "tables",
+    "read_motion": "tables",
     "read_ode_model": "tables",
     "read_record": "tables",
     "Job": "tables",

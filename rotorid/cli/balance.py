@@ -293,9 +293,7 @@ def balance(
         },
         figure=(plot, report.figure),
         table=(output, report.frame),
-        more=None
-        if save_influence is None
-        else (save_influence, lambda: influence_bytes(save_influence, found.influence)),
+        more=[(save_influence, lambda: influence_bytes(save_influence or Path(), found.influence))],
     )
 
 

@@ -42,6 +42,7 @@ OperatingOption = Annotated[
 
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
+STATE_SPACES = (".json", ".npz", ".mat")
 
 
 def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str, Any]:
@@ -62,10 +63,15 @@ def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str
 
 
 def check_targets(
-    plot: Path | None, output: Path | None, *more: Path | None, model: Path | None = None
+    plot: Path | None,
+    output: Path | None,
+    *more: Path | None,
+    model: Path | None = None,
+    state_space: Path | None = None,
 ) -> None:
     """Refuse files that could not be written, before any work is done; `more` are tables, too."""
-    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more), (model, (".toml",))]
+    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more)]
+    targets += [(model, (".toml",)), (state_space, STATE_SPACES)]
     asked: list[Path] = []
     for path, endings in targets:
         if path is None:
@@ -111,20 +117,19 @@ def emit(
     options: Mapping[str, object],
     figure: tuple[Path | None, Callable[[], Figure]] | None = None,
     table: tuple[Path | None, Callable[[], pd.DataFrame]] | None = None,
-    more: tuple[Path | None, Callable[[], bytes]] | None = None,
+    more: Sequence[tuple[Path | None, Callable[[], bytes]]] = (),
 ) -> None:
     """Print a result as text or JSON; write its picture, its table and `more`, all of them or none."""
     from rotorid.tables.writing import table_bytes, write_files
 
-    check_inputs([t[0] for t in (figure, table, more) if t and t[0]], files)
+    check_inputs([t[0] for t in (figure, table, *more) if t and t[0]], files)
     record = provenance(files, options)
     written: dict[Path, bytes] = {}
     if figure and figure[0]:
         written[figure[0]] = figure_bytes(figure[1](), figure[0])
     if table and table[0]:
         written[table[0]] = table_bytes(table[0], table[1]())
-    if more and more[0]:
-        written[more[0]] = more[1]()
+    written |= {path: build() for path, build in more if path is not None}
     write_files(written)
     if as_json:
         typer.echo(

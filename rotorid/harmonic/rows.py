@@ -134,7 +134,7 @@ def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
             kind = "input" if name in model.inputs else "signal"
             raise ValueError(
                 f"the {kind} {name} of the model is not among the measurements (they have {given}); "
-                f"measure it, or make it known or a parameter"
+                "measure it, make it known or a parameter, or use the method output-error, which predicts it"
             )
     for name in experiments.signals:
         if name in model.known or name in model.parameters:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import fem
 from fem.matrices import ignored_inertia
 from rotorid.estimate import Estimate
-from rotorid.reduction.masses import equivalent_masses
-from rotorid.reduction.result import Reduction
+from rotorid.reduction.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
+from rotorid.reduction.plane import plane_at_rest
+from rotorid.reduction.result import Choices, Reduction
 from rotorid.reduction.sensitivity import mass_sensitivity
+from rotorid.reduction.separated import separate
+from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
 from rotorid.reduction.vibration import like, mac, natural_frequencies
 
 FloatArray = NDArray[np.float64]
@@ -24,14 +28,28 @@ SENSITIVE = 0.1
 ALIKE = 0.9
 """Below this MAC two shapes are not those of one mode."""
 
+APART = 0.05
+"""A measured frequency that differs by more from the rotor's is said."""
+
 
 def reduce(
-    rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2, *, speed: float | None = None
+    rotor: fem.Rotor,
+    nodes: Sequence[int],
+    modes: int = 2,
+    *,
+    speed: float | None = None,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+    nonnegative: bool = False,
+    measured: tuple[ArrayLike, ArrayLike] | None = None,
+    supports_apart: bool = False,
+    errors: InputErrors | None = None,
 ) -> Reduction:
     """Reduce a rotor to masses at chosen nodes by regression over its first modes.
 
     Formula (50) is one of a plane that does not turn: of a rotor with gyroscopic effect, or on supports that
-    are more than constant isotropic springs, the plane x at rest is reduced, and `warnings` say so.
+    are more than constant isotropic springs, the plane x at rest is reduced, and `warnings` say so. What
+    turns, couples and damps comes back in `Reduction.small`.
 
     Parameters
     ----------
@@ -40,100 +58,223 @@ def reduce(
     nodes
         Different node numbers, from 1, where the masses stand.
     modes
-        How many of the rotor's modes the regression uses, 1 … n.
+        How many of the modes the regression uses, 1 … n.
     speed
         Where tables of supports are read, rad/s; by default their lowest common speed.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`; the defaults are those of [S].
+    measured
+        Frequencies, rad/s (k,), and shapes at the nodes (n, k), used instead of the computed ones.
+    supports_apart
+        Take the compliance from (47): that of the shaft on rigid supports, and the two bearings beside it;
+        seals at the masses then stand in the right side of (50).
+    errors
+        Relative standard deviations of the inputs: then `uncertainty` has those of masses and frequencies.
 
     Raises
     ------
     ValueError
         For a speed outside a table, nodes that do not exist or repeat, a number of modes out of range, a
-        rotor free to move, or masses that these modes do not determine.
+        rotor free to move, masses that these modes do not determine, or supports that cannot be set apart.
 
     Notes
     -----
     Source: [S] 1.10, tasks 9.1 and 9.2. The frequencies of the small model come from its own eigenvalue
     problem, so their agreement with the rotor's is a check, also for the modes that the regression used.
     """
-    places = tuple(int(n) for n in nodes)
+    places = _places(rotor, nodes)
     n = len(places)
-    if n == 0 or len(set(places)) != n:
-        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
-    bad = [p for p in places if not 1 <= p <= rotor.n_nodes]
-    if bad:
-        raise ValueError(f"node {bad[0]} does not exist: this rotor has nodes 1 … {rotor.n_nodes}")
-    if not 1 <= modes <= n:
-        raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
-    plane, said = _plane_at_rest(rotor, speed)
-    alpha = fem.compliance(plane, places)
+    plane, said = plane_at_rest(rotor, speed)
     full = fem.critical_speeds(plane, n)
     index = np.array(places) - 1
-    rotor_shapes = full.shapes[index]
-    estimate = equivalent_masses(alpha, full.frequencies[:modes], rotor_shapes[:, :modes])
+    seals, apart = np.zeros(n), None
+    if supports_apart:
+        bare, seals = _without_seals(plane, places)
+        apart = separate(bare, places)
+        alpha = apart.compliance(_at_nodes(bare, apart.supports))
+    else:
+        alpha = fem.compliance(plane, places)
+    if measured is None:
+        omega, shapes = full.frequencies, full.shapes[index]
+    else:
+        omega, shapes = _modes(measured, n)
+        said += _apart(omega, full.frequencies)
+    result = _reduced(
+        places,
+        alpha,
+        seals,
+        omega,
+        shapes,
+        modes,
+        Choices("rotor" if measured is None else "measured", normalise, rows, nonnegative),
+        errors,
+    )
+    return dataclasses.replace(
+        result,
+        rotor=rotor,
+        rotor_modes=full,
+        separated=apart,
+        warnings=(*said, *_of_shaft(rotor, full), *result.warnings),
+    )
+
+
+def reduce_measured(
+    compliance: ArrayLike,
+    frequencies: ArrayLike,
+    shapes: ArrayLike,
+    modes: int | None = None,
+    *,
+    nodes: Sequence[int | str] | None = None,
+    seal_stiffness: ArrayLike = 0.0,
+    normalise: Normalisation = "first",
+    rows: RowWeights = "equal",
+    nonnegative: bool = False,
+    errors: InputErrors | None = None,
+) -> Reduction:
+    """Find equivalent masses of a rotor of which compliance and modes are given, without a model of it.
+
+    Parameters
+    ----------
+    compliance
+        m/N, shape (n, n).
+    frequencies, shapes
+        Measured, rad/s (k,), and at the masses (n, k).
+    modes
+        How many of them the regression uses; default all.
+    nodes
+        Names of the places, 1 … n by default.
+    seal_stiffness, normalise, rows, nonnegative
+        As in `equivalent_masses`.
+    errors
+        As in `reduce`.
+
+    Raises
+    ------
+    ValueError
+        As `equivalent_masses`, and for masses that these modes do not determine.
+    """
+    alpha = np.asarray(compliance, dtype=float)
+    n = len(alpha)
+    omega, U = _modes((frequencies, shapes), n)
+    places = tuple(nodes) if nodes is not None else tuple(range(1, n + 1))
+    if len(places) != n or len(set(places)) != n:
+        raise ValueError(f"{n} different names of places are needed; got {list(places)}")
+    seals = np.broadcast_to(np.asarray(seal_stiffness, dtype=float), (n,)).copy()
+    return _reduced(
+        places,
+        alpha,
+        seals,
+        omega,
+        U,
+        len(omega) if modes is None else modes,
+        Choices("measured", normalise, rows, nonnegative),
+        errors,
+    )
+
+
+def _reduced(
+    places: tuple[int | str, ...],
+    alpha: FloatArray,
+    seals: FloatArray,
+    omega: FloatArray,
+    shapes: FloatArray,
+    modes: int,
+    choices: Choices,
+    errors: InputErrors | None,
+) -> Reduction:
+    """The regression and its checks, whatever the inputs come from."""
+    n, most = len(places), min(len(places), len(omega))
+    if not 1 <= modes <= most:
+        raise ValueError(f"{n} masses can use 1 … {most} modes; got {modes}")
+    used = omega[:modes], shapes[:, :modes]
+    how: dict[str, Any] = {"seal_stiffness": seals, "normalise": choices.normalise, "rows": choices.rows}
+    estimate = equivalent_masses(alpha, *used, **how, nonnegative=choices.nonnegative)
     if not estimate.full_rank:
         raise ValueError(
             f"the first {modes} mode(s) do not determine the masses at nodes {list(places)}: "
             f"{estimate.describe_rank()}; use more modes or other nodes"
         )
-    sensitivity = mass_sensitivity(alpha, full.frequencies[:modes], rotor_shapes[:, :modes])
-    omega, shapes = natural_frequencies(alpha, estimate.solution)
-    shapes = like(shapes, rotor_shapes)
-    agreement = np.diag(mac(shapes, rotor_shapes))[:modes]
+    sensitivity = mass_sensitivity(alpha, *used, **how)
+    uncertainty: MassUncertainty | None = None
+    bound = estimate.warnings if isinstance(estimate, BoundedEstimate) else ()
+    if errors is not None and bound:
+        bound += ("what the stated errors do was not computed: masses at a bound do not follow them",)
+    elif errors is not None:
+        uncertainty = mass_uncertainty(alpha, *used, errors, **how)
+    frequencies, own = natural_frequencies(alpha, estimate.solution, seal_stiffness=seals)
+    compared = shapes[:, :n]
+    own[:, : compared.shape[1]] = like(own[:, : compared.shape[1]], compared)
+    agreement = np.diag(mac(own, compared))[:modes]
     return Reduction(
-        rotor=rotor,
+        rotor=None,
         nodes=places,
-        positions=rotor.positions[index],
         modes=modes,
         masses=estimate,
         sensitivity=sensitivity,
         compliance=alpha,
-        frequencies=omega,
-        shapes=shapes,
-        rotor_modes=full,
-        rotor_shapes=rotor_shapes,
-        warnings=(
-            *said,
-            *_of_shaft(rotor, full),
-            *_warnings(estimate, sensitivity, omega, places, agreement),
-        ),
+        seal_stiffness=seals,
+        frequencies=frequencies,
+        shapes=own,
+        rotor_frequencies=omega[:n],
+        rotor_shapes=compared,
+        rotor_modes=None,
+        choices=choices,
+        uncertainty=uncertainty,
+        separated=None,
+        warnings=(*bound, *_warnings(estimate, sensitivity, frequencies, places, agreement)),
     )
 
 
-def _plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, list[str]]:
-    """The rotor's plane x without rotation, on springs to the ground or to pedestals, and what to say of it.
+def _places(rotor: fem.Rotor, nodes: Sequence[int]) -> tuple[int, ...]:
+    places = tuple(int(n) for n in nodes)
+    if not places or len(set(places)) != len(places):
+        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    bad = [p for p in places if not 1 <= p <= rotor.n_nodes]
+    if bad:
+        raise ValueError(f"node {bad[0]} does not exist: this rotor has nodes 1 … {rotor.n_nodes}")
+    return places
 
-    Neither gyroscopic moments nor coupling between x and y nor damping have a place in formula (50).
-    """
-    if speed is not None and not (np.isfinite(speed) and speed >= 0):
-        raise ValueError(f"the speed must be finite and not negative, in rad/s, not {speed}")
-    lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
-    omega = lowest if speed is None else float(speed)
-    supports = []
-    for support in rotor.supports:
-        stand = support.pedestal
-        supports.append(
-            fem.Support(
-                support.node,
-                float(support.at(omega)[0][0, 0]),
-                name=support.name,
-                pedestal=None if stand is None else fem.Pedestal(stand.mass, stand.xy("stiffness")[0]),
-                kind=support.kind,
-                tilting_stiffness=support.tilting_stiffness,
+
+def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, FloatArray]:
+    """Frequencies and shapes as arrays that fit n masses."""
+    omega, shapes = (np.asarray(part, dtype=float) for part in measured)
+    omega = np.atleast_1d(omega)
+    if shapes.shape != (n, len(omega)):
+        raise ValueError(
+            f"shapes must be (n, k) for {n} masses and {len(omega)} frequencies; got {shapes.shape}"
+        )
+    if not (np.isfinite(omega).all() and np.isfinite(shapes).all()):
+        raise ValueError("frequencies and shapes must be finite numbers")
+    return omega, shapes
+
+
+def _without_seals(plane: fem.Rotor, places: tuple[int, ...]) -> tuple[fem.Rotor, FloatArray]:
+    """The plane without its seals at the masses, and their stiffness."""
+    taken = [s for s in plane.supports if s.kind == "seal" and s.node in places and s.plain]
+    stiffness = np.array([sum(float(s.stiffness) for s in taken if s.node == node) for node in places])
+    kept = [s for s in plane.supports if s not in taken]
+    return dataclasses.replace(plane, supports=kept), stiffness
+
+
+def _at_nodes(plane: fem.Rotor, nodes: tuple[int, ...]) -> list[float]:
+    """Stiffness of all bearings at each node, N/m, of a plane on springs; pedestals stand in series."""
+    zero = np.zeros(1)
+    return [
+        float(sum(s.dynamic_stiffness(zero)[0, 0, 0].real for s in plane.supports if s.node == node))
+        for node in nodes
+    ]
+
+
+def _apart(measured: FloatArray, computed: FloatArray) -> list[str]:
+    """What to say where the measured rotor is not the one of the model."""
+    out = []
+    for k, (f, g) in enumerate(zip(measured, computed, strict=False), start=1):
+        if abs(f / g - 1) > APART:
+            out.append(
+                f"the measured frequency {k}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
+                f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
             )
-        )
-    plane = dataclasses.replace(
-        rotor, supports=supports, model=dataclasses.replace(rotor.model, gyroscopic=False)
-    )
-    said = []
-    if rotor.model.gyroscopic or not (rotor.symmetric and _uncoupled(rotor)):
-        said.append(
-            "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
-            "of the rotor at rest, without gyroscopic effect and cross-coupling"
-        )
-    if not rotor.constant:
-        which = "the lowest of" if speed is None else "chosen in"
-        said.append(f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables")
-    return plane, said
+    return out
 
 
 def _of_shaft(rotor: fem.Rotor, full: fem.Modes) -> list[str]:
@@ -142,17 +283,11 @@ def _of_shaft(rotor: fem.Rotor, full: fem.Modes) -> list[str]:
     return [*ignored_inertia(rotor), *(text for text in full.warnings if text not in ours)]
 
 
-def _uncoupled(rotor: fem.Rotor) -> bool:
-    """Whether no support's stiffness couples x and y."""
-    matrices = [support.at(support.speeds or 0.0)[0] for support in rotor.supports]
-    return not any(K[..., 0, 1].any() or K[..., 1, 0].any() for K in matrices)
-
-
 def _warnings(
     estimate: Estimate,
     sensitivity: FloatArray,
     omega: FloatArray,
-    places: tuple[int, ...],
+    places: tuple[int | str, ...],
     agreement: FloatArray,
 ) -> list[str]:
     out = [

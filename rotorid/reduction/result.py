@@ -2,23 +2,67 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 import fem
 from rotorid.estimate import Estimate
+from rotorid.reduction.masses import Normalisation, RowWeights
+from rotorid.reduction.separated import Separated
+from rotorid.reduction.shift import Shift
+from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
 from rotorid.reduction.vibration import mac
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+    from rotorid.reduction.small import SmallRotor
+
 FloatArray = NDArray[np.float64]
 
 RAD_S_TO_RPM = 30.0 / np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """How a regression was done.
+
+    Attributes
+    ----------
+    source
+        Whether the modes were computed from the rotor or measured.
+    normalise, rows, nonnegative
+        As in `equivalent_masses`.
+    """
+
+    source: Literal["rotor", "measured"]
+    normalise: Normalisation
+    rows: RowWeights
+    nonnegative: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        return {
+            "source": self.source,
+            "normalise": self.normalise,
+            "rows": self.rows if isinstance(self.rows, str) else "own",
+            "nonnegative": self.nonnegative,
+        }
+
+    def words(self, modes: int) -> str:
+        """Such as "the first 2 measured modes, rows relative"."""
+        kind = "measured " if self.source == "measured" else ""
+        text = f"the first {kind}mode" if modes == 1 else f"the first {modes} {kind}modes"
+        said = [] if self.normalise == "first" else [f"shapes scaled by {self.normalise}"]
+        rows = self.to_dict()["rows"]
+        said += [] if rows == "equal" else [f"rows {rows}"]
+        said += ["masses not negative"] if self.nonnegative else []
+        return ", ".join((text, *said))
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +71,10 @@ class Reduction:
 
     Attributes
     ----------
-    nodes, positions
-        Where the masses stand: node numbers and m from the left end, shape (n,).
+    rotor
+        The rotor; None where only its compliance and measured modes are known.
+    nodes
+        Where the masses stand: node numbers, or labels where there is no rotor.
     modes
         How many modes of the rotor the regression used.
     masses
@@ -36,79 +82,146 @@ class Reduction:
     sensitivity
         Relative standard deviation of each mass per relative standard deviation of the inputs, shape (n,).
     compliance
-        m/N, shape (n, n).
+        m/N, shape (n, n), without the seals in `seal_stiffness`.
+    seal_stiffness
+        Of springs from the masses to the ground beside the compliance, N/m, shape (n,).
     frequencies, shapes
         Of the n-mass model: rad/s (n,), and at the masses (n, n), scaled to fit the rotor's.
     rotor_frequencies, rotor_shapes
-        Of the rotor's plane at rest: rad/s (n,), and at the masses (n, n).
+        Of the rotor, computed for its plane at rest or measured: rad/s (j,), and at the masses (n, j).
     rotor_modes
-        The rotor's modes at every node, to draw.
+        The computed modes at every node, to draw; None without a rotor.
+    choices
+        How the regression was done: normalisation, row weights, sign of the masses, source of the modes.
+    uncertainty
+        What stated errors of the inputs do to masses and frequencies; None where none are stated.
+    separated
+        The compliance of the shaft apart from its two supports, (47); None where not asked for.
     warnings
         What a user should know before trusting the model.
     """
 
-    rotor: fem.Rotor
-    nodes: tuple[int, ...]
-    positions: FloatArray
+    rotor: fem.Rotor | None
+    nodes: tuple[int | str, ...]
     modes: int
     masses: Estimate
     sensitivity: FloatArray
     compliance: FloatArray
+    seal_stiffness: FloatArray
     frequencies: FloatArray
     shapes: FloatArray
-    rotor_modes: fem.Modes
+    rotor_frequencies: FloatArray
     rotor_shapes: FloatArray
+    rotor_modes: fem.Modes | None
+    choices: Choices
+    uncertainty: MassUncertainty | None
+    separated: Separated | None
     warnings: tuple[str, ...]
 
     @property
-    def rotor_frequencies(self) -> FloatArray:
-        """The rotor's first n natural frequencies, rad/s."""
-        return self.rotor_modes.frequencies
+    def positions(self) -> FloatArray | None:
+        """Of the masses, m from the left end, shape (n,); None without a rotor."""
+        if self.rotor is None:
+            return None
+        return np.asarray(self.rotor.positions[[int(node) - 1 for node in self.nodes]])
 
     @property
     def relative_error(self) -> FloatArray:
-        """Of each frequency against the rotor's, shape (n,)."""
-        return np.asarray(self.frequencies / self.rotor_frequencies - 1.0)
+        """Of each frequency against the rotor's, shape (n,); NaN where the rotor's is not known."""
+        return np.asarray(self.frequencies / self._padded(self.rotor_frequencies) - 1.0)
 
     @property
     def mac_matrix(self) -> FloatArray:
-        """MAC of the model's modes (rows) with the rotor's (columns) at the masses, (n, n)."""
+        """MAC of the model's modes (rows) with the rotor's (columns) at the masses, (n, j)."""
         return mac(self.shapes, self.rotor_shapes)
 
     @property
     def mac(self) -> FloatArray:
-        """MAC of each mode with the rotor's mode of the same number, shape (n,)."""
-        return np.asarray(np.diag(self.mac_matrix))
+        """MAC of each mode with the rotor's mode of the same number, shape (n,); NaN where unknown."""
+        return self._padded(np.diag(self.mac_matrix))
 
     @property
     def equations_of_motion(self) -> fem.Motion:
         """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
 
         The displacement of the mass at node 7 is `x7`. There is no damping: what a rotor's bearings and its
-        surroundings take out is for the user to add, or to estimate (`rotorid.timedomain.second_order`).
+        surroundings take out is for the user to add, or to estimate (`rotorid.timedomain.second_order`), or
+        comes with the supports (`small`).
         """
-        K = np.linalg.inv(self.compliance)
+        K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
         n = len(self.nodes)
         names = tuple(f"x{node}" for node in self.nodes)
         return fem.Motion(np.diag(self.masses.solution), np.zeros((n, n)), (K + K.T) / 2, names, 0.0)
 
+    def what_if(self, changes: Mapping[str, float]) -> Shift:
+        """Masses and frequencies after relative changes of inputs, such as {"alpha12": 0.013}.
+
+        Raises
+        ------
+        ValueError
+            For an input that does not exist (they are `alpha12`, `U31`, `omega1`, `c2` …), or a change
+            that is not finite.
+        """
+        used = self.rotor_frequencies[: self.modes], self.rotor_shapes[:, : self.modes]
+        known = mass_uncertainty(
+            self.compliance,
+            *used,
+            InputErrors(),
+            seal_stiffness=self.seal_stiffness,
+            normalise=self.choices.normalise,
+            rows=self.choices.rows,
+        )
+        return known.shift(changes)
+
+    def small(self, modal_damping: Sequence[float] = ()) -> SmallRotor:
+        """The model in both planes with the rotor's supports, gyroscopic moments and damping.
+
+        Parameters
+        ----------
+        modal_damping
+            Damping ratios of the first modes, added to what the supports take out.
+
+        Raises
+        ------
+        ValueError
+            Without a rotor, or with masses that are not positive.
+        """
+        from rotorid.reduction.small import small_rotor
+
+        if self.rotor is None:
+            raise ValueError(
+                "measured modes and a compliance alone say nothing of bearings and the second plane: "
+                "give a rotor"
+            )
+        return small_rotor(
+            self.rotor, [int(node) for node in self.nodes], self.masses.solution, modal_damping=modal_damping
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
-        return {
+        positions = self.positions
+        document: dict[str, Any] = {
             "nodes": list(self.nodes),
-            "positions_m": self.positions.tolist(),
+            "positions_m": None if positions is None else positions.tolist(),
             "modes": self.modes,
+            **self.choices.to_dict(),
             "masses_kg": self.masses.solution.tolist(),
             "masses_std_kg": None if self.masses.std is None else _floats(self.masses.std),
-            "mass_sensitivity": self.sensitivity.tolist(),
+            "mass_sensitivity": _floats(self.sensitivity),
             "compliance_m_per_N": self.compliance.tolist(),
+            "seal_stiffness_N_per_m": self.seal_stiffness.tolist(),
             "natural_frequencies_rad_s": _floats(self.frequencies),
-            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
+            "rotor_frequencies_rad_s": _floats(self._padded(self.rotor_frequencies)),
             "relative_error": _floats(self.relative_error),
             "mac": _floats(self.mac),
             "condition_number": self.masses.condition_number,
             "warnings": list(self.warnings),
         }
+        if self.separated is not None:
+            document["separated"] = self.separated.to_dict()
+        if self.uncertainty is not None:
+            document["uncertainty"] = self.uncertainty.to_dict()
+        return document
 
     def to_frame(self) -> pd.DataFrame:
         """First a row per mass (`table` is "masses"), then a row per mode ("modes").
@@ -119,54 +232,76 @@ class Reduction:
         import pandas as pd
 
         n = len(self.nodes)
-        masses = pd.DataFrame(
-            {"node": self.nodes, "position_m": self.positions, "mass_kg": self.masses.solution}
-        )
+        masses = pd.DataFrame({"node": self.nodes, "mass_kg": self.masses.solution})
+        if self.positions is not None:
+            masses.insert(1, "position_m", self.positions)
         modes = pd.DataFrame(
             {
                 "mode": np.arange(1, n + 1),
                 "frequency_rad_s": self.frequencies,
-                "rotor_frequency_rad_s": self.rotor_frequencies,
+                "rotor_frequency_rad_s": self._padded(self.rotor_frequencies),
                 "relative_error": self.relative_error,
                 "mac": self.mac,
             }
         )
         modes.index += n
-        frame = pd.concat((masses, modes), axis=1).astype({"node": "Int64", "mode": "Int64"})
+        frame = pd.concat((masses, modes), axis=1).astype({"mode": "Int64"})
+        if self.rotor is not None:
+            frame = frame.astype({"node": "Int64"})
         frame.insert(0, "table", ["masses"] * n + ["modes"] * n)
         return frame
 
     def summary(self) -> str:
         """Text for an engineer."""
-        std = self.masses.std
         lines = [f"Warning: {w}" for w in self.warnings]
-        lines.append(f"{len(self.nodes)} equivalent masses from the first {self.modes} mode(s), formula (50)")
-        for i, node in enumerate(self.nodes):
-            spread = "" if std is None else f" ± {_plain(std[i])}"
-            mass = self.masses.solution[i]
-            lines.append(f"  node {node:>3}  at {self.positions[i]:7.3f} m   {mass:10.3f} kg{spread}")
-        total = self.masses.solution.sum()
-        lines.append(f"  together {total:.1f} kg of the rotor's {self.rotor.total_mass:.1f} kg")
-        lines.append("mode   n-mass model            rotor                   error      MAC")
-        for k, (f, g) in enumerate(zip(self.frequencies, self.rotor_frequencies, strict=True)):
-            error = self.relative_error[k]
+        lines.append(
+            f"{len(self.nodes)} equivalent masses from {self.choices.words(self.modes)}, formula (50)"
+        )
+        lines += self._mass_lines()
+        whose = "measured" if self.choices.source == "measured" else "rotor"
+        lines.append(f"mode   n-mass model            {whose:<8}                error      MAC")
+        for k, f in enumerate(self.frequencies):
+            if k >= len(self.rotor_frequencies):
+                lines.append(f"{k + 1:>4}   {_speed(f) if np.isfinite(f) else 'does not vibrate':<21}")
+                continue
+            g, error = self.rotor_frequencies[k], self.relative_error[k]
             lines.append(
                 f"{k + 1:>4}   {_speed(f)}   {_speed(g)}   {100 * error:+7.3f} %  {self.mac[k]:.5f}"
                 if np.isfinite(f)
                 else f"{k + 1:>4}   {'does not vibrate':<21}   {_speed(g)}"
             )
         lines.append(f"condition number of the regression {self.masses.condition_number:.3g}")
-        if std is not None:
+        if self.masses.std is not None:
             lines.append(
                 "± is one standard deviation from the regression's residuals (model error, not measurement)"
             )
+        if self.separated is not None:
+            lines += ["", self.separated.summary()]
+        if self.uncertainty is not None:
+            lines += ["", self.uncertainty.summary()]
         return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the shapes of both models over the rotor; returns the axes."""
-        from rotorid.plots import plot_reduction
+        from rotorid.plots_reduction import plot_reduction
 
         return plot_reduction(self, ax)
+
+    def _mass_lines(self) -> list[str]:
+        std, positions = self.masses.std, self.positions
+        lines = []
+        for i, node in enumerate(self.nodes):
+            known = std is not None and np.isfinite(std[i])
+            spread = f" ± {_plain(std[i])}" if std is not None and known else ""
+            where = "" if positions is None else f"  at {positions[i]:7.3f} m"
+            lines.append(f"  node {node:>3}{where}   {self.masses.solution[i]:10.3f} kg{spread}")
+        whole = "" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
+        return [*lines, f"  together {self.masses.solution.sum():.1f} kg{whole}"]
+
+    def _padded(self, values: FloatArray) -> FloatArray:
+        out = np.full(len(self.nodes), np.nan)
+        out[: len(values)] = values[: len(out)]
+        return out
 
 
 def _speed(omega: float) -> str:

@@ -9,6 +9,8 @@ from rotorid.tables.harmonicfile import HarmonicFile, read_harmonic_model
 from rotorid.tables.influence import influence_frame, read_influence, write_influence
 from rotorid.tables.job import Job, job_from_files, read_job
 from rotorid.tables.measurements import read_measurements
+from rotorid.tables.modes import MeasuredModes, read_compliance, read_modes
+from rotorid.tables.motionfile import read_motion
 from rotorid.tables.odefile import read_ode_model
 from rotorid.tables.problems import InputError, Problem, TableWarning
 from rotorid.tables.records import read_record
@@ -24,15 +26,19 @@ __all__ = [
     "HarmonicFile",
     "InputError",
     "Job",
+    "MeasuredModes",
     "Problem",
     "StatedErrors",
     "TableWarning",
     "influence_frame",
     "job_from_files",
+    "read_compliance",
     "read_harmonic_model",
     "read_influence",
     "read_job",
     "read_measurements",
+    "read_modes",
+    "read_motion",
     "read_ode_model",
     "read_record",
     "read_rotor",

@@ -290,7 +290,11 @@ def _known(columns: Sequence[Column]) -> str:
 def _complain_about_missing(
     grid: Grid, columns: Sequence[Column], found: Mapping[str, _Match], problems: Problems
 ) -> None:
-    unknown = [name for name in grid.header if name and _column_of(name, columns) is None]
+    unknown = [
+        name
+        for name in grid.header
+        if name and not name.casefold().startswith(REMARKS) and _column_of(name, columns) is None
+    ]
     close = [_column_of(near, columns) for name in unknown if (near := nearest(name, columns))]
     misspelt = {column.stem for column in close if column is not None}
     for column in columns:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,13 +11,15 @@ from typing import TYPE_CHECKING
 
 from rotorid.expressions import ExpressionError, is_name, parse_equation
 from rotorid.tables.number import LARGEST
-from rotorid.tables.problems import Problems, did_you_mean
+from rotorid.tables.problems import Problems, TableWarning, did_you_mean, listing
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
     from rotorid.harmonic.model import HarmonicModel
 
+_IN_TIME = ("M", "C", "K", "states")
+"""Keys of models in time; such a file is read by `read_ode_model`, too."""
 _EXAMPLE = '"(m*p**2 + b*p + c)*X = F"'
 
 
@@ -52,6 +55,17 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     `inputs` (names of the exciting amplitudes), `[bounds]` (name = [lowest, highest]), `[start]` (name =
     guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
 
+    Instead of equations there may be a linear model in time as `read_ode_model` reads it, such as the one
+    that `rotorid reduce --model` writes: `M`, `C`, `K` (then (M p² + C p + K) X = F with amplitudes named
+    like the coordinates) or `[states]` (then p x = rate of x). Its `[estimate]` has starting values, which
+    are the `start` here. `inputs` are the exciting amplitudes, and `[force]` says where they act; matrices
+    without both have a force amplitude f_x7 on every coordinate x7, and those not in the table are 0. An
+    output that is a number times a displacement or velocity is measured in place of it; other linear outputs
+    add equations. `[initial]` plays no part, `speed_rad_s` neither; a parameter of initial values alone is
+    left out, with a warning. Explicit time, constant loads and nonlinear terms are refused. What
+    `[outputs]` do not show is eliminated if no parameter stands at it; another amplitude that is not measured
+    is predicted by output error, while equation error needs it.
+
     Parameters
     ----------
     path
@@ -65,6 +79,11 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     ------
     InputError
         With all problems of the file, each with its key.
+
+    Warns
+    -----
+    TableWarning
+        Where a parameter of a model in time has no influence on amplitudes.
     """
     path = Path(path)
     problems = Problems()
@@ -73,6 +92,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         problems.stop()
         raise AssertionError("no file and no problem")
     section = Section(str(path), data, problems)
+    if "equations" not in section and any(key in section for key in _IN_TIME):
+        return _from_time(section, path, problems)
     equations = _equations(section)
     estimate = _names(section, "estimate", 'such as estimate = ["c", "b"]', required=True)
     inputs = _names(section, "inputs", 'such as inputs = ["F"]', required=False)
@@ -100,6 +121,42 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     if model is None:
         raise AssertionError("no model and no problem")
     return HarmonicFile(model, bounds, start, errors, path)
+
+
+def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile:
+    """The operator equations of a model in time."""
+    # odefile takes pair and read_errors from here
+    from rotorid.tables.odefile import read_time_form
+    from rotorid.tables.operatorform import operator_form
+
+    form = read_time_form(section, problems, initial=False)
+    problems.stop()
+    from rotorid.harmonic.model import harmonic_model
+
+    model = None
+    try:
+        operators = operator_form(form)
+        start = dict(operators.estimate)
+        model = harmonic_model(
+            operators.equations, known=form.known, estimate=list(start), inputs=operators.inputs
+        )
+        if model.has_constant_terms:
+            raise ValueError(
+                "a load or output without any amplitude stands in it: a constant one has no influence on "
+                "amplitudes, leave it out; one that excites must be a measured input"
+            )
+    except ValueError as error:
+        problems.add(str(path), None, None, None, f"a linear model of amplitudes: {error}")
+    problems.stop()
+    if model is None:
+        raise AssertionError("no model and no problem")
+    if operators.left_out:
+        lost = listing(operators.left_out, "and")
+        stand = "stands" if len(operators.left_out) == 1 else "stand"
+        message = f"{path}: {lost} {stand} in initial values only, which amplitudes do not show: left out"
+        warnings.warn(message, TableWarning, stacklevel=3)
+    bounds = {name: limits for name, limits in form.bounds.items() if name in start}
+    return HarmonicFile(model, bounds, start, form.errors, path)
 
 
 def read_errors(section: Section) -> AmplitudeErrors | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,45 +20,186 @@ def ode_model_bytes(
     initial: Mapping[str, float],
     *,
     comments: Sequence[str] = (),
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] | None = None,
 ) -> bytes:
-    """A model file M y'' + C y' + K y = 0 whose dampers to the ground are to be estimated.
+    """A model file of M y'' + C y' + K y = f whose dampers to the ground are to be estimated.
+
+    It is read by `read_ode_model` (time records), by `read_harmonic_model` (amplitudes) and, in its matrix
+    form, by `read_motion`. Where a coordinate has no mass, the matrices cannot be integrated: the file holds
+    the states of `fem.state_space` instead, in which damped massless coordinates are of first order and
+    undamped ones are eliminated.
 
     Parameters
     ----------
     motion
-        Matrices and names of the displacements.
+        Matrices and names of the displacements, of one plane or both.
     dampers
-        {displacement: starting value of its damper, N·s/m}; the parameter of `x7` is called `d_x7`.
+        {displacement: starting value of its damper, N·s/m}; the parameter of `x7` is called `d_x7`. Empty:
+        nothing is estimated. In the form of states each needs a displacement with mass.
     initial
-        Initial values {displacement or velocity: value} that are not 0.
+        Initial values {displacement or velocity: value} that are not 0; in the form of states, of states.
     comments
         Lines at the top.
+    inputs
+        Forces that are measured: `f_x7` on the displacement `x7`. Records then need a column of each. Without
+        inputs `read_harmonic_model` takes a force on every coordinate of the matrices; a file of states has
+        none then.
+    outputs
+        What is measured: displacements `x7` or velocities `v_x7`. Default: all displacements, in the form of
+        states those with mass.
 
     Returns
     -------
     bytes
-        What `read_ode_model` reads; all digits of the matrices are kept.
+        All digits of the matrices are kept.
+
+    Raises
+    ------
+    ValueError
+        Numbers that are not finite, names that do not exist, a damper at a massless displacement, and what
+        `fem.state_space` refuses.
     """
-    lines = [f"# {line}" for line in comments]
-    names = [f"d_{name}" for name in dampers]
+    _check(motion, dampers, initial, inputs, outputs)
+    massless = np.asarray(~(motion.M.any(axis=0) | motion.M.any(axis=1)), dtype=bool)
+    lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
+    if motion.speed:
+        lines.append(f"speed_rad_s = {float(motion.speed)!r}")
+    if inputs:
+        lines.append(f"inputs = {_names(inputs)}")
+    if massless.any():
+        lines += _states(motion, massless, dampers, initial, inputs, outputs)
+    else:
+        lines += _matrices(motion, dampers, initial, inputs, outputs)
+    lines += ["", "[estimate]", *(f"d_{name} = {float(value)!r}" for name, value in dampers.items())]
+    if dampers:
+        lines += ["", "[bounds]", *(f"d_{name} = [0, inf]" for name in dampers)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _matrices(
+    motion: Motion,
+    dampers: Mapping[str, float],
+    initial: Mapping[str, float],
+    inputs: Sequence[str],
+    outputs: Sequence[str] | None,
+) -> list[str]:
     damping: list[list[str]] = [[_number(value) for value in row] for row in motion.C]
-    for parameter, name in zip(names, dampers, strict=True):
+    for name in dampers:
         i = motion.index(name)
         known = damping[i][i]
-        damping[i][i] = f'"{parameter}"' if known == "0" else f'"{known} + {parameter}"'
-    lines.append("coordinates = [" + ", ".join(f'"{name}"' for name in motion.coordinates) + "]")
+        damping[i][i] = f'"d_{name}"' if known == "0" else f'"{known} + d_{name}"'
+    lines = [f"coordinates = {_names(motion.coordinates)}"]
     for key, rows in (
         ("M", [[_number(value) for value in row] for row in motion.M]),
         ("C", damping),
         ("K", [[_number(value) for value in row] for row in motion.K]),
     ):
         lines += [f"{key} = [", *(f"  [{', '.join(row)}]," for row in rows), "]"]
+    if inputs:
+        lines += ["", "[force]", *(f'{name.removeprefix("f_")} = "{name}"' for name in inputs)]
     if initial:
         lines += ["", "[initial]", *(f"{name} = {_number(value)}" for name, value in initial.items())]
-    lines += ["", "[estimate]"]
-    lines += [f"{parameter} = {value!r}" for parameter, value in zip(names, dampers.values(), strict=True)]
-    lines += ["", "[bounds]", *(f"{parameter} = [0, inf]" for parameter in names)]
-    return ("\n".join(lines) + "\n").encode()
+    if outputs is not None:
+        lines += ["", "[outputs]", *(f'{name} = "{name}"' for name in outputs)]
+    return lines
+
+
+def _states(
+    motion: Motion,
+    massless: NDArray[np.bool_],
+    dampers: Mapping[str, float],
+    initial: Mapping[str, float],
+    inputs: Sequence[str],
+    outputs: Sequence[str] | None,
+) -> list[str]:
+    """Rates s' = A s + B u − Σ B_i d_i v_i with the dampers' forces −d_i v_i on their coordinates."""
+    from fem.statespace import state_space
+
+    names = motion.coordinates
+    for name in dampers:
+        if massless[motion.index(name)]:
+            raise ValueError(
+                f"a damper to be estimated at {name}, which has no mass, does not stand linearly in the "
+                "states; estimate dampers at masses"
+            )
+    shown = [name for name, light in zip(names, massless, strict=True) if not light]
+    shown = list(outputs) if outputs is not None else shown
+    forces = [*inputs, *(f"f_{name}" for name in dampers if f"f_{name}" not in inputs)]
+    rates = [f"v_{name}" for name in dampers]
+    model = state_space(motion, inputs=forces, outputs=[*shown, *(x for x in rates if x not in shown)])
+    A, B, C, D = model
+    u = [forces.index(name) for name in inputs]
+    velocity = {
+        x: _sum([*C[i], *D[i, u]], [*model.states, *inputs])
+        for i, x in enumerate(model.outputs)
+        if x in rates
+    }
+    lines = ["", "[states]"]
+    for i, state in enumerate(model.states):
+        text = _sum([*A[i], *B[i, u]], [*model.states, *inputs])
+        for name in dampers:
+            share = B[i, forces.index(f"f_{name}")]
+            if share:
+                text += f" - ({_number(share)})*d_{name}*({velocity[f'v_{name}']})"
+        lines.append(f'{state} = "{text}"')
+    if lost := [name for name in initial if name not in model.states]:
+        raise ValueError(f"initial: {lost[0]} is no state; they are {', '.join(model.states)}")
+    lines += ["", "[initial]", *(f"{name} = {_number(initial.get(name, 0.0))}" for name in model.states)]
+    lines += ["", "[outputs]"]
+    for i, name in enumerate(shown):
+        lines.append(f'{name} = "{_sum([*C[i], *D[i, u]], [*model.states, *inputs])}"')
+    return lines
+
+
+def _sum(values: Sequence[float], names: Sequence[str]) -> str:
+    """Σ value · name, as an expression with all digits."""
+    terms = [
+        name if value == 1 else f"({_number(value)})*{name}"
+        for value, name in zip(values, names, strict=True)
+        if value
+    ]
+    return " + ".join(terms) or "0"
+
+
+def _check(
+    motion: Motion,
+    dampers: Mapping[str, float],
+    initial: Mapping[str, float],
+    inputs: Sequence[str],
+    outputs: Sequence[str] | None,
+) -> None:
+    for key in "MCK":
+        if not np.isfinite(getattr(motion, key)).all():
+            raise ValueError(f"{key} holds numbers that are not finite: such a model cannot be written")
+    both = {"dampers": dampers, "initial": initial}
+    for what, values in both.items():
+        for name, value in values.items():
+            if not np.isfinite(value):
+                raise ValueError(f"{what}: the value of {name} must be a finite number, not {value!r}")
+    for name in dampers:
+        motion.index(name)
+        if dampers[name] < 0:
+            raise ValueError(
+                f"dampers: the starting value of {name} must be 0 or more, not {dampers[name]:g}"
+            )
+    allowed = {
+        "input": [f"f_{name}" for name in motion.coordinates],
+        "output": [*motion.coordinates, *(f"v_{name}" for name in motion.coordinates)],
+    }
+    for kind, chosen in (("input", inputs), ("output", outputs or ())):
+        if isinstance(chosen, str):
+            raise ValueError(f"{kind}s must be a list of names, not the one name {chosen!r}")
+        for i, name in enumerate(chosen):
+            if name not in allowed[kind]:
+                first = allowed[kind][0]
+                raise ValueError(f"no {kind} {name!r} in this model: they are named like {first}")
+            if name in chosen[:i]:
+                raise ValueError(f"the {kind} {name} is named twice")
+
+
+def _names(names: Iterable[str]) -> str:
+    return "[" + ", ".join(f'"{name}"' for name in names) + "]"
 
 
 def _number(value: float) -> str:

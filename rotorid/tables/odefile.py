@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid import expressions
 from rotorid.expressions import ExpressionError, is_name
-from rotorid.tables.harmonicfile import pair
-from rotorid.tables.matrixform import read_matrices
+from rotorid.tables.harmonicfile import pair, read_errors
+from rotorid.tables.matrixform import Matrices, read_matrices
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:
+    from rotorid.harmonic.experiments import AmplitudeErrors
     from rotorid.timedomain.model import OdeModel
 
 _KEYS = (
@@ -30,8 +32,48 @@ _KEYS = (
     "estimate",
     "known",
     "bounds",
+    "errors",
+    "speed_rad_s",
 )
 _A_NAME = "names: a letter, then letters, digits and _; not t and no function"
+
+
+@dataclass(frozen=True)
+class TimeForm:
+    """What stands in a model file in time, before a model is made of it.
+
+    Attributes
+    ----------
+    states
+        Rate of each state; of matrices only the names count.
+    matrices
+        M, C, K, where the file has them.
+    initial, outputs, force
+        Numbers and expressions by name.
+    estimate, known
+        Numbers by name.
+    inputs, per_record
+        Names.
+    bounds
+        Lowest and highest value of parameters.
+    errors
+        Stated errors of amplitudes, for harmonic tests only.
+    speed
+        At which the matrices hold, rad/s.
+    """
+
+    states: dict[str, str]
+    matrices: Matrices | None
+    initial: dict[str, float | str]
+    outputs: dict[str, str]
+    force: dict[str, str]
+    estimate: dict[str, float]
+    known: dict[str, float]
+    inputs: list[str]
+    per_record: list[str]
+    bounds: dict[str, tuple[float, float]]
+    errors: AmplitudeErrors | None
+    speed: float
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -39,14 +81,17 @@ def read_ode_model(path: str | Path) -> OdeModel:
 
     Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number, or an
     expression of parameters), `[outputs]` (name = "expression"; default: the states), `[estimate]` (name =
-    starting value), optional `[known]` (name = number) and `[bounds]` (name = [lowest, highest]), and
-    `inputs`, a list of measured inputs (columns of the record), and `per_record`, a list of parameters (such
-    as unknown initial values) that every one of several records has for itself. Without states the outputs
-    are functions of the time.
+    starting value; empty where a model is only to be simulated), optional `[known]` (name = number) and
+    `[bounds]` (name = [lowest, highest]), `inputs`, a list of measured inputs (columns of the record), and
+    `per_record`, a list of parameters (such as unknown initial values) that every one of several records has
+    for itself. Without states the outputs are functions of the time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
     velocity of y1 is v_y1) and `[force]` (y1 = "expression"). Initial values are 0 then where none is given.
+    The speed at which the matrices of a rotor hold may stand in `speed_rad_s`.
+
+    A linear model is read by `read_harmonic_model`, too; `[errors]` of amplitudes are for that alone.
 
     Parameters
     ----------
@@ -69,13 +114,58 @@ def read_ode_model(path: str | Path) -> OdeModel:
         problems.stop()
         raise AssertionError("no file and no problem")
     section = Section(str(path), data, problems)
+    form = read_time_form(section, problems)
+    model = None
+    if not len(problems):
+        from rotorid.timedomain.model import ode_model
+        from rotorid.timedomain.second_order import second_order
+
+        given: dict[str, Any] = {
+            "initial": form.initial,
+            "outputs": form.outputs or None,
+            "estimate": form.estimate,
+            "known": form.known,
+            "inputs": form.inputs,
+            "bounds": form.bounds,
+            "per_record": form.per_record,
+        }
+        try:
+            if form.matrices is None:
+                model = ode_model(form.states, **given)
+            else:
+                m = form.matrices
+                model = second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
+        except ValueError as error:
+            problems.add(str(path), None, None, None, f"a usable model: {error}")
+    problems.stop()
+    if model is None:
+        raise AssertionError("no model and no problem")
+    return model
+
+
+def read_time_form(section: Section, problems: Problems, *, initial: bool = True) -> TimeForm:
+    """All keys of a model file in time; what is wrong with them goes to the problems.
+
+    Parameters
+    ----------
+    section
+        The whole file.
+    problems
+        Collects the complaints.
+    initial
+        Whether every state of `[states]` needs its initial value.
+    """
     inputs = _inputs(section)
     own = section.take("per_record")
     known = _numbers(section, "known")
     estimate = _numbers(section, "estimate")
     others = [key for key in section.keys if key not in _KEYS]
-    if not estimate and not any(did_you_mean(key, ["estimate"]) for key in others):
-        section.missing("estimate", "[estimate] with name = starting value for at least one parameter")
+    if "estimate" not in section and not any(did_you_mean(key, ["estimate"]) for key in others):
+        section.missing(
+            "estimate",
+            "[estimate] with name = starting value for at least one parameter (an empty [estimate] where the "
+            "model is only to be simulated)",
+        )
     own = _per_record(section, own, estimate)
     matrices = read_matrices(section)
     states = _texts(section, "states") if matrices is None else matrices.rates
@@ -87,37 +177,21 @@ def read_ode_model(path: str | Path) -> OdeModel:
     everything = ["t", *states, *constants, *inputs]
     _readable(section, "states", states, everything, problems)
     _readable(section, "outputs", outputs, everything, problems)
-    initial = _initial(section, states, constants, problems, complete=matrices is None)
+    begin = _initial(section, states, constants, problems, complete=initial and matrices is None)
     force = {} if matrices is None else _texts(section, "force")
     _readable(section, "force", force, everything, problems)
+    for name in force:
+        if matrices is not None and name not in matrices.coordinates:
+            hint = did_you_mean(name, matrices.coordinates)
+            expected = f"a name of coordinates{hint}; they are {listing(matrices.coordinates, 'and')}"
+            section.complain(f"force.{name}", expected, value=False)
     bounds = _bounds(section, estimate)
+    errors = read_errors(section)
+    speed = section.number("speed_rad_s", 0.0, low=0.0) or 0.0
     section.finish()
-    model = None
-    if not len(problems):
-        from rotorid.timedomain.model import ode_model
-        from rotorid.timedomain.second_order import second_order
-
-        given: dict[str, Any] = {
-            "initial": initial,
-            "outputs": outputs or None,
-            "estimate": estimate,
-            "known": known,
-            "inputs": inputs,
-            "bounds": bounds,
-            "per_record": own,
-        }
-        try:
-            if matrices is None:
-                model = ode_model(states, **given)
-            else:
-                form = (matrices.M, matrices.C, matrices.K)
-                model = second_order(*form, names=matrices.coordinates, force=force, **given)
-        except ValueError as error:
-            problems.add(str(path), None, None, None, f"a usable model: {error}")
-    problems.stop()
-    if model is None:
-        raise AssertionError("no model and no problem")
-    return model
+    return TimeForm(
+        states, matrices, begin, outputs, force, estimate, known, inputs, own, bounds, errors, speed
+    )
 
 
 def _named(inner: Section, key: str) -> bool:

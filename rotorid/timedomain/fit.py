@@ -105,6 +105,11 @@ def fit(
     >>> print(found.values.round(3), found.converged)
     [1.003] True
     """
+    if not model.parameters:
+        raise ValueError(
+            "the model has nothing to estimate: put NAME = STARTING VALUE into the table [estimate] of its "
+            "file"
+        )
     if method not in METHODS:
         raise ValueError(f"no method {method!r}; methods are {', '.join(METHODS)}")
     plain = method in ("gauss-newton", "quasilinearization")

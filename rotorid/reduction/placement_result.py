@@ -1,0 +1,298 @@
+"""All choices of places for the masses beside one another: which match the frequencies, which the shapes."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fem
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+ALIKE = 0.9
+"""Below this MAC two shapes are not those of one mode."""
+
+CLOSE = 0.02
+"""Frequencies that differ by less than this share of them are called a match."""
+
+BADLY = 30.0
+"""Condition number above which a fit is called badly conditioned: 1 % in, up to 30 % out."""
+
+SMALL_ERROR = 1e-3
+"""Frequency errors below this count as equally good where a compromise is sought."""
+
+SMALL_LOSS = 1e-2
+"""So do values of 1 − MAC below this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Every choice of n nodes for the masses, best frequencies first.
+
+    A choice is ranked where all its masses are positive and its model vibrates in n modes. The rows
+    `[:ranked]` are those, by ascending error (of equal errors the higher MAC first); what follows has masses
+    that are not positive, then choices that determine no masses; error, MAC and frequencies there are NaN.
+
+    Attributes
+    ----------
+    nodes
+        Node numbers of each choice, ascending, shape (T, n), T = `considered`.
+    masses
+        kg, shape (T, n); NaN where they are not determined.
+    frequencies
+        Of the n-mass models, their first `check` modes, rad/s, shape (T, check).
+    error
+        Largest |relative frequency error| over these modes, shape (T,).
+    mac
+        Smallest MAC over these modes, mode k of the model with mode k of the rotor, shape (T,).
+    worst_mode
+        The number of the mode with the smallest MAC, shape (T,); 0 where the choice is not ranked.
+    condition
+        Condition number of each column-scaled regression, shape (T,); inf where it is rank deficient, NaN
+        where it cannot be set up.
+    ranked, unphysical, undetermined, at_node
+        How many choices: ranked; with masses that are not positive; of deficient rank; that cannot be scaled,
+        because a mode has a node at the first mass or at all. Together T.
+    modes, check, normalise, rows
+        What the regression used: number of modes, modes checked, scale of the shapes, weights of the rows
+        ("own" where they were given as an array).
+    rotor_frequencies
+        The rotor's first `check` frequencies, rad/s.
+    candidates
+        Node numbers that could be chosen.
+    book
+        Row of the choice of `book_nodes`, None where the rule gives none or not among the candidates.
+    book_note
+        Why there is none, else "".
+    rotor
+        The rotor itself.
+    warnings
+        What a user should know before choosing.
+    """
+
+    nodes: IntArray
+    masses: FloatArray
+    frequencies: FloatArray
+    error: FloatArray
+    mac: FloatArray
+    worst_mode: IntArray
+    condition: FloatArray
+    ranked: int
+    unphysical: int
+    undetermined: int
+    at_node: int
+    modes: int
+    check: int
+    normalise: str
+    rows: str
+    rotor_frequencies: FloatArray
+    candidates: tuple[int, ...]
+    book: int | None
+    book_note: str
+    rotor: fem.Rotor
+    warnings: tuple[str, ...]
+
+    @property
+    def considered(self) -> int:
+        """Number of choices T."""
+        return len(self.nodes)
+
+    @cached_property
+    def pareto(self) -> NDArray[np.intp]:
+        """Rows that no other beats in both error and MAC: the trade-off, by ascending error."""
+        mac = self.mac[: self.ranked]
+        if not self.ranked:
+            return np.empty(0, dtype=np.intp)
+        before = np.concatenate(([-np.inf], np.maximum.accumulate(mac)[:-1]))
+        return np.flatnonzero(mac > before)
+
+    @property
+    def best_by_frequency(self) -> int | None:
+        """Row of the smallest frequency error; None where no choice is ranked."""
+        return 0 if self.ranked else None
+
+    @property
+    def best_by_mac(self) -> int | None:
+        """Row of the largest smallest MAC (of equals the one of smaller error); None: no choice is ranked."""
+        return int(self.pareto[-1]) if self.ranked else None
+
+    @property
+    def compromise(self) -> int | None:
+        """Row of the trade-off that loses least, as a factor, against both bests; None: no choice is ranked.
+
+        The row that minimises max(error / smallest error, (1 − MAC) / smallest (1 − MAC)), after errors
+        are raised to 0.1 % and 1 − MAC to 0.01 at least, below which they are equally good: the knee of the
+        trade-off on logarithmic axes.
+        """
+        if not self.ranked:
+            return None
+        front = self.pareto
+        error = np.maximum(self.error[front], SMALL_ERROR)
+        loss = np.maximum(1.0 - self.mac[front], SMALL_LOSS)
+        return int(front[np.argmin(np.maximum(error / error.min(), loss / loss.min()))])
+
+    def index(self, nodes: tuple[int, ...]) -> int:
+        """Row of a choice of nodes, in any order.
+
+        Raises
+        ------
+        ValueError
+            If it is not among the choices.
+        """
+        wanted = sorted(int(n) for n in nodes)
+        found = []
+        if len(wanted) == self.nodes.shape[1]:
+            found = np.flatnonzero((self.nodes == wanted).all(axis=1)).tolist()
+        if not found:
+            raise ValueError(
+                f"nodes {wanted} are not among the choices of {self.nodes.shape[1]} of "
+                f"{len(self.candidates)} candidates; give different nodes among the candidates"
+            )
+        return int(found[0])
+
+    def traps(self) -> NDArray[np.intp]:
+        """Rows with all checked frequencies within 2 % but a shape unlike the rotor's (MAC below 0.9)."""
+        r = self.ranked
+        return np.flatnonzero((self.error[:r] <= CLOSE) & (self.mac[:r] < ALIKE))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per choice, in rank order: nodes, masses, frequencies, error, MAC, condition number."""
+        import pandas as pd
+
+        n = self.nodes.shape[1]
+        columns: dict[str, Any] = {
+            "rank": pd.array([*range(1, self.ranked + 1)] + [pd.NA] * self._rest, "Int64")
+        }
+        columns |= {f"node_{i + 1}": self.nodes[:, i] for i in range(n)}
+        columns |= {f"mass_{i + 1}_kg": self.masses[:, i] for i in range(n)}
+        columns |= {f"frequency_{k + 1}_rad_s": self.frequencies[:, k] for k in range(self.check)}
+        columns |= {"largest_error": self.error, "smallest_mac": self.mac}
+        columns |= {"worst_mode": self.worst_mode, "condition_number": self.condition}
+        on_front = np.zeros(self.considered, dtype=bool)
+        on_front[self.pareto] = True
+        return pd.DataFrame({**columns, "trade_off": on_front})
+
+    @property
+    def _rest(self) -> int:
+        return self.considered - self.ranked
+
+    def to_dict(self, top: int = 20) -> dict[str, Any]:
+        """As JSON types: counts, the `top` ranked choices, the trade-off, the choices with a name."""
+        return {
+            "considered": self.considered,
+            "ranked": self.ranked,
+            "unphysical": self.unphysical,
+            "undetermined": self.undetermined,
+            "at_node": self.at_node,
+            "modes": self.modes,
+            "check": self.check,
+            "normalise": self.normalise,
+            "rows": self.rows,
+            "candidates": list(self.candidates),
+            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
+            "choices": [self._choice(i) for i in range(min(top, self.ranked))],
+            "trade_off": [self._choice(int(i)) for i in self.pareto],
+            "best_by_frequency": self._choice(self.best_by_frequency),
+            "best_by_mac": self._choice(self.best_by_mac),
+            "compromise": self._choice(self.compromise),
+            "book_rule": self._choice(self.book),
+            "frequency_match_with_wrong_shapes": len(self.traps()),
+            "warnings": list(self.warnings),
+        }
+
+    def _choice(self, i: int | None) -> dict[str, Any] | None:
+        if i is None:
+            return None
+        return {
+            "rank": i + 1 if i < self.ranked else None,
+            "nodes": self.nodes[i].tolist(),
+            "masses_kg": _floats(self.masses[i]),
+            "natural_frequencies_rad_s": _floats(self.frequencies[i]),
+            "largest_error": _float(self.error[i]),
+            "smallest_mac": _float(self.mac[i]),
+            "worst_mode": int(self.worst_mode[i]) or None,
+            "condition_number": _float(self.condition[i]),
+        }
+
+    def summary(self, top: int = 10) -> str:
+        """Text for an engineer: the best choices by frequency, by MAC, the compromise, the book's rule."""
+        n = self.nodes.shape[1]
+        lines = [f"Warning: {w}" for w in self.warnings]
+        lines.append(
+            f"{self.considered} choices of {n} of {len(self.candidates)} nodes, masses from {self.modes} "
+            f"mode(s), checked on {self.check} mode(s)"
+        )
+        lines.append(
+            f"  ranked {self.ranked}; with masses that are not positive {self.unphysical}; not determined "
+            f"{self.undetermined}; a mode has a node at the first mass {self.at_node}"
+        )
+        if not self.ranked:
+            return "\n".join([*lines, "no choice gives a physical model; use other candidates or more modes"])
+        lines.append(" rank   largest error   smallest MAC (mode)   condition   nodes: masses, kg")
+        lines += [self._line(i) for i in range(min(top, self.ranked))]
+        named = (
+            ("best by frequency", self.best_by_frequency),
+            ("best by MAC", self.best_by_mac),
+            ("compromise (closest to both bests, as factors)", self.compromise),
+            ("the book's rule (antinodes)", self.book),
+        )
+        for words, i in named:
+            lines.append(f"{words}:")
+            lines.append(self._line(i) if i is not None else f"       none: {self.book_note}")
+        lines.append(self._trap())
+        return "\n".join(lines)
+
+    def _line(self, i: int) -> str:
+        places = ", ".join(str(node) for node in self.nodes[i])
+        masses = ", ".join(f"{m:.2f}" for m in self.masses[i])
+        if i >= self.ranked:
+            return f"       not ranked, no physical model   nodes {places}: {masses}"
+        return (
+            f"{i + 1:>5}   {100 * self.error[i]:11.4f} %   {self.mac[i]:12.4f} ({self.worst_mode[i]})"
+            f"   {self.condition[i]:13.3g}   {places}: {masses}"
+        )
+
+    def _trap(self) -> str:
+        if self.nodes.shape[1] == 1:
+            return "One mass has no shape to compare, and every place gives its one frequency exactly."
+        traps = self.traps()
+        text = "Frequencies alone are a trap: a model can match them and still move unlike the rotor. "
+        if not traps.size:
+            text += f"Here no choice matches within {100 * CLOSE:g} % with a MAC below {ALIKE:g}."
+        else:
+            i = int(traps[0])
+            text += (
+                f"Here {traps.size} of the choices match all checked frequencies within {100 * CLOSE:g} % "
+                f"with a MAC below {ALIKE:g}, first nodes {', '.join(map(str, self.nodes[i]))} (rank "
+                f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns."
+            )
+        return fill(text, 110)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the map of error over 1 − MAC with its trade-off; returns the axes."""
+        from rotorid.plots_placement import plot_placement
+
+        return plot_placement(self, ax)
+
+    def with_warnings(self, *more: str) -> Placement:
+        """The same with further warnings."""
+        return dataclasses.replace(self, warnings=(*self.warnings, *more))
+
+
+def _float(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _floats(values: FloatArray) -> list[float | None]:
+    return [_float(v) for v in values]

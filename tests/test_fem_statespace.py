@@ -1,0 +1,299 @@
+"""State space with massless coordinates: eigenvalues, frequency response and feedthrough, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import eigvals
+from scipy.optimize import linear_sum_assignment
+from scipy.signal import StateSpace as ScipyStateSpace
+from scipy.signal import lsim
+
+import fem
+from fem.statespace import state_space
+
+
+def motion_of(M, C, K, names=None):
+    M, C, K = (np.atleast_2d(np.asarray(X, dtype=float)) for X in (M, C, K))
+    return fem.Motion(M, C, K, names or tuple(f"x{i + 1}" for i in range(len(M))), 0.0)
+
+
+def finite_eigenvalues(motion):
+    """Of the generalised problem, by QZ; as many as the determinant's degree leaves."""
+    n = len(motion.M)
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-motion.K, -motion.C]])
+    E = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), motion.M]])
+    a, b = eigvals(A, E, homogeneous_eigvals=True)
+    keep = np.abs(b) > 1e-7 * np.abs(a)
+    return a[keep] / b[keep]
+
+
+def farthest(found, expected):
+    """Largest relative difference of two sets of eigenvalues."""
+    assert len(found) == len(expected)
+    distance = np.abs(found[:, None] - expected) / np.abs(expected)
+    return distance[linear_sum_assignment(distance)].max()
+
+
+def random_motion(seed, kind, massive, massless, rank):
+    """Nonsymmetric C and K; the massless block of C has a rank, or zero rows and columns."""
+    rng = np.random.default_rng(seed)
+    n, rank = massive + massless, min(rank, massless)
+    R = rng.normal(size=(massive, massive))
+    M = np.zeros((n, n))
+    M[:massive, :massive] = R @ R.T + np.eye(massive)
+    K = 0.5 * rng.normal(size=(n, n)) + 4 * np.eye(n)
+    C = 0.3 * rng.normal(size=(n, n))
+    own = np.arange(massive, n)
+    block = np.zeros((massless, massless))
+    if kind == "combinations":
+        left, right = (np.linalg.qr(rng.normal(size=(massless, massless)))[0] for _ in range(2))
+        block = (left[:, :rank] * rng.uniform(0.3, 2.0, rank)) @ right[:, :rank].T
+    else:
+        block[:rank, :rank] = np.eye(rank) + 0.2 * rng.normal(size=(rank, rank))
+    C[np.ix_(own, own)] = block
+    if kind == "physical":  # no damping on the undamped ones at all, as from dampers between points
+        off = own[rank:]
+        C[off], C[:, off] = 0.0, 0.0
+    mixed = rng.permutation(n)
+    return motion_of(*(X[np.ix_(mixed, mixed)] for X in (M, C, K))), 2 * massive + rank
+
+
+systems = st.builds(
+    random_motion,
+    st.integers(0, 2**32 - 1),
+    st.sampled_from(["combinations", "coordinates", "physical"]),
+    st.integers(1, 4),
+    st.integers(0, 4),
+    st.integers(0, 4),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(systems)
+def test_random_systems_keep_eigenvalues_and_receptance(drawn):
+    motion, order = drawn
+    model = state_space(motion)
+    assert model.A.shape == (order, order)
+    assert len(model.states) == len(set(model.states)) == order
+    assert farthest(model.eigenvalues, finite_eigenvalues(motion)) < 1e-10
+    omega = np.array([0.0, 0.7, 3.1, 40.0])
+    w = omega[:, None, None]
+    dynamic = motion.K + 1j * w * motion.C - w * w * motion.M
+    H = model.frequency_response(omega)
+    unit = np.abs(H @ dynamic - np.eye(len(motion.M)))
+    assert (
+        unit.max(axis=(1, 2)) < 1e-10 * np.abs(H).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
+    ).all()
+
+
+def test_a_scaled_system_is_the_same_system():
+    """In newtons and metres: stiffness 1e8, masses from 1e-2 to 1e3; the split must not see the units."""
+    rng = np.random.default_rng(3)
+    for kind in ("combinations", "coordinates", "physical"):
+        motion, order = random_motion(5, kind, 3, 3, 2)
+        s = 10 ** rng.uniform(-2, 2, 6)
+        time = 2e-3
+        scaled = [1e6 * s[:, None] * X * s * time**k for k, X in enumerate((motion.K, motion.C, motion.M))]
+        model = state_space(motion_of(scaled[2], scaled[1], scaled[0]))
+        assert len(model.A) == order
+        assert farthest(model.eigenvalues * time, state_space(motion).eigenvalues) < 1e-10
+
+
+def test_damping_on_algebraic_coordinates_takes_the_momentum():
+    """m x'' + c y' + k x = f, e x' + h y = g: y = (g − e x')/h, so (m − c e/h) x'' + k x = f − c g'/h."""
+    m, c, e, h, k = 2.0, 0.6, 0.5, 3.0, 8.0
+    motion = motion_of([[m, 0], [0, 0]], [[0, c], [e, 0]], [[k, 0], [0, h]], ("x", "y"))
+    model = state_space(motion)
+    assert model.states == ("x", "p_x")
+    root = np.sqrt(k / (m - c * e / h))
+    np.testing.assert_allclose(np.sort(model.eigenvalues.imag), [-root, root], rtol=1e-12)
+    w = 1.3
+    expected = -1j * w * c / h / (k - w * w * (m - c * e / h))
+    assert model.frequency_response(w)[0, 0, 1] == pytest.approx(expected, rel=1e-12)
+    velocity = state_space(motion, inputs=["f_x", "f_y"], outputs=["v_x"])
+    assert velocity.frequency_response(w)[0, 0, 1] == pytest.approx(1j * w * expected, rel=1e-12)
+
+
+def test_feedthrough_of_a_force_on_a_massless_undamped_output():
+    """A mass on two springs in series; a force on the point between moves it at once by f/(k1 + k2)."""
+    k1, k2 = 3.0, 5.0
+    model = state_space(motion_of(np.diag([1.0, 0.0]), np.zeros((2, 2)), [[k1, -k1], [-k1, k1 + k2]]))
+    assert model.states == ("x1", "v_x1")
+    np.testing.assert_allclose(model.D, [[0, 0], [0, 1 / (k1 + k2)]], atol=1e-15)
+    np.testing.assert_allclose(model.A, [[0, 1], [-k1 * k2 / (k1 + k2), 0]], atol=1e-15)
+    np.testing.assert_allclose(model.B, [[0, 0], [1, k1 / (k1 + k2)]], atol=1e-15)
+    np.testing.assert_allclose(model.C, [[1, 0], [k1 / (k1 + k2), 0]], atol=1e-15)
+
+
+def test_a_damper_and_a_spring_without_mass_creep():
+    k, c = 4.0, 2.0
+    model = state_space(motion_of(0.0, c, k), outputs=["x1", "v_x1"])
+    assert model.states == ("x1",)
+    t = np.linspace(0.0, 3.0, 61)
+    _, y, _ = lsim(ScipyStateSpace(*model), np.ones_like(t), t)
+    np.testing.assert_allclose(y[:, 0], (1 - np.exp(-k * t / c)) / k, atol=1e-12)
+    np.testing.assert_allclose(y[:, 1], np.exp(-k * t / c) / c, atol=1e-12)
+
+
+def test_scipy_takes_it_and_answers_alike():
+    motion, _ = random_motion(11, "physical", 2, 2, 1)
+    model = state_space(motion, inputs=["f_x2", "f_x1"], outputs=["x3", "x1"])
+    A, B, C, D = model
+    assert (A is model.A, B is model.B, C is model.C, D is model.D) == (True,) * 4
+    omega = np.array([0.4, 2.0])
+    dynamic = motion.K + 1j * omega[:, None, None] * motion.C - omega[:, None, None] ** 2 * motion.M
+    expected = np.linalg.inv(dynamic)[:, [2, 0]][:, :, [1, 0]]
+    np.testing.assert_allclose(model.frequency_response(omega), expected, rtol=1e-10)
+    system = ScipyStateSpace(*model)
+    for k, w in enumerate(omega):
+        theirs = system.C @ np.linalg.solve(1j * w * np.eye(len(A)) - system.A, system.B) + system.D
+        np.testing.assert_allclose(theirs, expected[k], rtol=1e-10)
+
+
+def test_velocities():
+    motion, _ = random_motion(2, "physical", 2, 3, 2)
+    massless = np.flatnonzero(~motion.M.any(axis=0))
+    undamped = next(i for i in massless if not motion.C[i].any())
+    others = [name for i, name in enumerate(motion.coordinates) if i != undamped]
+    model = state_space(motion, outputs=[*others, *(f"v_{name}" for name in others)])
+    H = model.frequency_response([0.9, 2.5])
+    iw = 1j * np.array([0.9, 2.5])[:, None, None]
+    np.testing.assert_allclose(H[:, 4:], iw * H[:, :4], rtol=1e-9, atol=1e-12)
+    name = motion.coordinates[undamped]
+    with pytest.raises(ValueError, match=f"'v_{name}'.*follows 'f_{name}' at once"):
+        state_space(motion, outputs=[f"v_{name}"])
+    # its velocity exists where no force acts on it at once
+    force = next(f"f_{motion.coordinates[i]}" for i in range(5) if motion.M[i].any())
+    both = state_space(motion, inputs=[force], outputs=[name, f"v_{name}"]).frequency_response(0.9)[0]
+    assert both[1, 0] == pytest.approx(0.9j * both[0, 0], rel=1e-10)
+
+
+def test_combinations_without_mass():
+    """A mass that x1 + x2 moves, a damper and a spring on each: x1 − x2 creeps."""
+    motion = motion_of(np.ones((2, 2)), 0.5 * np.eye(2), np.diag([2.0, 2.0]))
+    model = state_space(motion, outputs=["x1", "v_x2"])
+    assert model.states == ("combination1", "v_combination1", "combination2")
+    assert farthest(model.eigenvalues, np.array([-4.0, *np.roots([2.0, 0.5, 2.0])])) < 1e-12
+    w = 1.7
+    expected = np.linalg.inv(motion.K + 1j * w * motion.C - w * w * motion.M)
+    found = model.frequency_response(w)[0]
+    np.testing.assert_allclose(found, [expected[0], 1j * w * expected[1]], rtol=1e-12)
+
+
+def test_a_shaft_with_shear_but_without_rotary_inertia():
+    """Its mass matrix is singular without a zero row."""
+    supports = [fem.Support(1, 1e7, 1e3), fem.Support(9, ((2e7, 1e6), (-1e6, 3e7)))]
+    rotor = fem.Rotor([0.1] * 8, 0.05, supports=supports, model=fem.Model(shear=True))
+    model = state_space(fem.equations_of_motion(rotor), inputs=["f_x3"], outputs=["x3", "y5"])
+    for value in fem.whirl_modes(rotor, 0.0, 6, method="exact").eigenvalues:
+        assert np.abs(model.eigenvalues - value).min() < 1e-9 * abs(value)
+
+
+def test_little_damping_on_a_massless_coordinate_costs_no_digits():
+    """A spring of two halves; at the point between them a damper c: one eigenvalue near −(k1 + k2)/c."""
+    k1, k2 = 3e8, 5e8
+    for c in (1e-2, 1e-5):
+        motion = motion_of(np.diag([10.0, 0.0]), np.diag([0.0, c]), [[k1, -k1], [-k1, k1 + k2]])
+        found = state_space(motion).eigenvalues
+        assert len(found) == 3
+        slow = found[np.abs(found) < 1e5]
+        root = np.sqrt(k1 * k2 / (k1 + k2) / 10.0)
+        decay = -0.5 * c * (k1 / (k1 + k2)) ** 2 / 10.0  # of first order in c
+        np.testing.assert_allclose(np.abs(slow.imag), root, rtol=1e-12)
+        np.testing.assert_allclose(slow.real, decay, rtol=1e-5, atol=1e-14 * root)
+
+
+def test_a_rotor_with_massless_pedestals_and_shaft():
+    """A massless shaft with discs, on damped cross-coupled bearings; a foot with and one without damping."""
+    rotor = fem.Rotor(
+        [0.1] * 6,
+        0.05,
+        density=0.0,
+        discs=[fem.Disc(3, 10.0, 0.3, 0.2), fem.Disc(5, 6.0, 0.2, 0.1)],
+        supports=[
+            fem.Support(1, ((1e7, 2e6), (-1e6, 2e7)), ((800.0, 10.0), (20.0, 600.0))),
+            fem.Support(6, 2e7, pedestal=fem.Pedestal(0.0, (5e7, 3e7), (0.0, 400.0))),
+        ],
+        model=fem.Model(rotary_inertia=True, gyroscopic=True),
+    )
+    for speed in (0.0, 400.0):
+        motion = fem.equations_of_motion(rotor, speed=speed)
+        model = state_space(motion, inputs=(), outputs=())
+        assert len(model.A) == 2 * 8 + 3  # x and y of node 1, and y of the foot
+        assert {"x1", "y1"} <= set(model.states)
+        theirs = fem.whirl_modes(rotor, speed, 6, method="exact").eigenvalues
+        for value in theirs:
+            assert np.abs(model.eigenvalues - value).min() < 1e-9 * abs(value)
+        assert model.speed == speed
+
+
+@pytest.mark.parametrize(
+    ("M", "C", "K", "message"),
+    [
+        # y is held by nothing
+        (np.diag([1.0, 0.0]), np.zeros((2, 2)), np.diag([1.0, 0.0]), "held neither"),
+        # a constraint x = g: index 3
+        (np.diag([1.0, 0.0]), np.zeros((2, 2)), [[1.0, 1.0], [1.0, 0.0]], "index above 1"),
+        # two massless points joined by a spring only
+        (
+            np.diag([1.0, 0, 0]),
+            np.zeros((3, 3)),
+            [[1.0, 0, 0], [0, 1e8, -1e8], [0, -1e8, 1e8]],
+            "held neither",
+        ),
+        # the same with a damper between them, which cannot hold both
+        (
+            np.diag([1.0, 0, 0]),
+            [[0, 0, 0], [0, 1e3, -1e3], [0, -1e3, 1e3]],
+            [[1.0, 0, 0], [0, 1e8, -1e8], [0, -1e8, 1e8]],
+            "held neither",
+        ),
+        # no mass where x1 = −x2, and no stiffness there
+        (np.ones((2, 2)), np.zeros((2, 2)), np.ones((2, 2)), "held neither"),
+        (np.eye(2), np.eye(2), [[1.0, np.nan], [0, 1]], "K holds numbers that are not finite"),
+        (np.eye(2), np.eye(3), np.eye(2), "C must be 2 × 2"),
+        (np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 0)), "no coordinates"),
+    ],
+)
+def test_what_has_no_state_space_is_refused(M, C, K, message):
+    M, C, K = (np.asarray(X, dtype=float) for X in (M, C, K))
+    motion = fem.Motion(M, C, K, tuple(f"x{i + 1}" for i in range(len(M))), 0.0)
+    with pytest.raises(ValueError, match=message):
+        state_space(motion)
+
+
+def test_names_are_checked():
+    motion = motion_of(np.eye(2), np.eye(2), np.eye(2))
+    for choice, message in (
+        ({"inputs": ["x1"]}, "no input 'x1': inputs are forces, f_x1 … f_x2"),
+        ({"inputs": ["f_x1", "f_x1"]}, "'f_x1' is named more than once"),
+        ({"inputs": "f_x1"}, "must be a list"),
+        ({"outputs": ["x3"]}, "no output 'x3'"),
+        ({"outputs": ["v_x3"]}, "no output 'v_x3'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            state_space(motion, **choice)
+    with pytest.raises(ValueError, match="same name"):
+        state_space(motion_of(np.eye(2), np.eye(2), np.eye(2), ("x1", "x1")))
+
+
+def test_frequencies_of_an_undamped_system():
+    model = state_space(motion_of(1.0, 0.0, 4.0))
+    with pytest.raises(ValueError, match="exactly an undamped natural frequency"):
+        model.frequency_response([1.0, 2.0])
+    with pytest.raises(ValueError, match="finite numbers"):
+        model.frequency_response([np.nan])
+    assert model.frequency_response(1.0)[0, 0, 0] == pytest.approx(1 / 3)
+    document = model.to_dict()
+    assert document["A"] == [[0.0, 1.0], [-4.0, 0.0]]
+    assert document["states"] == ["x1", "v_x1"]
+
+
+def test_rigid_motion_keeps_its_zero_eigenvalues():
+    """A free mass: x' = v, v' = f."""
+    model = state_space(motion_of(2.0, 0.0, 0.0))
+    np.testing.assert_array_equal(model.A, [[0, 1], [0, 0]])
+    np.testing.assert_array_equal(model.B, [[0], [0.5]])

@@ -1,0 +1,323 @@
+"""Pictures of reductions hold what the results hold, and their texts do not cover one another."""
+
+import dataclasses
+from itertools import pairwise
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from fem_rotors import rotor23, uniform
+
+import fem
+from rotorid.plots_placement import plot_placement
+from rotorid.plots_reduction import plot_methods, plot_reduction
+from rotorid.plots_running import plot_running, plot_stability
+from rotorid.reduction import reduce
+from rotorid.reduction.methods import compare_methods
+
+mpl.use("Agg")
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    """No figure outlives its test."""
+    from matplotlib import pyplot as plt
+
+    yield
+    plt.close("all")
+
+
+def boxes(texts):
+    figure = texts[0].figure
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    return [text.get_window_extent(renderer) for text in texts if text.get_text()]
+
+
+def texts_of(ax):
+    return [text for text in ax.texts if text.get_text()]
+
+
+def curves_of(ax):
+    return [line for line in ax.get_lines() if len(line.get_xdata()) > 2]
+
+
+def legend_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def apart(texts):
+    found = boxes(texts)
+    return not any(a.overlaps(b) for i, a in enumerate(found) for b in found[:i])
+
+
+def test_shapes_of_the_model_stand_on_those_of_the_rotor():
+    reduction = reduce(rotor23(), (7, 12, 18), 2)
+    ax = plot_reduction(reduction)
+    modes = reduction.rotor_modes
+    scale = np.abs(modes.shapes).max(axis=0)
+    curves = [line for line in ax.get_lines() if len(line.get_xdata()) > 100]
+    points = [line for line in ax.get_lines() if line.get_linestyle() == "None"]
+    assert len(curves) == len(points) == 3
+    for k in range(3):
+        x, y = curves[k].get_data()
+        at = np.searchsorted(x, modes.positions - 1e-9)
+        np.testing.assert_allclose(x[at], modes.positions, atol=1e-9)
+        np.testing.assert_allclose(y[at], modes.shapes[:, k] / scale[k], atol=1e-9)
+        np.testing.assert_allclose(points[k].get_xdata(), reduction.positions)
+        np.testing.assert_allclose(points[k].get_ydata(), reduction.shapes[:, k] / scale[k])
+    labels = " ".join(legend_of(ax))
+    assert "135.24 rad/s (1291 rpm, −0.0034 %), MAC 1.0000" in labels
+    assert "mode 3: 1069.3 rad/s" in labels
+    assert [text.get_text() for text in texts_of(ax)] == ["134 kg", "197 kg", "157 kg"]
+    assert ax.get_xlabel() == "position, m"
+
+
+def test_masses_at_neighbouring_nodes_are_written_apart():
+    reduction = reduce(rotor23(), (2, 4, 5, 11, 12, 13, 22), 5)
+    ax = plot_reduction(reduction)
+    assert len(texts_of(ax)) == 7
+    assert apart([*texts_of(ax), ax.title])
+    assert "first 6 of 7 modes" in ax.get_title()
+    given = plot_reduction(reduction, ax)
+    assert given is ax
+
+
+def test_modes_that_do_not_vibrate_are_named_and_have_no_points():
+    ax = plot_reduction(reduce(rotor23(), (2, 3, 4), 1))
+    assert "mode 3: does not vibrate" in legend_of(ax)
+    low, high = ax.get_ylim()
+    drawn = [line.get_ydata() for line in ax.get_lines() if line.get_linestyle() == "None"]
+    assert all(low < y < high for line in drawn for y in line)
+
+
+def test_bars_of_the_methods_hold_errors_and_mac():
+    methods = compare_methods(rotor23(), (7, 12, 18))
+    above, below = plot_methods(methods)
+    for i, row in enumerate(methods.rows):
+        errors = np.array([bar.get_height() for bar in above.containers[i]])
+        expected = np.where(np.abs(row.relative_error) < 1e-6, 0.0, 100 * row.relative_error)
+        np.testing.assert_allclose(errors, expected, rtol=1e-9)
+        losses = np.array([bar.get_y() + bar.get_height() for bar in below.containers[i]])
+        np.testing.assert_allclose(losses, np.maximum(1 - row.mac, 1e-6), rtol=1e-6)
+    assert legend_of(above) == [row.name for row in methods.rows]
+    written = [text.get_text() for text in texts_of(above)]
+    assert written.count("0") == 4  # SEREP three times, and the first mode of IRS
+    assert {"+7.5", "−8.1", "+0.00058"} <= set(written)
+    assert "0.98795" in [text.get_text() for text in texts_of(below)]
+    low, high = above.get_ylim()
+    assert low < -8.2
+    assert high > 7.5
+    assert [tick.get_text().split("\n")[0] for tick in below.get_xticklabels()] == [
+        "mode 1",
+        "mode 2",
+        "mode 3",
+    ]
+    assert apart(texts_of(above))
+    assert apart(texts_of(below))
+
+
+def test_many_modes_and_failed_methods_are_drawn():
+    above, below = plot_methods(compare_methods(rotor23(), (2, 4, 7, 11, 12, 18, 22), modes=4))
+    assert "first 6 of 7 modes" in above.get_title()
+    assert apart(texts_of(above))
+    assert apart(texts_of(below))
+    stiff = uniform(8, supports=[fem.Support(1, 1e16), fem.Support(9, 1e16)])
+    failed = compare_methods(stiff, (1, 5))
+    assert failed.row("SEREP").M is None
+    above, below = plot_methods(failed)
+    assert [text.get_text() for text in texts_of(above)].count("none") == 2
+
+
+def placement(**changes):
+    """Four choices, the last without a physical model."""
+    fields = {
+        "nodes": np.array([[3, 11], [4, 10], [7, 12], [1, 2]]),
+        "masses": np.array([[318.0, 146.0], [95.0, 208.0], [134.0, 197.0], [-5.0, 900.0]]),
+        "frequencies": np.ones((4, 2)),
+        "error": np.array([0.003, 0.011, 0.08, np.nan]),
+        "mac": np.array([0.06, 0.99, 0.97, np.nan]),
+        "condition": np.array([24.0, 17.0, 18.0, 900.0]),
+        "pareto": np.array([0, 1]),
+        "considered": 4,
+        "check": 2,
+        "best_by_frequency": 0,
+        "best_by_mac": 1,
+        "compromise": 1,
+        "book": 2,
+        "rotor": rotor23(),
+    }
+    return SimpleNamespace(**fields | changes)
+
+
+def test_the_map_holds_every_physical_choice_and_its_names():
+    ax = plot_placement(placement())
+    points = ax.collections[0].get_offsets()
+    np.testing.assert_allclose(points, [(0.03, 8.0), (0.01, 1.1), (0.94, 0.3)])
+    np.testing.assert_allclose(ax.collections[0].get_array(), [18.0, 17.0, 24.0])
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert "1 without physical model" in ax.get_legend().get_title().get_text()
+    labels = legend_of(ax)
+    assert labels[0].startswith("trade-off")
+    assert labels[1:] == [
+        "best by frequency: nodes 3, 11 (318, 146 kg), 0.3 %, MAC 0.0600",
+        "best by MAC and compromise: nodes 4, 10 (95, 208 kg), 1.1 %, MAC 0.9900",
+        "the book's rule: nodes 7, 12 (134, 197 kg), 8 %, MAC 0.9700",
+    ]
+    assert ax.figure.axes[1].get_ylabel() == "condition number of the regression"
+    ax.figure.canvas.draw()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"book": None},
+        {"book": 3},
+        {"error": np.array([0.0, 0.0, 0.0, np.nan]), "mac": np.array([1.0, 1.0, 1.0, np.nan])},
+        {"condition": np.ones(4)},
+    ],
+)
+def test_the_map_of_special_cases_is_drawn(changes):
+    ax = plot_placement(placement(**changes))
+    ax.figure.canvas.draw()
+    shown = ax.collections[0].get_offsets()
+    assert len(shown) == 3
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    assert all(left < x < right and low < y < high for x, y in shown)
+    assert any("book" in label for label in legend_of(ax)) is (changes.get("book", 2) == 2)
+    assert len(ax.figure.axes) == (1 if "condition" in changes else 2)
+
+
+def test_a_map_without_any_physical_choice_says_so():
+    nothing = np.full(4, np.nan)
+    ax = plot_placement(
+        placement(error=nothing, mac=nothing, pareto=np.array([], dtype=int), best_by_frequency=None,
+                  best_by_mac=None, compromise=None)
+    )  # fmt: skip
+    assert [text.get_text() for text in ax.texts] == ["no choice gives a physical model"]
+    assert ax.get_title() == "4 choices of 2 nodes, 4 without physical model"
+
+
+def running():
+    speeds = np.linspace(0.0, 300.0, 61)
+    shape = np.array([[1.0, 0.5], [0.5, 2.0]])
+    full = (speeds**2 / np.abs(100.0**2 - speeds**2 + 200j * 10))[:, None, None] * shape * 1e-3 + 0j
+    small = full * (1.0 + 0.03 * speeds / 300.0)[:, None, None]
+    near = np.abs(speeds - 100.0) <= 10.0
+    return SimpleNamespace(
+        speeds=speeds, full=full, small=small, nodes=(7, 18), sensors=(7, 18), criticals=np.array([100.0]),
+        bands=0.1, left_out=[(90.0, 110.0)], excluded=near | (speeds == 0),
+    )  # fmt: skip
+
+
+def test_both_responses_and_their_difference_over_speed():
+    cost = running()
+    ax = plot_running(cost)
+    full, small = ax.get_lines()[:2]
+    np.testing.assert_allclose(full.get_ydata(), np.abs(cost.full[1:, 1, 1]))
+    np.testing.assert_allclose(small.get_ydata(), np.abs(cost.small[1:, 1, 1]))
+    assert legend_of(ax) == ["full rotor", "2-mass model", "left out, ±10 % of a critical speed"]
+    assert "µm per g·mm" in ax.get_ylabel()
+    below = ax.figure.axes[1]
+    difference = curves_of(below)[0]
+    np.testing.assert_allclose(difference.get_ydata(), 3.0 * cost.speeds[1:] / 300.0, rtol=1e-9)
+    assert below.get_xlabel() == "speed, rad/s"
+    for panel in (ax, below):
+        band = panel.patches[0].get_path().get_extents(panel.patches[0].get_patch_transform())
+        assert (band.x0, band.x1) == (90.0, 110.0)
+    low, high = ax.get_ylim()
+    assert low > 0
+    assert high > np.abs(cost.small).max()
+
+
+def test_overlapping_bands_are_shaded_once_and_those_outside_not_at_all():
+    cost = running()
+    cost.criticals, cost.left_out = np.array([100.0, 104.0, 400.0]), [(90, 110), (93.6, 114.4), (360, 440)]
+    ax = plot_running(cost)
+    spans = [patch.get_path().get_extents(patch.get_patch_transform()) for patch in ax.patches]
+    assert [(span.x0, span.x1) for span in spans] == [(90.0, 114.4)]
+    assert ax.get_xlim()[1] < 360
+
+
+def test_one_sensor_and_plane_can_be_chosen():
+    cost = running()
+    ax = plot_running(cost, sensor=0, plane=18)
+    np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), np.abs(cost.full[1:, 0, 1]))
+    assert ax.get_ylabel().startswith("reading at node 7,\nunbalance at node 18")
+    below = ax.figure.axes[1]  # relative to the largest entry, which is four times this one
+    np.testing.assert_allclose(curves_of(below)[0].get_ydata(), 0.75 * cost.speeds[1:] / 300.0, rtol=1e-9)
+    only = plot_running(cost, ax, sensor=0, plane=18)
+    assert only is ax
+    for options, message in (
+        ({"sensor": 0}, "both a sensor and a plane"),
+        ({"sensor": 2, "plane": 7}, "numbered 0 to 1"),
+        ({"sensor": -1, "plane": 7}, "numbered 0 to 1"),
+        ({"sensor": 0, "plane": 12}, "masses stand at nodes 7, 18"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            plot_running(cost, **options)
+
+
+def stability(**changes):
+    speeds = np.linspace(0.0, 400.0, 41)
+    fields = {
+        "speeds": speeds,
+        "full_decrement": 0.01 * (1 - speeds / 200.0),
+        "small_decrement": 0.01 * (1 - speeds / 210.0),
+        "full_threshold": 200.0,
+        "small_threshold": 210.0,
+        "nodes": (7, 12, 18),
+    }
+    return SimpleNamespace(**fields | changes)
+
+
+def test_decrements_and_thresholds_of_both_models():
+    cost = stability()
+    ax = plot_stability(cost)
+    labels = ["full rotor, unstable from 200 rad/s", "3-mass model, unstable from 210 rad/s"]
+    assert legend_of(ax) == labels
+    lines = {line.get_label(): line for line in ax.get_lines()}
+    np.testing.assert_array_equal(lines[labels[0]].get_ydata(), cost.full_decrement)
+    np.testing.assert_array_equal(lines[labels[1]].get_ydata(), cost.small_decrement)
+    marks = [line.get_xdata()[0] for line in ax.get_lines() if list(line.get_ydata()) == [0.0]]
+    assert marks == [200.0, 210.0]
+    assert ax.get_ylim()[0] < cost.full_decrement.min()
+
+
+def test_a_stable_rotor_shows_where_it_would_be_unstable():
+    steady = np.full(41, 0.0036)
+    ax = plot_stability(
+        stability(full_decrement=steady, small_decrement=steady, full_threshold=None, small_threshold=None)
+    )
+    assert legend_of(ax) == ["full rotor", "3-mass model"]
+    low, high = ax.get_ylim()
+    assert low < 0 < 0.0036 < high
+
+
+def test_what_runs_away_or_does_not_oscillate_is_drawn():
+    gone = stability().full_decrement.copy()
+    gone[30:] = -np.inf
+    ax = plot_stability(stability(full_decrement=gone))
+    assert "full rotor runs away without oscillating" in legend_of(ax)
+    away = next(line for line in ax.get_lines() if "runs away" in str(line.get_label()))
+    np.testing.assert_array_equal(away.get_xdata(), stability().speeds[30:])
+    nothing = np.full(41, np.nan)
+    ax = plot_stability(
+        stability(full_decrement=nothing, small_decrement=nothing, full_threshold=None, small_threshold=None)
+    )
+    assert "nothing oscillates" in [text.get_text() for text in ax.texts]
+    ax.figure.canvas.draw()
+    # a well-damped rotor at standstill does not flatten the rest
+    tall = stability().full_decrement.copy()
+    tall[0] = 500.0
+    assert plot_stability(stability(full_decrement=tall)).get_ylim()[1] < 1.0
+
+
+def test_results_draw_themselves():
+    methods = compare_methods(rotor23(), (7, 12, 18))
+    above, below = methods.plot()
+    assert above.figure is below.figure
+    same = dataclasses.replace(methods, warnings=("said",)).plot((above, below))
+    assert same == (above, below)
+    assert all(a.get_position().y0 >= b.get_position().y1 for a, b in pairwise((above, below)))

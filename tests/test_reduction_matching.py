@@ -1,0 +1,281 @@
+"""Mass sets with given frequencies: closed forms, permutations, random chains, and their shapes."""
+
+import json
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fem
+from rotorid.reduction import equivalent_masses, matching, natural_frequencies, reduce
+from rotorid.reduction.matching import match, matching_masses
+from rotorid.reduction.trading import trade_off
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    return read_rotor(sample_data() / "rotor23.csv")
+
+
+@pytest.fixture(scope="module")
+def table(rotor):
+    return trade_off(rotor, (7, 12, 18))
+
+
+def chain(springs, masses):
+    """Compliance and frequencies, rad/s, of masses in a row, the first spring to the ground."""
+    n = len(masses)
+    K = np.diag(springs) + np.diag([*springs[1:], 0.0])
+    for i in range(1, n):
+        K[i - 1, i] = K[i, i - 1] = -springs[i]
+    squares = np.linalg.eigvals(K / np.asarray(masses)[:, None]).real
+    alpha = np.linalg.inv(K)
+    return (alpha + alpha.T) / 2, np.sqrt(np.sort(squares))
+
+
+def check(alpha, omega, sets):
+    """Every set is positive and has these frequencies, by another eigenvalue problem than the solver's."""
+    assert (sets > 0).all()
+    for masses in sets:
+        squares = np.linalg.eigvals(np.linalg.inv(alpha) / masses[:, None])
+        np.testing.assert_allclose(np.sqrt(np.sort(squares.real)), omega, rtol=1e-8)
+
+
+def distance(sets, masses):
+    return np.abs(sets / np.asarray(masses) - 1).max(axis=1).min(initial=np.inf)
+
+
+def test_nodes_7_12_18_have_two_sets_and_only_two(rotor):
+    alpha, omega = fem.compliance(rotor, (7, 12, 18)), fem.critical_speeds(rotor, 3).frequencies
+    sets = matching_masses(alpha, omega)
+    np.testing.assert_allclose(sets, [[89.1, 196.5, 198.6], [280.5, 162.1, 76.5]], atol=0.05)
+    for masses in sets:
+        np.testing.assert_allclose(natural_frequencies(alpha, masses)[0], omega, rtol=1e-9)
+    check(alpha, omega, sets)
+
+
+def test_one_and_two_masses_in_closed_form():
+    assert matching_masses([[2e-8]], [1e3]) == pytest.approx(50.0)
+    # α11 m1 + α22 m2 = λ1 + λ2 = 4, det α m1 m2 = λ1 λ2 = 2, as 3 m1 + m2 = 4 and 2 m1 m2 = 2
+    sets = matching_masses([[3.0, 1.0], [1.0, 1.0]], 1 / np.sqrt([2 + np.sqrt(2), 2 - np.sqrt(2)]))
+    np.testing.assert_allclose(sets, [[1 / 3, 3.0], [1.0, 1.0]], rtol=1e-9)
+
+
+def test_two_sets_that_coincide_are_one():
+    sets = matching_masses([[2.0, 1.0], [1.0, 2.0]], [1 / np.sqrt(3), 1.0])
+    np.testing.assert_allclose(sets, [[1.0, 1.0]], rtol=1e-6)
+
+
+def test_there_may_be_no_set_at_all(rotor):
+    alpha = fem.compliance(rotor, (7, 12))
+    for omega in (fem.critical_speeds(rotor, 2).frequencies, [100.0, 110.0]):
+        result = match(alpha, omega)
+        assert result.masses.shape == (0, 2)
+        assert result.complete
+    trial = match(
+        fem.compliance(rotor, (5, 9, 13, 18)), fem.critical_speeds(rotor, 4).frequencies, starts=300
+    )
+    assert trial.masses.shape == (0, 4)
+    assert not trial.complete
+
+
+@pytest.mark.parametrize("masses", [(1.0, 2.5), (1.0, 2.0, 4.5), (1.0, 2.0, 4.0, 9.0)])
+def test_equal_places_can_be_exchanged(masses):
+    """Where all α_ii and all α_ij are equal, every order of the masses has the same frequencies: n! sets."""
+    n = len(masses)
+    alpha = np.eye(n) + 0.4
+    omega, _ = natural_frequencies(alpha, masses)
+    sets = matching_masses(alpha, omega)
+    np.testing.assert_allclose(sets, sorted(permutations(masses)), rtol=1e-8)
+
+
+def test_mirrored_places_have_mirrored_sets():
+    """The outer places are alike (p12 = p23): the elimination then has double roots only."""
+    alpha = np.array([[3.0, 2.0, 1.0], [2.0, 4.0, 2.0], [1.0, 2.0, 3.0]]) / 4
+    for masses in ([1.0, 1.7, 2.4], [0.2, 3.0, 0.9], [1.0, 1.0, 3.0]):
+        omega, _ = natural_frequencies(alpha, masses)
+        sets = matching_masses(alpha, omega)
+        check(alpha, omega, sets)
+        assert distance(sets, masses) < 1e-6
+        mirrored = sets[:, ::-1]
+        np.testing.assert_allclose(sets, mirrored[np.lexsort(mirrored.T[::-1])], rtol=1e-5)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_the_own_masses_of_a_chain_are_among_its_sets(data):
+    n = data.draw(st.integers(1, 3))
+    size = st.floats(0.05, 20.0, allow_nan=False)
+    springs = np.array(data.draw(st.lists(size, min_size=n, max_size=n))) * 1e6
+    masses = np.array(data.draw(st.lists(size, min_size=n, max_size=n))) * 10
+    alpha, omega = chain(springs, masses)
+    result = match(alpha, omega)
+    # at a fold two sets meet, and a mass is only known to the root of the rounding error
+    assert distance(result.masses, masses) < 1e-5
+    check(alpha, omega, result.masses)
+    assert result.complete
+    assert len(result.masses) <= (1, 2, 6)[n - 1]
+
+
+def test_elimination_finds_what_many_random_starts_find():
+    """Two ways to the sets of three masses; there are 2, 4 or 6 of them."""
+    rng = np.random.default_rng(3)
+    counts = []
+    for _ in range(25):
+        alpha, omega = chain(np.exp(rng.uniform(-1.5, 1.5, 3)), np.exp(rng.uniform(-1.5, 1.5, 3)))
+        sets = matching_masses(alpha, omega)
+        root, lam = np.sqrt(np.diag(alpha)), 1 / omega**2
+        shape, z = alpha / np.outer(root, root), lam / lam.sum()
+        u = matching._refined(shape, z, matching._random(3, 600, 1))
+        others, _ = matching._distinct(u[matching._confirmed(shape, z, u)])
+        np.testing.assert_allclose(others * lam.sum() / np.diag(alpha), sets, rtol=1e-7)
+        counts.append(len(sets))
+    assert set(counts) == {2, 4, 6}
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_four_and_more_masses_are_not_proven_complete(n):
+    rng = np.random.default_rng(n)
+    springs, masses = np.exp(rng.uniform(-1, 1, n)), np.exp(rng.uniform(-1, 1, n))
+    alpha, omega = chain(springs, masses)
+    result = match(alpha, omega, starts=600)
+    assert distance(result.masses, masses) < 1e-8
+    check(alpha, omega, result.masses)
+    assert len(result.masses) % 2 == 0
+    assert not result.complete
+    assert result.found.sum() <= result.starts
+    assert "not proven" in result.warnings[0]
+    again = match(alpha, omega[::-1], starts=600)
+    np.testing.assert_array_equal(result.masses, again.masses)
+
+
+def test_too_few_starts_are_continued_and_an_odd_number_is_said():
+    alpha = np.eye(4) + 0.4
+    omega, _ = natural_frequencies(alpha, [1.0, 2.0, 4.0, 9.0])
+    few = match(alpha, omega, starts=8)
+    assert 0 < len(few.masses) < 24
+    assert few.starts == 8 * matching.ROUNDS
+    assert few.found.min() < matching.RARE
+    odd = [match(alpha, omega, starts=8, seed=seed) for seed in range(12)]
+    assert {len(r.masses) % 2 for r in odd} == {0, 1}
+    for r in odd:
+        assert ("should be even" in r.warnings[0]) == (len(r.masses) % 2 == 1)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "omega", "message"),
+    [
+        (np.eye(3), [1.0, 2.0], r"compliance \(n, n\)"),
+        (np.ones((2, 3)), [1.0, 2.0], r"compliance \(n, n\)"),
+        (np.zeros((0, 0)), [], r"compliance \(n, n\)"),
+        ([[1.0, np.nan], [np.nan, 1.0]], [1.0, 2.0], "finite"),
+        (np.eye(2), [1.0, np.inf], "finite"),
+        (np.eye(2), [0.0, 1.0], "positive"),
+        ([[1.0, 0.1], [0.2, 1.0]], [1.0, 2.0], "symmetric"),
+        ([[1.0, 2.0], [2.0, 1.0]], [1.0, 2.0], "positive definite"),
+        (np.eye(2), [1.0, 1.0], "two frequencies are equal"),
+        (np.eye(2), [1.0, 5000.0], "factor of 1000"),
+    ],
+)
+def test_bad_inputs_are_refused(alpha, omega, message):
+    with pytest.raises(ValueError, match=message):
+        matching_masses(alpha, omega)
+
+
+def test_no_starts_are_refused():
+    with pytest.raises(ValueError, match="starts must be at least 1"):
+        match(np.eye(4) + 0.1, [1.0, 1.2, 1.4, 1.6], starts=0)
+
+
+def test_trade_off_puts_exact_frequencies_beside_shapes(rotor, table):
+    assert table.names[-2:] == ("matching set 1", "matching set 2")
+    assert table.matching.tolist() == [False] * 5 + [True] * 2
+    assert np.abs(table.relative_error[-2:]).max() < 1e-9
+    np.testing.assert_allclose(table.mac[-2:].min(axis=1), [0.8388, 0.7326], atol=5e-5)
+    assert table.traps.tolist() == [5, 6]
+    for k, name in (
+        (1, "regression, 1 mode"),
+        (2, "regression, 2 modes, equal rows"),
+        (3, "regression, 3 modes, equal rows"),
+    ):
+        row, one = table.names.index(name), reduce(rotor, (7, 12, 18), k)
+        np.testing.assert_allclose(table.masses[row], one.masses.solution, rtol=1e-9)
+        np.testing.assert_allclose(table.relative_error[row], one.relative_error, atol=1e-10)
+        np.testing.assert_allclose(table.mac[row], one.mac, rtol=1e-9)
+        assert table.condition[row] == pytest.approx(one.masses.condition_number)
+    row = table.names.index("regression, 2 modes, relative rows")
+    weighted = equivalent_masses(
+        fem.compliance(rotor, (7, 12, 18)),
+        table.rotor_frequencies[:2],
+        table.rotor_shapes[:, :2],
+        rows="relative",
+    )
+    np.testing.assert_allclose(table.masses[row], weighted.values, rtol=1e-9)
+
+
+def test_trade_off_says_the_trap_in_words(table):
+    text = " ".join(table.summary().split())
+    assert (
+        "2 different mass set(s) have the rotor's 3 frequencies exactly. Frequencies alone are a trap" in text
+    )
+    assert "Do not use these: matching set 1 has MAC 0.8388 in mode 3; matching set 2 has MAC 0.7326" in text
+    assert "Closest in shape: regression, 3 modes, relative rows, smallest MAC 0.9912 in mode 3" in text
+    assert "-0.0000" not in text
+    assert max(map(len, table.summary().splitlines())) <= 110
+    document = table.to_dict()
+    json.dumps(document, allow_nan=False)
+    assert [a["matching"] for a in document["alternatives"]] == table.matching.tolist()
+    assert document["alternatives"][-1]["condition_number"] is None
+    frame = table.to_frame()
+    np.testing.assert_array_equal(frame[["mass_7_kg", "mass_12_kg", "mass_18_kg"]], table.masses)
+    np.testing.assert_array_equal(frame[["mac_1", "mac_2", "mac_3"]], table.mac)
+
+
+def test_trade_off_where_no_model_is_good(rotor):
+    text = " ".join(trade_off(rotor, (3, 11, 14)).summary().split())
+    assert "None of these models moves like the rotor in all 3 modes" in text
+    nothing = trade_off(rotor, (2, 3, 4))
+    assert not nothing.matching.any()
+    assert sum("not positive, no physical model" in w for w in nothing.warnings) == 5
+    assert "No set of positive masses at these nodes has all 3 frequencies. No model here" in " ".join(
+        nothing.summary().split()
+    )
+    json.dumps(nothing.to_dict(), allow_nan=False)
+    alone = trade_off(rotor, [12])
+    np.testing.assert_allclose(alone.masses, 332.419, atol=1e-3)
+    assert "One mass has no shape" in alone.summary()
+
+
+def test_trade_off_names_what_it_leaves_out():
+    ends = [fem.Support(1, 1e10), fem.Support(25, 1e10)]
+    beam = fem.Rotor([0.05] * 24, 0.06, supports=ends, stations={"middle": 13})
+    table = trade_off(beam, ["middle", 7])
+    assert table.nodes == (13, 7)
+    assert table.names[0] == "regression, 1 mode"
+    assert not any("2 modes" in name for name in table.names)
+    assert sum("left out, a mode has a node at the first mass" in w for w in table.warnings) == 2
+    assert len(trade_off(beam, ["middle", 7], normalise="length").names) == 3
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [((), "different nodes"), ((7, 7), "different nodes"), ((7, 99), "node 99 does not exist")],
+)
+def test_trade_off_refuses_bad_nodes(rotor, nodes, message):
+    with pytest.raises(ValueError, match=message):
+        trade_off(rotor, nodes)
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.lists(st.floats(0.1, 10.0), min_size=8, max_size=8))
+def test_random_starts_reach_the_own_masses_of_four(numbers):
+    springs, masses = np.array(numbers[:4]) * 1e6, np.array(numbers[4:]) * 10
+    alpha, omega = chain(springs, masses)
+    result = match(alpha, omega, starts=1000)
+    assert distance(result.masses, masses) < 1e-5
+    check(alpha, omega, result.masses)
+    assert len(result.masses) <= 24

@@ -1,0 +1,300 @@
+"""Places of equivalent masses: all choices against the one-by-one reduction, closed forms and brute force."""
+
+import json
+from itertools import combinations
+from math import comb
+
+import numpy as np
+import pytest
+
+import fem
+from rotorid.reduction import equivalent_masses, mac, natural_frequencies, placement, reduce
+from rotorid.reduction.placement import book_nodes, rank_nodes
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    return read_rotor(sample_data() / "rotor23.csv")
+
+
+@pytest.fixture(scope="module")
+def triples(rotor):
+    return rank_nodes(rotor)
+
+
+@pytest.fixture(scope="module")
+def beam():
+    """A uniform beam on (almost) rigid supports at its ends: sin(k π x / l)."""
+    return fem.Rotor([0.05] * 24, 0.06, supports=[fem.Support(1, 1e10), fem.Support(25, 1e10)])
+
+
+@pytest.fixture(scope="module")
+def lumped():
+    """A rotor that is three masses: a shaft without mass."""
+    discs = [fem.Disc(2, 20.0), fem.Disc(4, 35.0), fem.Disc(5, 10.0)]
+    ends = [fem.Support(1, 1e7), fem.Support(7, 2e7)]
+    return fem.Rotor([0.2] * 6, 0.05, density=0.0, discs=discs, supports=ends, stations={"gear": 4})
+
+
+def test_all_triples_of_the_reference_rotor(triples):
+    assert triples.considered == comb(24, 3) == 2024
+    assert triples.ranked + triples.unphysical + triples.undetermined + triples.at_node == 2024
+    assert triples.nodes[:2].tolist() == [[3, 11, 14], [9, 14, 19]]
+    np.testing.assert_allclose(triples.masses[0], [317.61, 145.62, 194.64], atol=0.005)
+    assert 100 * triples.error[0] == pytest.approx(0.2975, abs=5e-5)
+    assert 100 * triples.error[1] == pytest.approx(0.728, abs=5e-4)
+    assert len({tuple(row) for row in triples.nodes.tolist()}) == 2024
+    assert (np.diff(triples.nodes, axis=1) > 0).all()
+
+
+def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
+    assert triples.mac[0] < 0.1
+    assert triples.worst_mode[0] == 3
+    assert any("do not choose by frequency alone" in text for text in triples.warnings)
+    text = triples.summary()
+    assert "Frequencies alone are a trap" in text
+    assert "first nodes 3, 11, 14 (rank 1, MAC 0.06 in mode 3)" in " ".join(text.split())
+    assert 0 in triples.traps()
+    good = triples.compromise
+    assert triples.error[good] < 0.02
+    assert triples.mac[good] > 0.99
+
+
+@pytest.mark.parametrize(("n", "modes"), [(1, 1), (2, 2), (3, 1), (3, 2), (3, 3), (4, 2), (5, 4)])
+def test_every_choice_is_that_of_the_one_by_one_reduction(rotor, n, modes):
+    candidates = (2, 4, 7, 9, 12, 15, 18, 20, 23)
+    result = rank_nodes(rotor, n, modes, candidates=candidates)
+    assert result.considered == comb(9, n)
+    for i in np.random.default_rng(n).permutation(result.considered)[:20]:
+        one = reduce(rotor, result.nodes[i].tolist(), modes)
+        np.testing.assert_allclose(result.masses[i], one.masses.solution, rtol=1e-7)
+        assert result.condition[i] == pytest.approx(one.masses.condition_number, rel=1e-7)
+        physical = bool((one.masses.solution > 0).all())
+        assert (i < result.ranked) == physical == np.isfinite(result.error[i])
+        if physical:
+            np.testing.assert_allclose(result.frequencies[i], one.frequencies, rtol=1e-8)
+            assert result.error[i] == pytest.approx(np.abs(one.relative_error).max(), rel=1e-5, abs=1e-10)
+            assert result.mac[i] == pytest.approx(one.mac.min(), rel=1e-6)
+            assert one.mac[result.worst_mode[i] - 1] == pytest.approx(one.mac.min(), abs=1e-12)
+        else:
+            assert result.worst_mode[i] == 0
+            assert np.isnan(result.mac[i])
+
+
+@pytest.mark.parametrize("normalise", ["first", "largest", "length"])
+@pytest.mark.parametrize("rows", ["equal", "relative", [[1.0, 2.0], [0.5, 1.0], [1.0, 0.0]]])
+def test_scales_and_weights_reach_the_regression(rotor, normalise, rows):
+    result = rank_nodes(
+        rotor, 3, 2, candidates=(4, 7, 12, 14, 18, 20), normalise=normalise, rows=rows, check=2
+    )
+    full = fem.critical_speeds(rotor, 2)
+    assert result.frequencies.shape == (20, 2)
+    for nodes, masses, error, worst in zip(
+        result.nodes, result.masses, result.error, result.mac, strict=True
+    ):
+        alpha, U = fem.compliance(rotor, nodes.tolist()), full.shapes[nodes - 1]
+        m = equivalent_masses(alpha, full.frequencies, U, normalise=normalise, rows=rows).solution
+        np.testing.assert_allclose(masses, m, rtol=1e-7)
+        if (m > 0).all():
+            omega, shapes = natural_frequencies(alpha, m)
+            assert error == pytest.approx(np.abs(omega[:2] / full.frequencies - 1).max(), rel=1e-5)
+            assert worst == pytest.approx(np.diag(mac(shapes[:, :2], U)).min(), rel=1e-6)
+
+
+def test_the_order_is_that_of_the_error_and_nothing_is_ranked_by_nan(triples):
+    r = triples.ranked
+    assert np.isfinite(triples.error[:r]).all()
+    assert (np.diff(triples.error[:r]) >= -1e-9).all()
+    assert (triples.masses[:r] > 0).all()
+    assert np.isnan(triples.error[r:]).all()
+    assert (triples.masses[r:].min(axis=1) <= 0).all()
+
+
+def test_the_trade_off_is_what_no_other_choice_beats(triples):
+    error, mac_ = triples.error[: triples.ranked], triples.mac[: triples.ranked]
+    front = [
+        i
+        for i in range(triples.ranked)
+        if not ((error <= error[i]) & (mac_ >= mac_[i]) & ((error < error[i]) | (mac_ > mac_[i]))).any()
+    ]
+    assert triples.pareto.tolist() == front
+    assert triples.best_by_frequency == front[0] == 0
+    assert triples.best_by_mac == front[-1] == int(np.argmax(mac_))
+    assert triples.compromise in front
+
+
+def test_small_batches_give_the_same(rotor, triples, monkeypatch):
+    monkeypatch.setattr(placement, "CHUNK", 3000)
+    again = rank_nodes(rotor)
+    np.testing.assert_array_equal(again.nodes, triples.nodes)
+    np.testing.assert_allclose(again.masses, triples.masses, rtol=1e-9)
+
+
+def test_a_rotor_that_is_three_masses_gets_them_at_its_discs(lumped):
+    for choices in ({}, {"modes": 3}, {"rows": "relative", "normalise": "length"}):
+        result = rank_nodes(lumped, **choices)
+        assert result.nodes[0].tolist() == [2, 4, 5]
+        np.testing.assert_allclose(result.masses[0], [20.0, 35.0, 10.0], rtol=1e-7)
+        assert result.error[0] < 1e-9
+        assert result.mac[0] > 1 - 1e-9
+        assert result.error[1] > 0.01
+        assert result.compromise == result.best_by_mac == 0
+
+
+def test_a_first_mass_at_a_node_of_a_mode_is_counted_and_not_ranked(beam):
+    """The middle, node 13, is a node of mode 2: with its shape scaled to 1 there is no regression."""
+    result = rank_nodes(beam, 2, 2)
+    middle_first = result.nodes[:, 0] == 13
+    assert result.at_node == middle_first.sum() == 12
+    assert np.isnan(result.condition[middle_first]).all()
+    assert (np.flatnonzero(middle_first) >= result.ranked + result.unphysical).all()
+    assert any("in 12 a mode has a node at the first mass" in text for text in result.warnings)
+    other = rank_nodes(beam, 2, 2, normalise="length")
+    assert other.at_node == 0
+    assert np.isfinite(other.condition).all()
+
+
+def test_modes_that_determine_no_masses_are_counted_and_not_ranked(beam):
+    result = rank_nodes(beam, 2, 1, rows=[[1.0], [0.0]])
+    assert (result.undetermined, result.ranked) == (300, 0)
+    assert np.isnan(result.masses).all()
+    assert result.best_by_frequency is result.best_by_mac is result.compromise is None
+    assert result.pareto.size == 0
+    assert "no choice gives a physical model" in result.summary()
+    document = result.to_dict()
+    assert document["choices"] == document["trade_off"] == []
+    json.dumps(document, allow_nan=False)
+
+
+def test_badly_conditioned_fits_are_said(rotor):
+    poor, fair = rank_nodes(rotor, 3, 1), rank_nodes(rotor, 3, 2)
+    assert (poor.condition[:10] > 60).any()
+    assert any("badly conditioned" in text for text in poor.warnings)
+    assert (fair.condition[:10] < 30).all()
+    assert not any("badly conditioned" in text for text in fair.warnings)
+
+
+@pytest.mark.parametrize(
+    ("n", "nodes"),
+    [
+        (1, [1 / 2]),
+        (2, [1 / 4, 3 / 4]),
+        (3, [1 / 4, 1 / 2, 3 / 4]),
+        (4, [1 / 8, 3 / 8, 5 / 8, 7 / 8]),
+        (5, [1 / 6, 1 / 4, 1 / 2, 3 / 4, 5 / 6]),
+        (6, [1 / 12, 3 / 12, 5 / 12, 7 / 12, 9 / 12, 11 / 12]),
+    ],
+)
+def test_the_books_rule_on_a_uniform_beam(beam, n, nodes):
+    """Mode k of a simply supported beam has its antinodes at (2 j − 1) l / (2 k)."""
+    assert book_nodes(beam, n) == tuple(round(24 * x) + 1 for x in nodes)
+
+
+def test_the_books_rule_on_the_books_rotor(rotor, triples):
+    assert book_nodes(rotor) == (7, 12, 18)
+    assert (book_nodes(rotor, 1), book_nodes(rotor, 2)) == ((12,), (7, 18))
+    assert triples.nodes[triples.book].tolist() == [7, 12, 18]
+    assert triples.book == triples.index((18, 7, 12))
+    np.testing.assert_allclose(triples.masses[triples.book], [134.203, 196.617, 157.083], atol=1e-3)
+    without = rank_nodes(rotor, candidates=[6, 7, 12, 14, 20])
+    assert without.book is None
+    assert "7, 12, 18 are not all among the candidates" in without.summary()
+    with pytest.raises(ValueError, match="not among the choices"):
+        without.index((7, 12, 18))
+
+
+def test_the_books_rule_needs_enough_antinodes(rotor, beam):
+    # the fourth antinode of mode 4 is on the overhang
+    with pytest.raises(ValueError, match=r"mode 4 has 3 antinode\(s\) between the outermost supports"):
+        book_nodes(rotor, 4)
+    soft = fem.Rotor(beam.length, beam.outer_diameter, supports=[fem.Support(1, 1e3), fem.Support(25, 1e3)])
+    with pytest.raises(ValueError, match="mode 2 has 0 antinode"):
+        book_nodes(soft, 2)
+    coarse = fem.Rotor([0.3] * 4, 0.06, supports=[beam.supports[0], fem.Support(5, 1e10)])
+    with pytest.raises(ValueError, match="share a node"):
+        book_nodes(coarse, 5)
+    assert rank_nodes(coarse, 5, 2).book is None
+
+
+def test_every_number_of_masses_up_to_every_node():
+    small = fem.Rotor([0.2] * 6, 0.05, supports=[fem.Support(1, 1e7), fem.Support(7, 2e7)])
+    for n in range(1, 8):
+        result = rank_nodes(small, n, n)
+        assert result.considered == comb(7, n)
+        assert {tuple(row) for row in result.nodes.tolist()} == set(combinations(range(1, 8), n))
+        assert result.ranked > 0
+        assert result.summary()
+    assert "One mass has no shape" in rank_nodes(small, 1, 1).summary()
+
+
+def test_stations_are_candidates_too(lumped):
+    result = rank_nodes(lumped, 3, 2, candidates=[5, "gear", 2, 6])
+    assert result.candidates == (2, 4, 5, 6)
+    assert result.nodes[0].tolist() == [2, 4, 5]
+
+
+def test_what_the_plane_at_rest_leaves_out_is_said(lumped):
+    ends = [fem.Support(1, ((1e7, 0.0), (0.0, 3e7))), fem.Support(7, 2e7)]
+    turning = fem.Rotor(lumped.length, 0.05, density=0.0, discs=lumped.discs, supports=ends)
+    result = rank_nodes(turning)
+    assert "plane x of the rotor at rest" in result.warnings[0]
+    np.testing.assert_allclose(result.masses[0], rank_nodes(lumped).masses[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"n": 0}, "number of masses"),
+        ({"n": 25}, "24 candidates hold 1 … 24"),
+        ({"n": 2, "modes": 3}, "2 masses can use 1 … 2"),
+        ({"modes": 0}, "number of modes"),
+        ({"check": 4}, "3 masses have 1 … 3"),
+        ({"n": 12}, "ways, more than 2000000: give fewer nodes as candidates"),
+        ({"candidates": [4, 4, 7]}, "candidates must be different nodes"),
+        ({"candidates": []}, "candidates must be different nodes"),
+        ({"candidates": [4, 7, 99]}, "node 99 does not exist"),
+        ({"candidates": [4, 7]}, "2 candidates hold 1 … 2"),
+        ({"normalise": "second"}, "normalise"),
+        ({"rows": "heavy"}, "rows"),
+        ({"speed": -1.0}, "speed must be"),
+    ],
+)
+def test_bad_questions_are_refused(rotor, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        rank_nodes(rotor, **arguments)
+
+
+def test_a_rotor_that_is_free_or_has_too_few_modes_is_refused(rotor, lumped):
+    with pytest.raises(ValueError, match="support"):
+        rank_nodes(fem.Rotor(rotor.length, rotor.outer_diameter))
+    with pytest.raises(ValueError, match="4 critical speeds cannot be found"):
+        rank_nodes(lumped, 4)
+
+
+def test_document_frame_and_text(triples):
+    document = triples.to_dict(top=5)
+    json.dumps(document, allow_nan=False)
+    assert [choice["rank"] for choice in document["choices"]] == [1, 2, 3, 4, 5]
+    assert document["best_by_frequency"]["nodes"] == [3, 11, 14]
+    assert document["book_rule"]["nodes"] == [7, 12, 18]
+    assert document["considered"] == 2024
+    frame = triples.to_frame()
+    assert len(frame) == 2024
+    assert frame["rank"].notna().sum() == triples.ranked
+    assert np.flatnonzero(frame["trade_off"]).tolist() == triples.pareto.tolist()
+    np.testing.assert_array_equal(frame[["node_1", "node_2", "node_3"]], triples.nodes)
+    np.testing.assert_array_equal(frame["largest_error"], triples.error)
+    text = triples.summary(top=3)
+    assert "317.61, 145.62, 194.64" in text
+    assert max(len(line) for line in text.splitlines() if not line.startswith("Warning")) <= 110
+
+
+def test_the_map_of_all_choices(triples):
+    from matplotlib.figure import Figure
+
+    axes = Figure().subplots()
+    assert triples.plot(axes) is axes
+    assert axes.get_xlabel()
+    assert axes.get_ylabel()

@@ -1,0 +1,459 @@
+"""One model file for `rotorid fit` and `rotorid identify`, written from matrices and read back."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fem
+from rotorid.harmonic import identify
+from rotorid.harmonic.experiments import experiments
+from rotorid.reduction import reduce
+from rotorid.reduction.small import small_rotor
+from rotorid.samples import sample_data
+from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
+from rotorid.tables.modelwriting import ode_model_bytes
+from rotorid.tables.motionfile import read_motion
+from rotorid.timedomain import Record, simulate
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.statespace import state_space
+
+TRUTH = {"d_x7": 1234.5, "d_x12": 321.0, "d_x18": 567.0}
+BEGIN = {"x7": 2000.0, "x12": 500.0, "x18": 400.0}
+FREQUENCIES = np.array([40.0, 90.0, 133.0, 136.0, 300.0, 530.0, 545.0, 1000.0])
+
+
+@pytest.fixture(scope="module")
+def three():
+    return reduce(read_rotor(sample_data() / "rotor23.csv"), (7, 12, 18), 2).equations_of_motion
+
+
+def saved(folder, name, content):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def response(motion, dampers, forces):
+    """Amplitudes (frequencies, n) of a motion with dampers to the ground, solved here."""
+    C = motion.C + np.diag([dampers.get(f"d_{name}", 0.0) for name in motion.coordinates])
+    w = FREQUENCIES[:, None, None]
+    return np.linalg.solve(-w * w * motion.M + 1j * w * C + motion.K, forces[:, None])[:, :, 0]
+
+
+def amplitude_table(columns):
+    lines = [",".join(["frequency_rad_s", *(f"{n}_{part}" for n in columns for part in ("re", "im"))])]
+    for i, w in enumerate(FREQUENCIES):
+        cells = [repr(float(part)) for z in columns.values() for part in (z[i].real, z[i].imag)]
+        lines.append(",".join([repr(float(w)), *cells]))
+    return "\n".join(lines) + "\n"
+
+
+def worst(document):
+    return max(abs(document["parameters"][name]["value"] / value - 1) for name, value in TRUTH.items())
+
+
+@pytest.mark.parametrize("method", ["equation-error", "output-error"])
+@pytest.mark.parametrize("inputs", [(), ("f_x7",)])
+def test_amplitudes_give_the_dampers_of_a_reduced_rotor(cli, tmp_path, three, method, inputs):
+    model = saved(tmp_path, "model.toml", ode_model_bytes(three, BEGIN, {}, inputs=inputs))
+    X = response(three, TRUTH, np.array([2.0, 0, 0]))
+    force = np.full(len(X), 2.0 + 0j)
+    columns = {name: X[:, i] for i, name in enumerate(three.coordinates)} | {"f_x7": force}
+    outcome = cli(
+        "identify",
+        model,
+        saved(tmp_path, "data.csv", amplitude_table(columns)),
+        "--method",
+        method,
+        "--json",
+    )
+    assert outcome.code == 0, outcome.err
+    assert outcome.json["identifiable"]
+    assert worst(outcome.json) < 1e-6
+
+
+@pytest.mark.parametrize("inputs", [(), ("f_x12",)])
+def test_a_record_gives_the_dampers_of_a_reduced_rotor(cli, tmp_path, three, inputs):
+    content = ode_model_bytes(three, BEGIN, {"v_x12": 0.04}, inputs=inputs)
+    path = saved(tmp_path, "model.toml", content)
+    t = np.linspace(0, 0.4, 401)
+    u = 1e3 * np.sin(100 * t)
+    model = read_ode_model(path)
+    y = simulate(model, list(TRUTH.values()), Record(t, {}, dict.fromkeys(inputs, u))).y
+    header = ",".join(["t_s", *three.coordinates, *inputs])
+    table = np.column_stack([t, y, *(u for _ in inputs)])
+    rows = "\n".join(",".join(repr(float(x)) for x in row) for row in table)
+    outcome = cli("fit", path, saved(tmp_path, "record.csv", f"{header}\n{rows}\n"), "--json")
+    assert outcome.code == 0, outcome.err
+    assert worst(outcome.json) < 1e-6
+
+
+def test_an_amplitude_that_is_not_measured(cli, tmp_path, three):
+    """Output error predicts it; equation error says what it needs."""
+    model = saved(tmp_path, "model.toml", ode_model_bytes(three, BEGIN, {}))
+    X = response(three, TRUTH, np.array([1.0, 0, 0]))
+    columns = {"x7": X[:, 0], "x18": X[:, 2], "f_x7": np.ones(len(X), dtype=complex)}
+    data = saved(tmp_path, "data.csv", amplitude_table(columns))
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", TableWarning)
+        outcome = cli("identify", model, data, "--method", "output-error", "--json")
+        refused = cli("identify", model, data)
+    assert outcome.code == 0, outcome.err
+    assert worst(outcome.json) < 1e-6
+    assert "the table has no x12" in outcome.err
+    assert refused.code == 2
+    assert "the signal x12 of the model is not among the measurements" in refused.err
+
+
+def test_matrices_keep_all_digits_in_both_planes(tmp_path):
+    rng = np.random.default_rng(5)
+    M, C, K = (rng.standard_normal((4, 4)) * 10.0 ** rng.integers(-9, 9, (4, 4)) for _ in range(3))
+    motion = fem.Motion(M + 1e9 * np.eye(4), C, K, ("x7", "x12", "y7", "y12"), 314.1)
+    path = saved(tmp_path, "m.toml", ode_model_bytes(motion, {"x7": 3.0, "y12": 4.0}, {}))
+    back = read_motion(path, {"d_x7": 0.0, "d_y12": 0.0})
+    for key in "MCK":
+        np.testing.assert_array_equal(getattr(back, key), getattr(motion, key))
+    assert back.coordinates == motion.coordinates
+    assert back.speed == 314.1
+    damped = read_motion(path, {"d_x7": 100.0}).C - motion.C
+    np.testing.assert_allclose(np.diag(damped), [100.0, 0, 0, 4.0], rtol=1e-12, atol=1e-12 * abs(C).max())
+
+
+def test_values_that_a_motion_does_not_take(tmp_path, three):
+    path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, {}))
+    with pytest.raises(ValueError, match="d_x8 is no parameter of the model"):
+        read_motion(path, {"d_x8": 1.0})
+    with pytest.raises(ValueError, match="d_x7 must be a finite number"):
+        read_motion(path, {"d_x7": np.nan})
+    states = saved(tmp_path, "s.toml", '[states]\nx = "-a*x"\n[initial]\nx = 1\n[estimate]\na = 1\n')
+    with pytest.raises(InputError, match="key M: expected M, C and K: states have no mass matrix"):
+        read_motion(states)
+    text = path.read_text().replace("[estimate]", '[force]\nx7 = "-3*x12"\n[estimate]')
+    with pytest.raises(InputError, match=r"force.x7: expected no x12 in it"):
+        read_motion(saved(tmp_path, "f.toml", text))
+
+
+def test_nothing_to_estimate(tmp_path, three):
+    """Such a file is simulated and read back; fit and identify refuse it in words."""
+    path = saved(tmp_path, "m.toml", ode_model_bytes(three, {}, {"x7": 1e-3}, outputs=["x7", "v_x18"]))
+    model = read_ode_model(path)
+    assert model.parameters == ()
+    t = np.linspace(0, 0.1, 20)
+    y = simulate(model, [], t).y
+    M, K = np.diag(three.M), three.K
+    scale = np.sqrt(M)
+    squares, V = np.linalg.eigh(K / scale / scale[:, None])
+    q = V.T @ (scale * [1e-3, 0, 0])
+    exact = (V / scale[:, None]) @ (q[:, None] * np.cos(np.sqrt(squares)[:, None] * t))
+    np.testing.assert_allclose(y[:, 0], exact[0], rtol=1e-8, atol=1e-12)
+    assert model.outputs == ("x7", "v_x18")
+    np.testing.assert_array_equal(read_motion(path).K, K)
+    with pytest.raises(ValueError):
+        fit(model, Record(t, {"x7": y[:, 0], "v_x18": y[:, 1]}))
+    with pytest.raises(InputError, match="no parameter is to be estimated"):
+        read_harmonic_model(path)
+
+
+LIGHT = fem.Motion(
+    np.diag([100.0, 80.0, 0.0, 0.0]),
+    np.diag([0.0, 20.0, 3e3, 0.0]),
+    np.array(
+        [[3e6, -1e6, -1e6, 0.0], [-1e6, 3e6, -2e5, -1e6], [-1e6, -2e5, 4e6, 0.0], [0.0, -1e6, 0.0, 5e6]]
+    ),
+    ("x7", "x12", "x2", "x22"),
+    0.0,
+)
+"""Two masses, a massless support with a damper, and one without."""
+
+
+def test_states_of_massless_supports_serve_both(tmp_path):
+    content = ode_model_bytes(LIGHT, {"x7": 300.0, "x12": 90.0}, {"v_x7": 0.1}, inputs=["f_x7"])
+    path = saved(tmp_path, "m.toml", content)
+    truth = {"d_x7": 210.0, "d_x12": 150.0}
+    model = read_ode_model(path)
+    assert model.states == ("x7", "x12", "v_x7", "v_x12", "x2")
+    assert model.outputs == ("x7", "x12")
+    t = np.linspace(0, 0.5, 300)
+    record = Record(t, {}, {"f_x7": 50 * np.cos(90 * t)})
+    y = simulate(model, list(truth.values()), record).y
+    found = fit(model, Record(t, {"x7": y[:, 0], "x12": y[:, 1]}, record.inputs))
+    np.testing.assert_allclose(found.values, list(truth.values()), rtol=1e-6)
+
+    file = read_harmonic_model(path)
+    assert set(file.model.outputs) == {"x7", "x12"}  # x2 is eliminated
+    X = response(LIGHT, truth, np.array([1.0, 0, 0, 0]))
+    signals = {"x7": X[:, 0], "x12": X[:, 1], "f_x7": 1.0}
+    measured = experiments(file.model, FREQUENCIES, signals)
+    for options in ({}, {"method": "output-error", "start": file.start, "bounds": file.bounds}):
+        part = identify(file.model, measured, **options)
+        np.testing.assert_allclose(part.values, list(truth.values()), rtol=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.0, ((900.0, 100.0), (50.0, 700.0))])
+def test_turning_rotor_in_both_planes(cli, tmp_path, damping):
+    """Gyroscopic discs and cross-coupled bearings, whose amplitudes nobody measures."""
+    stiffness = ((4e7, 6e6), (-6e6, 5e7))
+    rotor = fem.Rotor(
+        length=[0.2, 0.3, 0.25, 0.3, 0.2],
+        outer_diameter=0.07,
+        discs=[fem.Disc(3, 40.0, 3.0, 1.6), fem.Disc(5, 25.0, 2.0, 1.1)],
+        supports=[fem.Support(2, stiffness, damping), fem.Support(4, stiffness, damping)],
+        model=fem.Model(gyroscopic=True),
+    )
+    motion = small_rotor(rotor, (3, 5), [40.0, 25.0]).motion(150.0)
+    truth = {"d_x3": 320.0, "d_y5": 710.0}
+    begin = {"x3": 100.0, "y5": 100.0}
+    model = saved(tmp_path, "m.toml", ode_model_bytes(motion, begin, {}, inputs=["f_x3"]))
+    X = response(motion, truth, np.eye(len(motion.coordinates))[0])
+    columns = {name: X[:, motion.index(name)] for name in ("x3", "x5", "y3", "y5")}
+    data = amplitude_table(columns | {"f_x3": np.ones(len(X), dtype=complex)})
+    outcome = cli("identify", model, saved(tmp_path, "data.csv", data), "--json")
+    assert outcome.code == 0, outcome.err
+    for name, value in truth.items():
+        assert outcome.json["parameters"][name]["value"] == pytest.approx(value, rel=1e-6)
+
+
+def test_outputs_that_do_not_show_a_mass(tmp_path, three):
+    """It is eliminated where nothing is estimated at it; else output error predicts it."""
+    X = response(three, TRUTH | {"d_x18": 0.0}, np.array([1.0, 0, 0]))
+    content = ode_model_bytes(three, {"x7": 900.0, "x12": 900.0}, {}, outputs=["x7", "x12"])
+    file = read_harmonic_model(saved(tmp_path, "m.toml", content))
+    assert file.model.outputs == ("x7", "x12")
+    forces = {"f_x7": 1.0, "f_x12": 0.0, "f_x18": 0.0}
+    signals = {"x7": X[:, 0], "x12": X[:, 1]}
+    found = identify(file.model, experiments(file.model, FREQUENCIES, signals | forces))
+    np.testing.assert_allclose(found.values, [TRUTH["d_x7"], TRUTH["d_x12"]], rtol=1e-6)
+
+    content = ode_model_bytes(three, {"x7": 900.0, "x12": 900.0}, {}, outputs=["x7", "x18"])
+    file = read_harmonic_model(saved(tmp_path, "n.toml", content))
+    assert set(file.model.outputs) == {"x7", "x12", "x18"}
+    signals = {"x7": X[:, 0], "x18": X[:, 2], "x12": np.nan}
+    measured = experiments(file.model, FREQUENCIES, signals | forces)
+    found = identify(file.model, measured, method="output-error", start=file.start, bounds=file.bounds)
+    np.testing.assert_allclose(found.values, [TRUTH["d_x7"], TRUTH["d_x12"]], rtol=1e-6)
+
+
+def test_writing_refuses(three):
+    with pytest.raises(ValueError, match="damper to be estimated at x2, which has no mass"):
+        ode_model_bytes(LIGHT, {"x2": 1.0}, {})
+    with pytest.raises(ValueError, match="initial: v_x2 is no state"):
+        ode_model_bytes(LIGHT, {}, {"v_x2": 1.0})
+    with pytest.raises(ValueError, match="K holds numbers that are not finite"):
+        ode_model_bytes(replace(three, K=three.K * np.nan), {}, {})
+    with pytest.raises(ValueError, match="no input 'f_x8'"):
+        ode_model_bytes(three, {}, {}, inputs=["f_x8"])
+    with pytest.raises(ValueError, match="the output x7 is named twice"):
+        ode_model_bytes(three, {}, {}, outputs=["x7", "x7"])
+    with pytest.raises(ValueError, match="value of x7 must be 0 or more"):
+        ode_model_bytes(three, {"x7": -1.0}, {})
+    with pytest.raises(ValueError, match="value of x7 must be a finite number"):
+        ode_model_bytes(three, {"x7": np.inf}, {})
+
+
+def test_lines_of_a_comment_stay_comments(tmp_path, three):
+    path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, {}, comments=["one\nM = 3", ""]))
+    assert path.read_text().startswith("# one\n# M = 3\n# \ncoordinates")
+    assert read_ode_model(path).parameters == tuple(TRUTH)
+
+
+MATRICES = """
+M = [["m", 0], [0, 2.0]]
+C = [[0.3, 0.1], [-0.1, "d"]]
+K = [[5, -1], [-1, "k"]]
+inputs = ["u"]
+[force]
+y1 = "g*u"
+[outputs]
+a = "1e3*y1"
+w = "v_y2/4"
+both = "y1 + 2*y2"
+[known]
+g = 2.5
+[estimate]
+m = 4.0
+d = 0.5
+k = 3.0
+[bounds]
+d = [0, inf]
+[errors]
+amplitude_percent = 1
+"""
+
+STATES = """
+inputs = ["u"]
+[states]
+x = "v"
+v = "-k*x - d*v + c*z + 3*u"
+z = "-r*z + x - 0.25*v"
+[outputs]
+x = "x"
+speed = "v"
+z = "2*z"
+[initial]
+x = 0
+v = "v0"
+z = 0
+[known]
+c = 0.7
+[estimate]
+k = 9.0
+d = 0.2
+r = 4.0
+"""
+
+
+def predicted(file, name, w):
+    values = file.model.predict(np.array(list(file.start.values())), w, {"u": np.ones(len(w), dtype=complex)})
+    return values[name]
+
+
+@pytest.mark.parametrize(
+    "text", [MATRICES, STATES.replace('"v0"', "1")], ids=["matrices with outputs", "states with outputs"]
+)
+def test_amplitudes_are_those_of_the_model_in_time(tmp_path, text):
+    path = saved(tmp_path, "m.toml", text)
+    file, model = read_harmonic_model(path), read_ode_model(path)
+    assert dict(file.start) == dict(zip(model.parameters, model.start, strict=True))
+    assert set(model.outputs) <= set(file.model.outputs)
+    w = np.array([0.1, 1.0, 2.7, 9.0])
+    expected = state_space(model).frequency_response(w)[:, :, 0]
+    for i, name in enumerate(model.outputs):
+        np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-12)
+
+
+def test_stated_errors_and_bounds_are_kept(tmp_path):
+    file = read_harmonic_model(saved(tmp_path, "m.toml", MATRICES))
+    assert file.errors is not None
+    assert file.errors.relative == 0.01
+    assert file.bounds == {"d": (0.0, np.inf)}
+
+
+def test_several_linear_outputs_identify(tmp_path):
+    """A sum of displacements is measured besides: nothing is counted wrongly."""
+    file = read_harmonic_model(saved(tmp_path, "m.toml", MATRICES))
+    w = np.array([0.3, 0.9, 1.4, 3.0])
+    truth = np.array([3.5, 0.8, 2.2])
+    u = {"u": np.ones(4, dtype=complex)}
+    signals = file.model.predict(truth, w, u) | u
+    found = identify(file.model, experiments(file.model, w, signals))
+    np.testing.assert_allclose(found.values, truth, rtol=1e-9)
+
+
+def test_a_parameter_of_the_start_alone_is_left_out_and_said(tmp_path):
+    path = saved(tmp_path, "m.toml", STATES.replace("r = 4.0", "r = 4.0\nv0 = 1.0"))
+    assert "v0" in read_ode_model(path).parameters
+    with pytest.warns(TableWarning, match="v0 stands in initial values only, .* left out"):
+        file = read_harmonic_model(path)
+    assert file.model.parameters == ("k", "d", "r")
+
+
+def test_states_need_no_initial_values_for_amplitudes(tmp_path):
+    text = re.sub(r"\[initial\].*?\[known\]", "[known]", STATES, flags=re.DOTALL)
+    assert read_harmonic_model(saved(tmp_path, "m.toml", text)).model.inputs == ("u",)
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "said"),
+    [
+        (MATRICES, '"g*u"', '"g*cos(3*t)"', r"force.y1 depends on the time t.*measured input"),
+        (MATRICES, '"g*u"', '"g*u*y1"', r"not linear in the signals: it contains"),
+        (MATRICES, '"g*u"', '"g*u + 1"', r"constant one has no influence"),
+        (MATRICES, '"y1 + 2*y2"', '"y1**2"', r"not linear in the signals"),
+        (MATRICES, '"y1 + 2*y2"', '"y1 + t"', r"outputs.both depends on the time"),
+        (MATRICES, '[["m", 0]', '[["m", "u"]', r"row 1 of M holds u"),
+        (
+            MATRICES.replace('w = "v_y2/4"', ""),
+            'a = "1e3*y1"',
+            'y2 = "1e3*y1"',
+            r"outputs.y2: the amplitude needs a name of its own",
+        ),
+        (MATRICES, 'a = "1e3*y1"', 'k = "1e3*y1"', r"outputs.k: the amplitude needs a name of its own"),
+        (MATRICES, '"k"]]', '"sin(k)"]]', r"neither a polynomial nor a fraction"),
+        (MATRICES, "m = 4.0", "m = 4.0\nunused = 1", r"unused is to be estimated but stands in no equation"),
+        (MATRICES, "[outputs]", 'per = ["m"]\n[outputs]', r"per: expected a name of coordinates"),
+        (MATRICES, "k = 3.0", "k = 3.0\nq", r"TOML"),
+        (STATES.replace('"v0"', "1"), "c*z", "c*z**2", r"not linear in the signals"),
+        (STATES.replace('"v0"', "1"), "3*u", "3*cos(t)", r"states.v depends on the time t"),
+        (STATES.replace('"v0"', "1"), "3*u", "3*u + 1", r"constant one has no influence"),
+        (STATES.replace('"v0"', "1"), "r = 4.0", "r = 4.0\np = 1.0", r"estimate: p is d/dt"),
+        (
+            STATES.replace('"v0"', "1"),
+            'inputs = ["u"]',
+            'inputs = ["u"]\nper_record = ["k"]',
+            r"per_record: k stands in the equations",
+        ),
+        (STATES, "v0", "v1", r"initial.v.*v1 is none"),
+    ],
+)
+def test_what_has_no_meaning_for_amplitudes_is_refused(tmp_path, text, old, new, said):
+    assert old in text
+    path = saved(tmp_path, "m.toml", text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_harmonic_model(path)
+    assert re.search(said, str(caught.value), re.DOTALL), str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_names_of_forces_that_are_taken(tmp_path):
+    text = 'M = [[1]]\nK = [["f_y1"]]\n[estimate]\nf_y1 = 1.0\n'
+    with pytest.raises(InputError, match="f_y1 is the force on y1 here"):
+        read_harmonic_model(saved(tmp_path, "m.toml", text))
+
+
+@pytest.mark.parametrize("rates", [["b", "a"], ["b", "c", "a"], ["a"], ["b", "c", "-a - b - c"], ["b", "b"]])
+def test_chains_and_circles_of_rates(tmp_path, rates):
+    """Rates that are plain states, also in circles, keep their meaning."""
+    names = "abc"[: len(rates)]
+    lines = [f'{n} = "{r}"' for n, r in zip(names, rates, strict=True)]
+    lines[-1] = lines[-1][:-1] + ' - e*a + u"'
+    outputs = [f'{n} = "{n}"' for n in names]
+    zeros = [f"{n} = 0" for n in names]
+    text = ["inputs = ['u']", "[states]", *lines, "[outputs]", *outputs, "[initial]", *zeros]
+    path = saved(tmp_path, "m.toml", "\n".join([*text, "[estimate]", "e = 3.0", ""]))
+    file, model = read_harmonic_model(path), read_ode_model(path)
+    w = np.array([0.5, 1.1, 4.0])
+    expected = state_space(model).frequency_response(w)[:, :, 0]
+    for i, name in enumerate(names):
+        np.testing.assert_allclose(predicted(file, name, w), expected[:, i], rtol=1e-11)
+
+
+@given(
+    entries=st.lists(st.integers(-3, 3), min_size=27, max_size=27),
+    light=st.sets(st.integers(0, 2), max_size=2),
+    damped=st.booleans(),
+    force=st.integers(0, 2),
+)
+def test_every_form_has_the_response_of_the_matrices(tmp_path_factory, entries, light, damped, force):
+    """Written in matrices or in states, read for time or amplitudes: always the same response."""
+    M, C, K = np.array(entries, dtype=float).reshape(3, 3, 3) / 10
+    M = M @ M.T + np.diag([2.0, 3.0, 4.0])
+    C = C + (np.diag([6.0, 5.0, 7.0]) if damped else 0)
+    K = K + np.diag([20.0, 30.0, 40.0])
+    for i in light:
+        M[i], M[:, i] = 0, 0
+        if not damped:
+            C[i], C[:, i] = 0, 0
+    names = ("x1", "x2", "y1")
+    motion = fem.Motion(M, C, K, names, 0.0)
+    heavy = [name for i, name in enumerate(names) if i not in light]
+    content = ode_model_bytes(motion, {heavy[0]: 2.0}, {}, inputs=[f"f_{names[force]}"], outputs=heavy)
+    path = saved(tmp_path_factory.mktemp("f"), "m.toml", content)
+    w = np.array([0.7, 2.9, 8.0])
+    damping = C + np.diag([2.0 if name == heavy[0] else 0.0 for name in names])
+    s = w[:, None, None]
+    exact = np.linalg.inv(-s * s * M + 1j * s * damping + K)[:, :, force]
+    exact = exact[:, [names.index(name) for name in heavy]]
+    found = state_space(read_ode_model(path)).frequency_response(w)[:, :, 0]
+    np.testing.assert_allclose(found, exact, rtol=1e-8, atol=1e-10)
+    file = read_harmonic_model(path)
+    inputs = {name: np.ones(3, dtype=complex) for name in file.model.inputs}
+    amplitudes = file.model.predict(np.array([2.0]), w, inputs)
+    for i, name in enumerate(heavy):
+        np.testing.assert_allclose(amplitudes[name], exact[:, i], rtol=1e-8, atol=1e-10)
