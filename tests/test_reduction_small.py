@@ -305,7 +305,7 @@ def test_condensed_pedestals_without_mass():
         (("fan",), (1.0,), {}, "no station is called 'fan'"),
         ((4, 8), (1.0,), {}, "as many masses"),
         ((4, 8), ("a", 1.0), {}, "numbers in kg"),
-        ((4, 8), (1.0, -2.0), {}, "node 8 is -2 kg; a physical model needs positive masses"),
+        ((4, 8), (1.0, -2.0), {}, "node 8 is -2 kg, not positive: a physical model needs positive masses"),
         ((4, 8), (1.0, 0.0), {}, "positive masses"),
         ((4, 8), (np.nan, 1.0), {}, "positive masses"),
         ((4, 8), (1.0, 1.0), {"modal_damping": (1.2,)}, "below 1"),
@@ -375,3 +375,15 @@ def test_document_frame_and_text(rotor, reduction):
     assert small.warnings == ()
     turning = replace(rotor, model=fem.Model(rotary_inertia=True, gyroscopic=True))
     assert "Warning: gyroscopic moments act on slopes" in small_rotor(turning, (7, 18), (1.0, 1.0)).summary()
+
+
+def test_python_control_takes_the_state_space():
+    import control
+
+    model = reduce(rotor23(), (7, 12, 18), 2).small((0.01, 0.02)).state_space()
+    system = control.ss(*model)
+    ours, theirs = np.sort_complex(model.eigenvalues), np.sort_complex(system.poles())
+    np.testing.assert_allclose(theirs, ours, rtol=1e-10)
+    omega = np.array([50.0, 300.0])
+    response = np.moveaxis(system(1j * omega), -1, 0)
+    np.testing.assert_allclose(response, model.frequency_response(omega), rtol=1e-8)

@@ -1,0 +1,191 @@
+"""`rotorid reduce` in full: places, methods, response, stability, measured modes, files."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+import fem
+from rotorid import read_motion
+from rotorid.samples import sample_data
+
+ROTOR = sample_data() / "rotor23.csv"
+BOOK = sample_data() / "book_task_9"
+COMPRESSOR = sample_data() / "compressor" / "rotor.toml"
+
+
+def book(which, modes, *more):
+    return (
+        "reduce", "--compliance", BOOK / f"compliance{which}.csv", "--measured", BOOK / f"modes{which}.csv",
+        "--modes", modes, *more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("which", "modes", "masses", "frequencies"),
+    [
+        ("_printed", 1, (95.879, 224.283, 136.575), (135.209, 592.93)),
+        ("_printed", 2, (130.050, 199.191, 154.698), (135.23, 541.26)),
+        ("", 1, (140.357, 191.941, 160.680), (135.2404, 530.68)),
+        ("", 2, (134.203, 196.617, 157.083), (135.2358, 539.05)),
+    ],
+)
+def test_tasks_9_1_and_9_2_as_commands(cli, which, modes, masses, frequencies):
+    document = cli(*book(which, modes, "--json")).json
+    np.testing.assert_allclose(document["masses_kg"], masses, atol=6e-4)
+    np.testing.assert_allclose(document["natural_frequencies_rad_s"][:2], frequencies, atol=6e-3)
+    assert document["positions_m"] is None
+    assert document["source"] == "measured"
+    assert document["relative_error"][2] is None or which == ""
+
+
+def test_the_error_of_the_printed_compliance_is_predicted(cli):
+    command = ("reduce", ROTOR, "--nodes", "7,12,18", "--modes", 2, "--errors", "alpha12=1.3", "--what-if",
+               "alpha12=1.336", "--json")  # fmt: skip
+    document = cli(*command).json
+    shift, spread = document["what_if"], document["uncertainty"]
+    np.testing.assert_allclose(shift["exact"]["masses_kg"], [-2.191, 0.426, -0.890], atol=1e-3)
+    np.testing.assert_allclose(shift["first_order"]["masses_kg"], [-2.573, 0.749, -1.183], atol=1e-3)
+    assert shift["exact"]["frequencies_rad_s"][1] == pytest.approx(-0.247, abs=1e-3)
+    assert "omega2" in shift["warnings"][0]  # first order has even the wrong sign there, and says so
+    np.testing.assert_allclose(spread["masses_std_kg"], [2.5, 0.73, 1.15], rtol=0.01)
+    drawn = spread["drawn"]["natural_frequencies_std_rad_s"]
+    assert abs(shift["exact"]["frequencies_rad_s"][1]) < 2 * drawn[1]
+    text = cli(*command[:-1]).out
+    assert "drawn inputs instead of first order" in text
+    assert "alpha12 100 %" in text
+
+
+def test_all_triples_are_ranked_and_the_trap_is_not_chosen(cli):
+    document = cli("reduce", ROTOR, "--rank", "--json").json
+    best = document["placement"]["choices"][0]
+    assert best["nodes"] == [3, 11, 14]
+    np.testing.assert_allclose(best["masses_kg"], [317.61, 145.62, 194.64], atol=6e-3)
+    assert best["largest_error"] == pytest.approx(0.002975, abs=5e-7)
+    assert document["nodes"] == [4, 10, 16]  # the compromise: the best by frequency has MAC 0.06 in mode 3
+    for place, nodes in (("best", [3, 11, 14]), ("mac", [6, 12, 18]), ("book", [7, 12, 18])):
+        assert cli("reduce", ROTOR, "--place", place, "--json").json["nodes"] == nodes
+    few = cli("reduce", ROTOR, "--rank", "--candidates", "7,12,18,20", "--json").json
+    assert few["placement"]["considered"] == 4
+
+
+def test_methods_trade_off_response_and_stability_stand_in_the_document(cli):
+    document = cli(
+        "reduce", ROTOR, "--nodes", "7,12,18", "--methods", "--trade-off", "--response", "auto",
+        "--stability", "0:9000rpm", "--supports-apart", "--json",
+    ).json  # fmt: skip
+    rows = {row["method"]: row for row in document["methods"]["methods"]}
+    np.testing.assert_allclose(
+        rows["Guyan"]["natural_frequencies_rad_s"], [135.2973, 545.3615, 1250.853], atol=6e-4
+    )
+    np.testing.assert_allclose(
+        rows["IRS"]["natural_frequencies_rad_s"], [135.2404, 540.7360, 1176.319], atol=6e-4
+    )
+    assert document["separated"]["span_m"] == pytest.approx(2.76)
+    assert document["response"]["largest"] < 0.08
+    assert document["response"]["median"] < 0.01
+    assert document["stability"]["small"]["status"] == "stable"
+    matching = [row for row in document["trade_off"]["alternatives"] if row["matching"]]
+    np.testing.assert_allclose(
+        sorted(row["masses_kg"] for row in matching),
+        [(89.08, 196.51, 198.60), (280.52, 162.08, 76.47)],
+        atol=5e-3,
+    )
+
+
+def test_supports_apart_give_the_same_masses(cli):
+    plain = cli("reduce", ROTOR, "--nodes", "7,12,18", "--json").json
+    apart = cli("reduce", ROTOR, "--nodes", "7,12,18", "--supports-apart", "--json").json
+    np.testing.assert_allclose(apart["masses_kg"], plain["masses_kg"], rtol=1e-8)
+
+
+def test_seals_at_the_masses_go_to_the_right_side(tmp_path, cli):
+    base = f'shaft = "{ROTOR}"\n[[seal]]\nnode = 12\nstiffness_N_per_m = 2e6\n'
+    path = tmp_path / "sealed.toml"
+    path.write_text(base)
+    plain = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--json")
+    apart = cli("reduce", path, "--nodes", "7,12,18", "--modes", 3, "--supports-apart", "--json")
+    assert plain.code == apart.code == 0, plain.err + apart.err
+    assert apart.json["seal_stiffness_N_per_m"] == [0.0, 2e6, 0.0]
+    # other rows of the same equations: the seal stands in the compliance, or beside it
+    np.testing.assert_allclose(apart.json["masses_kg"], plain.json["masses_kg"], rtol=0.01)
+
+
+def test_measured_modes_of_a_rotor_are_used_and_compared(cli):
+    own = cli("reduce", ROTOR, "--measured", BOOK / "modes.csv", "--json").json
+    assert own["nodes"] == [7, 12, 18]
+    np.testing.assert_allclose(own["masses_kg"], [134.203, 196.617, 157.083], atol=2e-3)
+    assert not own["warnings"]
+    one = cli("reduce", ROTOR, "--measured", BOOK / "modes.csv", "--nodes", "7,20", "--json")
+    assert one.code == 2
+    assert "no shape was measured at 20" in one.err
+
+
+@pytest.mark.parametrize("ending", ["json", "npz", "mat"])
+def test_the_state_space_has_the_eigenvalues_of_the_model_file(cli, tmp_path, ending):
+    space, model = tmp_path / f"space.{ending}", tmp_path / "model.toml"
+    outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", "--state-space", space, "--model", model)
+    assert outcome.code == 0, outcome.err
+    if ending == "json":
+        found = {key: np.array(value) for key, value in json.loads(space.read_text()).items()}
+    else:
+        found = dict(np.load(space)) if ending == "npz" else loadmat(space)
+    undamped = {f"d_x{node}": 0.0 for node in (7, 12, 18)}
+    back = fem.state_space(read_motion(model, undamped))
+    ours = np.sort(np.abs(np.linalg.eigvals(found["A"])))
+    np.testing.assert_allclose(ours, np.sort(np.tile(np.abs(back.eigenvalues), 2)), rtol=1e-10)
+    names = [str(np.squeeze(name)) for name in np.ravel(found["outputs"])]
+    assert names == ["x7", "x12", "x18", "y7", "y12", "y18"]
+
+
+def test_the_small_compressor_has_both_planes_and_damped_supports(cli, tmp_path):
+    model = tmp_path / "model.toml"
+    outcome = cli("reduce", COMPRESSOR, "--place", "compromise", "--masses", 3, "--speed", "6000rpm",
+                  "--model", model, "--stability", "1000:12000rpm", "--json")  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert "[states]" in model.read_text()
+    assert outcome.json["stability"]["full"]["status"] == outcome.json["stability"]["small"]["status"]
+
+
+@pytest.mark.parametrize("view", ["shapes", "methods", "placement", "response", "stability"])
+def test_every_view_is_drawn(cli, tmp_path, view):
+    ask = {"placement": ["--rank"], "methods": ["--methods"], "response": ["--response", "auto"],
+           "stability": ["--stability", "0:9000rpm"]}.get(view, [])  # fmt: skip
+    place = [] if view == "placement" else ["--nodes", "7,12,18"]
+    path = tmp_path / "picture.png"
+    assert cli("reduce", ROTOR, *place, *ask, "--view", view, "--plot", path).code == 0
+    assert path.stat().st_size > 20_000
+    assert cli(*book("", 2), "--plot", tmp_path / "measured.png").code == 0
+    if ask:
+        refused = cli("reduce", ROTOR, "--nodes", "7,12,18", "--view", view, "--plot", path)
+        assert refused.code == 2
+        assert ask[0] in refused.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((ROTOR,), "say where the masses stand"),
+        ((), "give a rotor, or --compliance and --measured"),
+        ((ROTOR, "--nodes", "7,12", "--place", "best"), "choose one"),
+        ((ROTOR, "--nodes", "7,12", "--errors", "alpha13=1"), "alpha11 to alpha22"),
+        ((ROTOR, "--nodes", "7,12", "--errors", "stiffness=1"), "'stiffness' is not known"),
+        ((ROTOR, "--nodes", "7,12", "--errors", "compliance"), "NAME=NUMBER"),
+        ((ROTOR, "--nodes", "7,12", "--errors", "compliance=1,compliance=2"), "stands twice"),
+        ((ROTOR, "--nodes", "7,12", "--errors", "compliance=-1"), "from 0 to 100 percent"),
+        ((ROTOR, "--nodes", "7,12", "--what-if", "alpha99=1"), "there is no input 'alpha99'"),
+        ((ROTOR, "--nodes", "7,12", "--damping", "1,x"), "percent of critical damping"),
+        ((ROTOR, "--nodes", "7,12,18", "--stability", "100"), "--stability '100' is not a range"),
+        ((ROTOR, "--nodes", "7,12", "--compliance", BOOK / "compliance.csv"), "take the place of a rotor"),
+        ((ROTOR, "--nodes", "7,12", "--state-space", "x.csv"), "cannot write this kind of file"),
+        ((*book("", 2)[1:], "--rank"), "--rank needs a rotor"),
+        ((*book("", 2)[1:], "--seals", "9=1e6"), "no mass stands at '9'"),
+        ((*book("", 4)[1:],), "can use 1 … 3 modes"),
+    ],
+)
+def test_what_cannot_be_is_refused(cli, arguments, message):
+    outcome = cli("reduce", *arguments)
+    assert outcome.code == 2
+    assert message in outcome.err
+    assert outcome.out == ""
