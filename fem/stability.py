@@ -1,21 +1,38 @@
-"""The speed above which a rotor whirls by itself."""
+"""The speed above which a rotor whirls by itself.
+
+Near a veering a mode that is followed may slip to another. The largest growth rate of all modes is
+continuous in speed whatever curve it runs along, so its root needs no names. Of a motion without damping
+rounding decides the sign of Re λ: hence growth beyond rounding is asked for first, and the last step back to
+Re λ = 0 is made along the slope of the mode that grows, in a basis that holds its vector of the full model.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
 from fem.campbell import followed, runs_away
-from fem.crossing import crossings
 from fem.orbits import whirl_direction
-from fem.planes import AnyArray, ComplexArray
-from fem.quadratic import NONE
+from fem.planes import AnyArray, ComplexArray, Quadratic
+from fem.quadratic import Solutions, polish, solve
 from fem.rotor import RPM, FloatArray, Rotor
+from fem.tracking import likeness, mass_weight
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
+from fem.whirlsolve import Whirl, enriched
 
 _GROWTH = 1e-9  # Re λ / |λ| above which a mode grows: an undamped one has rounding there
+_PARTS = 8  # into how many parts the interval with the threshold is divided
+_AWAY = 1e-6  # a real eigenvalue above this part of the reference frequency runs away
+_JUMP = 1e-4  # growth where it should vanish, of its change: more is a motion that came, not one that passed
+_STEP = 1e-6  # relative step of speed for a slope
+_SECANTS = 6
+_SAME = 0.9  # MAC of a mode before and after the last digits
+_DIGITS = 1e-9  # relative step of speed after which it is found
 Status = Literal["stable", "threshold", "unstable"]
 
 
@@ -114,7 +131,8 @@ def stability_threshold(
         How many modes of lowest frequency to watch.
     steps
         Into how many steps the range is divided; a mode that is unstable only between two neighbouring
-        speeds is not seen. The threshold itself is found by iteration.
+        speeds is not seen. The threshold itself is found by iteration on the largest growth of all modes,
+        which does not depend on which mode is which.
 
     Raises
     ------
@@ -154,44 +172,174 @@ def stability_threshold(
         worst = int(np.argmax(growth[0]))
         frequency, direction = _described(values[:1, worst], whirl.Q.nodes(X[:1, worst]))
         return replace(stable, status="unstable", mode=worst + 1, frequency=frequency, direction=direction)
-    fresh = (growth[k] > _GROWTH) & np.isfinite(growth[k - 1])
-    if not fresh.any():
-        # It grew out of an overdamped motion: the interval is all that is known.
+    lost = _first_growth(whirl, k, values, X)
+    if lost is None:
+        # It grew out of an overdamped motion, or came from above: the interval is all that is known.
         return replace(
             stable,
             status="threshold",
             threshold=float(speeds[k - 1]),
             warnings=(
-                f"an overdamped motion becomes unstable between {speeds[k - 1]:.6g} and {speeds[k]:.6g} "
-                "rad/s; the lower speed is given, search this range with a smaller step",
+                f"a motion becomes unstable between {speeds[k - 1]:.6g} and {speeds[k]:.6g} rad/s that did "
+                "not oscillate before; the lower speed is given, search this range with a smaller step",
             ),
         )
-    only = np.full_like(values, NONE)
-    # From the last speed at which the mode decays beyond rounding; undamped up to the threshold, rounding
-    # decides the sign of Re λ, and growth beyond it is asked for.
-    decays = growth[:k] < -_GROWTH
-    damped = bool(decays[:, fresh].any(axis=0).all())
-    offset = 0.0 if damped else _GROWTH
-    for mode in np.flatnonzero(fresh):
-        start = int(np.flatnonzero(decays[:, mode])[-1]) if damped else k - 1
-        only[start : k + 1, mode] = values[start : k + 1, mode]
+    speed, mode, value, shape = lost
+    stable = replace(stable, status="threshold", threshold=speed)
+    if mode is None:
+        return stable
+    frequency, direction = _described(np.array([value]), shape)
+    return replace(stable, mode=mode + 1, frequency=frequency, direction=direction)
 
-    def level(lam: ComplexArray, _: FloatArray) -> FloatArray:
-        return np.asarray(lam.real / np.abs(lam) - offset)
 
-    found = crossings(whirl, only, X, level)
-    frequency, direction = _described(found.values[:1], found.shapes[:1])
-    return replace(
-        stable,
-        status="threshold",
-        threshold=float(found.speeds[0]),
-        mode=int(found.modes[0]) + 1,
-        frequency=frequency,
-        direction=direction,
-    )
+def _first_growth(
+    whirl: Whirl, k: int, values: ComplexArray, X: ComplexArray
+) -> tuple[float, int | None, complex, AnyArray] | None:
+    """Where growth begins: at speed number k − 1 no watched mode grows, at k one does.
+
+    Parameters
+    ----------
+    whirl
+        All modes at each speed.
+    k
+        Number of the first speed with growth.
+    values, X
+        Watched modes, shapes (S, n) and (S, n, R).
+
+    Returns
+    -------
+    Speed, mode from 0 (None if it does not oscillate), eigenvalue and shape (1, planes, N); None if the
+    motion was not there before.
+    """
+    Q, m = whirl.Q, whirl.found.values.shape[1]
+    low, high = float(whirl.speeds[k - 1]), float(whirl.speeds[k])
+    # Modes that are not watched may grow already, or begin to here: these are passed over by number.
+    passed = int((_growth(whirl.found)[k - 1] > _GROWTH).sum())
+    for skip in range(passed, m + 1):
+        excess = partial(_excess, whirl, skip, Q)
+        bracket = _first_part(excess, low, high)
+        if bracket is None:
+            return None
+        speed, rest = _root(excess, *bracket)
+        if rest > _JUMP:
+            return None
+        pairs, rank = _fastest(whirl, skip, Q, speed)
+        if rank is None:
+            return speed, None, 0j, np.empty(0)
+        value, vector = complex(pairs.values[0, rank]), pairs.vectors[:1, rank]
+        mode = _watched(whirl, k, values, X, np.array([value]), vector)
+        if mode is not None:
+            break
+    else:
+        return None
+    larger, x = enriched(whirl, np.array([speed]), np.array([value]), vector)
+    if larger is not Q:
+        # The same once more in a basis that holds the full model's vector there.
+        a, b = bracket
+        excess = partial(_excess, whirl, skip, larger)
+        if excess(a) < 0 < excess(b):
+            speed, _ = _root(excess, a, b)
+            pairs, rank = _fastest(whirl, skip, larger, speed)
+            if rank is not None:
+                value, x = complex(pairs.values[0, rank]), pairs.vectors[:1, rank]
+    # The mode may have been without growth and decay, but for rounding, for some time before.
+    growth = np.nan_to_num(values[:k, mode].real / np.abs(values[:k, mode]), nan=0.0)
+    decays = np.flatnonzero(growth < -_GROWTH)
+    floor = float(whirl.speeds[decays[-1]]) if decays.size else low
+    back = _back(larger, speed, value, x, floor, high)
+    if back is not None:
+        speed, value, x = back
+    return speed, mode, value, larger.nodes(x)
+
+
+def _watched(
+    whirl: Whirl, k: int, values: ComplexArray, X: ComplexArray, value: ComplexArray, vector: ComplexArray
+) -> int | None:
+    """Which watched mode a pair (1,), (1, R) between speeds k − 1 and k belongs to; None if to another."""
+    weight, apart = mass_weight(whirl), whirl.Q.P.planes == 1
+    growing = np.nan_to_num(values[k].real / np.abs(values[k]), nan=-1.0) > _GROWTH
+    mine, others = np.zeros(values.shape[1]), []
+    for end in (k - 1, k):
+        mac = likeness(value, vector, whirl.found.values[end], whirl.found.vectors[end], weight, apart)[0]
+        others.append(whirl.found.values[end, int(np.argmax(mac))])
+        mine += likeness(value, vector, values[end], X[end], weight, apart)[0]
+    if not growing.any() or not any(
+        (values[end] == v).any() for end, v in zip((k - 1, k), others, strict=True)
+    ):
+        return None
+    return int(np.argmax(np.where(growing, mine, -1.0)))
 
 
 def _described(values: ComplexArray, shapes: AnyArray) -> tuple[float, float]:
     """Frequency and direction of one mode."""
     lam, x, y = in_both_planes(values, shapes)
     return float(lam.imag[0]), float(whirl_direction(x, y)[0])
+
+
+def _growth(found: Solutions) -> FloatArray:
+    """Re λ / |λ|, −1 where there is no mode."""
+    return np.asarray(np.nan_to_num(found.values.real / np.abs(found.values), nan=-1.0))
+
+
+def _excess(whirl: Whirl, passed: int, Q: Quadratic, speed: float) -> float:
+    """Largest growth but for a number of modes, less what is rounding; real eigenvalues by the reference."""
+    pairs = solve(Q, np.array([speed]), whirl.found.values.shape[1], whirl.scale)
+    ranked = np.sort(_growth(pairs)[0])[::-1]
+    fastest = float(ranked[passed]) - _GROWTH if passed < ranked.size else -1.0
+    return max(fastest, _real(pairs, whirl))
+
+
+def _fastest(whirl: Whirl, passed: int, Q: Quadratic, speed: float) -> tuple[Solutions, int | None]:
+    """The pairs at a speed and which of them `_excess` means; None if it does not oscillate."""
+    pairs = solve(Q, np.array([speed]), whirl.found.values.shape[1], whirl.scale)
+    rates = _growth(pairs)[0]
+    rank = int(np.argsort(-rates, kind="stable")[min(passed, rates.size - 1)])
+    away = passed >= rates.size or _real(pairs, whirl) > rates[rank] - _GROWTH
+    return pairs, None if away else rank
+
+
+def _real(pairs: Solutions, whirl: Whirl) -> float:
+    """Growth of motions that do not oscillate, as `_excess` counts it."""
+    return float(pairs.real[0].max(initial=-whirl.scale)) / whirl.scale - _AWAY
+
+
+def _first_part(function: Callable[[float], float], low: float, high: float) -> tuple[float, float] | None:
+    """The first part of an interval in which a function becomes positive."""
+    speeds = np.linspace(low, high, _PARTS + 1).tolist()
+    return next(((a, b) for a, b in pairwise(speeds) if function(b) > 0), None)
+
+
+def _root(function: Callable[[float], float], a: float, b: float) -> tuple[float, float]:
+    """A bracketed root, and what is left of the function there, relative to its change."""
+    from scipy.optimize import brentq
+
+    start, end = function(a), function(b)
+    if start >= 0:
+        return a, 0.0
+    speed = float(brentq(function, a, b, xtol=1e-13 * b, rtol=1e-14))
+    return speed, abs(function(speed)) / (end - start)
+
+
+def _back(
+    Q: Quadratic, speed: float, value: complex, X: ComplexArray, floor: float, high: float
+) -> tuple[float, complex, ComplexArray] | None:
+    """Speed, eigenvalue and vector (1, R) where a mode neither grows nor decays; None if it is not plain."""
+    at, first = np.array([0]), X
+    lam = np.array([value])
+    lam, X, _ = polish(Q, np.array([speed]), at, lam, X, 1)
+    step = _STEP * high if speed + _STEP * high <= high else -_STEP * high
+    other = polish(Q, np.array([speed + step]), at, lam, X, 2)[0]
+    slope = float((other.real / np.abs(other) - lam.real / np.abs(lam))[0]) / step
+    if not slope > 0:
+        return None
+    for _ in range(_SECANTS):
+        here = float((lam.real / np.abs(lam))[0])
+        new = float(np.clip(speed - here / slope, floor, high))
+        moved, speed = abs(new - speed), new
+        lam, X, _ = polish(Q, np.array([speed]), at, lam, X, 2)
+        if moved <= 1e-3 * _DIGITS * high:
+            break
+    same = np.abs(np.vdot(first, X)) ** 2 / (np.vdot(first, first).real * np.vdot(X, X).real)
+    if moved > _DIGITS * high or same < _SAME:
+        return None
+    return speed, complex(lam[0]), X

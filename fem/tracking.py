@@ -48,8 +48,7 @@ def follow(whirl: Whirl) -> Followed:
     """Chain the eigenpairs of neighbouring speeds."""
     values, X = whirl.found.values, whirl.found.vectors
     S, m = values.shape
-    weight = whirl.Q.M * whirl.scale**2
-    weight = weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight))
+    weight = mass_weight(whirl)
     labels = np.full((S, m), -1)
     labels[0, np.isfinite(values[0])] = np.flatnonzero(np.isfinite(values[0]))
     count = m
@@ -82,6 +81,18 @@ def follow(whirl: Whirl) -> Followed:
     out[at, labels[at, rank]] = values[at, rank]
     vectors[at, labels[at, rank]] = X[at, rank]
     return Followed(out, vectors, np.isin(np.arange(count), list(lost)), tuple(doubtful))
+
+
+def mass_weight(whirl: Whirl) -> FloatArray:
+    """Weight of `likeness`, shape (R, R): the mass, and a little of everything that has none."""
+    weight = whirl.Q.M * whirl.scale**2
+    return np.asarray(weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight)))
+
+
+def plain(best: FloatArray, rivals: FloatArray) -> NDArray[np.bool_]:
+    """Whether a MAC tells a mode beyond doubt from the one most like it among the others."""
+    apart = (rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals))
+    return np.asarray((best >= _ALIKE) & apart)
 
 
 def likeness(
@@ -121,8 +132,7 @@ def _obvious(mac: FloatArray, partner: NDArray[np.intp]) -> NDArray[np.bool_]:
     across = np.take_along_axis(others.max(axis=1), partner, axis=1)
     rivals = np.maximum(others.max(axis=2), across)
     one_each = (np.sort(partner, axis=1) == np.arange(mac.shape[1])).all(axis=1)
-    plain = (rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals))
-    return np.asarray(one_each & ((best >= _ALIKE) & plain).all(axis=1))
+    return np.asarray(one_each & plain(best, rivals).all(axis=1))
 
 
 def _pairs(mac: FloatArray) -> tuple[dict[int, int], set[int]]:

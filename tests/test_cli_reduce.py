@@ -7,8 +7,10 @@ import pytest
 from scipy.io import loadmat
 
 import fem
-from rotorid import read_motion
+from rotorid import read_motion, read_ode_model, read_rotor
+from rotorid import reduce as reduce_rotor
 from rotorid.samples import sample_data
+from rotorid.timedomain.statespace import state_space
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"
@@ -175,7 +177,11 @@ def test_every_view_is_drawn(cli, tmp_path, view):
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=1,compliance=2"), "stands twice"),
         ((ROTOR, "--nodes", "7,12", "--errors", "compliance=-1"), "from 0 to 100 percent"),
         ((ROTOR, "--nodes", "7,12", "--what-if", "alpha99=1"), "there is no input 'alpha99'"),
-        ((ROTOR, "--nodes", "7,12", "--damping", "1,x"), "percent of critical damping"),
+        ((ROTOR, "--nodes", "7,12", "--damping", "1"), "--damping does nothing without --model"),
+        (
+            (ROTOR, "--nodes", "7,12,18", "--damping", "1,x", "--model", "m.toml"),
+            "percent of critical damping",
+        ),
         ((ROTOR, "--nodes", "7,12,18", "--stability", "100"), "--stability '100' is not a range"),
         ((ROTOR, "--nodes", "7,12", "--compliance", BOOK / "compliance.csv"), "take the place of a rotor"),
         ((ROTOR, "--nodes", "7,12", "--state-space", "x.csv"), "cannot write this kind of file"),
@@ -189,3 +195,81 @@ def test_what_cannot_be_is_refused(cli, arguments, message):
     assert outcome.code == 2
     assert message in outcome.err
     assert outcome.out == ""
+
+
+def test_the_mass_of_a_pedestal_counts_once():
+    """The regression sees the rotor alone; the feet come back with the small model."""
+    base = read_rotor(ROTOR)
+    on_feet, on_springs = (
+        fem.Rotor(
+            base.length,
+            base.outer_diameter,
+            discs=base.discs,
+            supports=[fem.Support(n, 1e8, pedestal=fem.Pedestal(mass, 4e8)) for n in (2, 22)],
+        )
+        for mass in (300.0, 0.0)
+    )
+    feet, springs = (reduce_rotor(rotor, (7, 12, 18), 2) for rotor in (on_feet, on_springs))
+    np.testing.assert_allclose(feet.masses.values, springs.masses.values, rtol=1e-12)
+    assert "masses of the pedestals are left out" in feet.warnings[0]
+    own = np.unique(np.round(np.abs(feet.small().eigenvalues(0.0)), 6))
+    whole = fem.critical_speeds(on_feet, 2).frequencies
+    np.testing.assert_allclose(own[:2], whole, rtol=0.005)
+    with pytest.raises(ValueError, match="hold the masses of the pedestals"):
+        reduce_rotor(on_feet, (7, 12, 18), 2, measured=(feet.rotor_frequencies, feet.rotor_shapes))
+
+
+def test_masses_that_nobody_would_believe_are_said():
+    rotor = read_rotor(ROTOR)
+    one = reduce_rotor(rotor, (2,), 1)
+    assert any("more than the rotor" in text for text in one.warnings)
+    two = reduce_rotor(rotor, (2, 23), 1)
+    assert any("far off: mode 2 by -7" in text for text in two.warnings)
+
+
+def test_measured_shapes_are_compared_with_the_rotor():
+    rotor = read_rotor(ROTOR)
+    good = reduce_rotor(rotor, (7, 12, 18), 2)
+    omega, shapes = good.rotor_frequencies, good.rotor_shapes
+    signs = shapes.copy()
+    signs[2, 1] *= -1
+    turned = reduce_rotor(rotor, (7, 12, 18), 2, measured=(omega[:2], signs[:, :2]))
+    assert any("is its sign at node 18 right?" in text for text in turned.warnings)
+    missed = reduce_rotor(rotor, (7, 12, 18), 2, measured=(omega[1:], shapes[:, 1:]))
+    assert any("but of its mode 2 (MAC 1.00): is a mode missing?" in text for text in missed.warnings)
+
+
+def test_a_model_on_damped_bearings_can_be_driven(cli, tmp_path):
+    """Damped supports are states of first order; forces are inputs, and only the masses are measured."""
+    path = tmp_path / "model.toml"
+    ask = ("reduce", COMPRESSOR, "--nodes", "8,14,20", "--modes", 1, "--speed", "6000rpm", "--model", path)
+    assert cli(*ask, "--force", "14").code == 0
+    model = read_ode_model(path)
+    assert model.inputs == ("f_x14",)
+    assert set(model.outputs) == {f"{axis}{node}" for axis in "xy" for node in (8, 14, 20)}
+    assert all(name.startswith(("d_x", "d_y")) for name in model.parameters)
+    speed = 200 * np.pi
+    small = reduce_rotor(read_rotor(COMPRESSOR), (8, 14, 20), 1, speed=speed).small()
+    back = state_space(model, np.zeros(len(model.parameters)))
+    theirs, ours = np.sort_complex(back.eigenvalues), np.sort_complex(small.eigenvalues(speed))
+    np.testing.assert_allclose(theirs, ours, rtol=1e-9)
+    refused = cli(*ask, "--force", "15")
+    assert refused.code == 2
+    assert "no mass of the model stands at 15" in refused.err
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (("--masses", 4), "--masses does nothing without --rank or --place"),
+        (("--view", "shapes"), "--view does nothing without --plot"),
+        (("--both-planes",), "--both-planes does nothing without --model"),
+        (("--force", "7"), "--force does nothing without --model"),
+        (("--measured", BOOK / "modes.csv", "--methods"), "--methods compares with the computed rotor"),
+        (("--response", "1:2"), "--response '1:2' is not a range"),
+    ],
+)
+def test_options_without_effect_are_refused(cli, more, message):
+    outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", *more)
+    assert outcome.code == 2
+    assert message in outcome.err

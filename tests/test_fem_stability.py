@@ -132,3 +132,113 @@ def test_tables_are_not_left():
     with pytest.raises(ValueError, match="seal"):
         fem.stability_threshold(rotor, 150.0)
     assert fem.stability_threshold(rotor, 200.0, lowest=100.0).status == "stable"
+
+
+def veering():
+    """Modes 3 and 4 veer sharply between 200 and 225 rad/s, where one of them loses stability."""
+    return fem.Rotor(
+        [0.07598931, 0.11731469, 0.17572019, 0.28725273],
+        [0.17364281, 0.18922264, 0.11957767, 0.16664831],
+        [0.0, 0.0, 0.0, 0.05866477],
+        youngs_modulus=[1.16283623e11, 1.51811977e11, 1.66249788e11, 1.68663561e11],
+        density=[4185.70733511, 3473.05108279, 5381.48107674, 6375.33350678],
+        material_damping=[6.9187337e-07, 4.38956655e-08, 9.13098917e-07, 6.02745395e-07],
+        supports=[
+            fem.Support(
+                5,
+                ((86604455.79, -6332058.41), (-17029054.77, 58682574.55)),
+                ((25452.72, -2607.584), (-7439.726, 33058.947)),
+            ),
+            fem.Support(
+                3,
+                [
+                    ((310099817.98, 114204051.11), (-114204051.11, 616926832.59)),
+                    ((22531703.17, 10913375.61), (-7633740.71, 11993259.52)),
+                    ((50519546.24, -2709611.89), (2709611.89, 77312206.27)),
+                ],
+                [418.155, ((137.505, -27.6903), (-51.4019, 159.7095)), 4665.1515],
+                speeds=(0.0, 300.0, 1000.0),
+            ),
+            fem.Support(
+                2,
+                13856974.44,
+                ((179.216, -41.3020), (-58.4332, 150.9910)),
+                pedestal=fem.Pedestal(0.0, (824463616.55, 74877667.76), 8965.15),
+            ),
+        ],
+        model=fem.Model(True, True, False),
+    )
+
+
+def sealed(seed):
+    """A rotor with seals whose cross-coupling grows with speed, and some with internal damping."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(4, 9))
+
+    def bearing(node):
+        k, ratio, cross = 10 ** rng.uniform(7, 8.5), rng.uniform(0.5, 2), rng.uniform(-0.2, 0.2)
+        return fem.Support(node, ((k, cross * k), (-cross * k, ratio * k)), 10 ** rng.uniform(2, 4.5))
+
+    k, q = 10 ** rng.uniform(5, 7.5), 10 ** rng.uniform(5, 7.5)
+    seal = fem.Support(
+        int(rng.integers(2, n + 1)),
+        [((k, 0), (0, k)), ((k, q), (-q, k))],
+        [10 ** rng.uniform(1, 3)] * 2,
+        speeds=(0.0, 1000.0),
+        kind="seal",
+    )
+    return fem.Rotor(
+        rng.uniform(0.05, 0.3, n),
+        rng.uniform(0.04, 0.16, n),
+        material_damping=rng.choice([0.0, 1e-6, 1e-4]) * rng.random(n),
+        discs=[fem.Disc(int(rng.integers(1, n + 2)), rng.uniform(1, 60), 0.5, 0.3)],
+        supports=[bearing(1), bearing(n + 1), seal],
+        model=fem.Model(False, True, True),
+    )
+
+
+def grows_only_above(rotor, speed):
+    """Judged by the full model's eigenvalues on both sides."""
+    before, after = (
+        fem.whirl_modes(rotor, factor * speed, 4, method="exact").eigenvalues.real.max()
+        for factor in (1 - 1e-5, 1 + 1e-5)
+    )
+    return before < 0 < after
+
+
+def test_a_veering_does_not_exchange_the_mode():
+    rotor = veering()
+    found = [fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 80, 160)]
+    for one in found:
+        assert one.threshold == pytest.approx(213.8314, rel=1e-5)
+        assert one.threshold == pytest.approx(found[0].threshold, rel=1e-8)
+        assert one.frequency == pytest.approx(found[0].frequency, rel=1e-8)
+        assert one.mode == 4
+        assert one.warnings == ()
+    assert grows_only_above(rotor, found[0].threshold)
+    # The Campbell diagram finds growth on the mode itself: the same speed.
+    growing = fem.campbell(rotor, np.linspace(0.0, 1000.0, 41), 4).unstable
+    assert growing[0].speed == pytest.approx(found[0].threshold, rel=1e-7)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_threshold_does_not_depend_on_the_steps(seed):
+    rotor = sealed(seed)
+    few, many = (fem.stability_threshold(rotor, 1000.0, n=4, steps=steps) for steps in (40, 160))
+    assert few.status == many.status
+    assert few.warnings == many.warnings == ()
+    if few.threshold is not None:
+        assert few.threshold == pytest.approx(many.threshold, rel=1e-6)
+        assert few.frequency == pytest.approx(many.frequency, rel=1e-6)
+        assert grows_only_above(rotor, few.threshold)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 4])
+def test_damped_critical_speeds_do_not_depend_on_the_steps(seed):
+    rotor = sealed(seed)
+    few, many = (fem.campbell(rotor, np.linspace(0.0, 1000.0, steps + 1), 6) for steps in (20, 80))
+    assert few.critical_speeds.size
+    np.testing.assert_allclose(few.critical_speeds, many.critical_speeds, rtol=1e-8)
+    for speed in few.critical_speeds:
+        omega = fem.whirl_modes(rotor, speed, 8, method="exact").frequencies
+        assert np.abs(omega - speed).min() < 1e-8 * speed

@@ -252,18 +252,12 @@ def test_bad_input(speeds, options, message):
         compare_response(book(), speeds, **options)
 
 
-def test_damping_of_the_small_model_alone():
-    """Modal damping is no part of the full rotor: what it takes away from a peak is seen."""
+def test_modal_damping_is_left_out_of_the_comparison():
+    """The full rotor has none: what it takes away from a peak is no error of the reduction."""
     small = book()
     damped = small_rotor(small.rotor, small.nodes, small.masses, modal_damping=(0.05, 0.05))
     speeds = [120.0, 135.0]
     plain, more = (compare_response(each, speeds, bands=0.0) for each in (small, damped))
-    for each in (
-        damped,
-        small_rotor(lumped(BEARINGS["whirling"]).rotor, (2, 4), [40.0, 90.0], modal_damping=(0.1,)),
-    ):
-        cost = compare_response(each, speeds, bands=0.0)
-        n = len(each.nodes)
-        assert cost.small[:, :n] == pytest.approx(each.response(speeds), rel=1e-9)
-    assert np.abs(more.small[1]).max() < 0.1 * np.abs(plain.small[1]).max()
-    assert more.largest > plain.largest
+    np.testing.assert_allclose(more.small, plain.small, rtol=1e-12)
+    assert more.warnings[0].startswith("the modal damping of the small model is left out")
+    assert np.abs(damped.response(speeds)[1]).max() < 0.1 * np.abs(plain.small[1]).max()

@@ -260,7 +260,7 @@ def _unit(text: str) -> tuple[str, float]:
     return body, 1.0
 
 
-def speeds(text: str, unit: str = "rad_s") -> list[float]:
+def speeds(text: str, unit: str = "rad_s", what: str = "--speeds") -> list[float]:
     """Read speeds, rad/s: "100:700:50" (first:last:step) or "100,200", "1000:6000:50rpm", "20Hz,1500rpm".
 
     A unit at the end holds for all; or each speed has its own. Without any it is `unit`. The last speed of a
@@ -274,40 +274,40 @@ def speeds(text: str, unit: str = "rad_s") -> list[float]:
     others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual)
     example = f"use FIRST:LAST:STEP or a list with commas, in {usual}, or with {others} at the end"
     if any(part is None for part in parts) or (sign == ":" and len(parts) != 3):
-        raise ValueError(f"--speeds {text!r} is not a range: {example}")
+        raise ValueError(f"{what} {text!r} is not a range: {example}")
     pairs = [part for part in parts if part is not None]
     own = [name for _, name in pairs]
     if any(own[:-1]) and not all(own):
-        raise ValueError(f"--speeds {text!r}: give the unit at every speed, or once at the end")
+        raise ValueError(f"{what} {text!r}: give the unit at every speed, or once at the end")
     if sign == ":" and len(set(own[:-1]) | {own[-1]} - {""}) > 1 and any(own[:-1]):
-        raise ValueError(f"--speeds {text!r}: a range has one unit")
+        raise ValueError(f"{what} {text!r}: a range has one unit")
     values = [value for value, _ in pairs]
     factors = [_SPEED_UNITS[name or own[-1] or unit] for name in own]
     if not np.isfinite(values).all():
-        raise ValueError(f"--speeds {text!r}: speeds must be finite and not negative")
+        raise ValueError(f"{what} {text!r}: speeds must be finite and not negative")
     if sign == ":":
         first, last, step = values
         if step <= 0 or last < first:
             raise ValueError(
-                f"--speeds {text!r}: the step must be positive and the last speed not below the first"
+                f"{what} {text!r}: the step must be positive and the last speed not below the first"
             )
         if (last - first) / step > 1e6:
-            raise ValueError(f"--speeds {text!r} has more than a million speeds")
+            raise ValueError(f"{what} {text!r} has more than a million speeds")
         values = list(first + step * np.arange(int(np.floor((last - first) / step * (1 + 1e-12) + 1e-9)) + 1))
         factors = [factors[0]] * len(values)
     if min(values) < 0:
-        raise ValueError(f"--speeds {text!r}: speeds must be finite and not negative")
+        raise ValueError(f"{what} {text!r}: speeds must be finite and not negative")
     return [float(v) * factor for v, factor in zip(values, factors, strict=True)]
 
 
-def rising_speeds(text: str) -> list[float]:
+def rising_speeds(text: str, what: str = "--speeds") -> list[float]:
     """`speeds` in ascending order, each once."""
-    return sorted(set(speeds(text)))
+    return sorted(set(speeds(text, what=what)))
 
 
 def one_speed(text: str, what: str) -> float:
     """Read "9000rpm" as one speed, rad/s."""
-    values = speeds(text)
+    values = speeds(text, what=what)
     if len(values) != 1:
         raise ValueError(f"{what} takes one speed, such as 9000rpm; got {text!r}")
     return values[0]

@@ -75,7 +75,10 @@ def reduce(
             show_default=False,
         ),
     ] = None,
-    masses: Annotated[int, typer.Option(min=1, help="How many masses --place and --rank set.")] = 3,
+    masses: Annotated[
+        int | None,
+        typer.Option(min=1, help="How many masses --place and --rank set; default 3.", show_default=False),
+    ] = None,
     modes: Annotated[
         int | None,
         typer.Option(min=1, help="How many modes the regression uses; default 2.", show_default=False),
@@ -179,6 +182,14 @@ def reduce(
         bool,
         typer.Option("--both-planes", help="Planes x and y in --model, also where nothing couples them."),
     ] = False,
+    force: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="Nodes of measured forces, inputs f_x12 of --model, 12 or 7,12.",
+            show_default=False,
+        ),
+    ] = None,
     model: Annotated[
         Path | None,
         typer.Option(
@@ -242,6 +253,28 @@ def reduce(
             raise ValueError(
                 "--compliance and --seals take the place of a rotor: give them, or ROTOR, not both"
             )
+        given.check_used(
+            {
+                "--masses": (masses is not None, rank or place is not None, "--rank or --place"),
+                "--candidates": (candidates is not None, rank or place is not None, "--rank or --place"),
+                "--damping": (damping is not None, bool(model or state_space), "--model or --state-space"),
+                "--both-planes": (both_planes, model is not None, "--model"),
+                "--force": (force is not None, model is not None, "--model"),
+                "--view": (view is not None, plot is not None, "--plot"),
+            }
+        )
+        computed: dict[str, object] = {
+            "--rank": rank,
+            "--place": place,
+            "--methods": methods,
+            "--trade-off": trade_off,
+        }
+        computed |= {"--response": response, "--stability": stability}
+        if measured is not None and (unfit := next((name for name, on in computed.items() if on), None)):
+            raise ValueError(
+                f"{unfit} compares with the computed rotor, not with the measured modes: leave out {unfit} "
+                "or --measured"
+            )
         from rotorid.reduction import rank_nodes
         from rotorid.reduction import reduce as reduce_rotor
         from rotorid.tables.modes import read_modes
@@ -253,8 +286,10 @@ def reduce(
         placement = None
         if rank or place is not None:
             chosen = None if candidates is None else parse_nodes(candidates, "--candidates")
-            placement = rank_nodes(machine, masses, modes or 2, candidates=chosen, speed=at, **how)
-        places = given.places(machine, nodes, place and place.value, placement, data, masses, at)
+            placement = rank_nodes(
+                machine, masses or 3, modes or min(2, masses or 3), candidates=chosen, speed=at, **how
+            )
+        places = given.places(machine, nodes, place and place.value, placement, data, masses or 3, at)
         used = min(2, len(places)) if modes is None else modes
         if data is not None and measured is not None:
             data = given.at(data, machine, places, measured)
@@ -268,7 +303,8 @@ def reduce(
             errors=given.errors(errors, data, used, len(places)),
             **signed,
         )
-        report = Report(result, placement=placement if rank else None, both_planes=both_planes)
+        driven = [] if force is None else [machine.node(node) for node in parse_nodes(force, "--force")]
+        report = Report(result, placement if rank else None, both_planes=both_planes, forces=driven)
         ratios = given.percents(damping, "--damping")
         if trade_off:
             report.add_trade_off(how["normalise"], at)
@@ -277,7 +313,7 @@ def reduce(
         if ratios or response or stability or state_space or model:
             report.add_small(ratios, at)
         if response is not None:
-            report.add_response(None if response == "auto" else rising_speeds(response))
+            report.add_response(None if response == "auto" else rising_speeds(response, "--response"))
         if stability is not None:
             report.add_stability(*given.speed_range(stability))
     if what_if is not None:
@@ -290,7 +326,7 @@ def reduce(
         options={
             "nodes": nodes,
             "place": place and place.value,
-            "masses": masses if rank or place else None,
+            "masses": masses,
             "modes": modes,
             **signed,
             "supports_apart": supports_apart,
@@ -305,6 +341,7 @@ def reduce(
             "stability": stability,
             "damping": damping,
             "both_planes": both_planes,
+            "force": force,
             "model": model,
             "state_space": state_space,
         },

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
+def check_used(options: Mapping[str, tuple[bool, bool, str]]) -> None:
+    """Refuse options that would have no effect: {option: (given, of use, what makes it of use)}."""
+    for option, (is_given, of_use, needed) in options.items():
+        if is_given and not of_use:
+            raise ValueError(f"{option} does nothing without {needed}")
+
+
 def places(
     rotor: fem.Rotor,
     nodes: str | None,

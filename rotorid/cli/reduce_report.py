@@ -46,6 +46,7 @@ class Report:
     small: SmallRotor | None = None
     speed: float = 0.0
     both_planes: bool = False
+    forces: Sequence[int] = ()
 
     def add_trade_off(self, normalise: Normalisation, speed: float | None) -> None:
         """Other masses at these nodes: regressions over more or fewer modes, and exact frequencies."""
@@ -107,6 +108,7 @@ class Report:
         return {
             **self.result.to_dict(),
             **{key: part.to_dict() for key, part in parts.items() if part is not None},
+            **({} if self.small is None else {"small_model": self.small.to_dict()}),
         }
 
     def text(self) -> str:
@@ -122,7 +124,7 @@ class Report:
         )
         blocks = [part.summary() for part in parts if part is not None]
         if self.small is not None:
-            blocks += [f"Warning: {text}" for text in self.small.warnings]
+            blocks.append(self.small.summary())
         return "\n\n".join(blocks)
 
     def frame(self) -> pd.DataFrame:
@@ -169,19 +171,35 @@ class Report:
                 "a model with a mass that is not positive cannot be written: use other nodes or modes"
             )
         motion = self._motion()
-        moving = [i for i, m in enumerate(np.diag(motion.M)) if m > 0]
-        dampers = {
-            motion.coordinates[i]: float(f"{0.04 * np.sqrt(motion.M[i, i] * motion.K[i, i]):.3g}")
-            for i in moving
+        masses = [f"{axis}{node}" for axis in "xy" for node in self.result.nodes]
+        masses = [name for name in masses if name in motion.coordinates]
+        critical = {
+            x: 2 * np.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
         }
-        which = "the plane x" if not any(c.startswith("y") for c in motion.coordinates) else "both planes"
+        inputs = [f"f_x{node}" for node in self.forces]
+        if lost := [name for name in inputs if name.removeprefix("f_") not in masses]:
+            raise ValueError(
+                f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
+                f"{', '.join(map(str, self.result.nodes))}"
+            )
+        which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
         said = [
             f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
             f"{self.result.modes} mode(s)), {which} at {motion.speed:.6g} rad/s, SI",
-            "Put what is known of the start into [initial] (v_x7 is the velocity of x7), and forces into "
-            "[force]",
+            "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
         ]
-        return ode_model_bytes(motion, dampers, {}, comments=said)
+        if motion.M.any(axis=0).all() and not inputs:
+            said.append("Put forces of time into [force].")
+        elif not inputs:
+            said.append("Measured forces: write the file with --force NODES.")
+        return ode_model_bytes(
+            motion,
+            {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
+            {},
+            comments=said,
+            inputs=inputs,
+            outputs=None if set(masses) == set(motion.coordinates) else masses,
+        )
 
     def state_space_bytes(self, path: Path) -> bytes:
         """A, B, C, D in both planes at the speed, in the format that the name of the file asks for."""

@@ -101,11 +101,13 @@ def rank_nodes(
     tuples, masses, condition, frequencies, error, mac, worst = (
         np.concatenate(p) for p in zip(*parts, strict=True)
     )
-    # best error first, of equal errors the larger MAC; then masses not positive, then nothing determined
+    # best error first, of equal errors the larger MAC, then the lighter; then masses not positive,
+    # then nothing determined
     known = np.isfinite(masses).all(axis=1)
     good = np.isfinite(error)
     group = np.where(good, 0, np.where(known, 1, 2))
-    keys = (-np.where(good, mac, 0.0), np.where(good, error, 0.0))
+    weight = np.where(good, masses.sum(axis=1), 0.0)
+    keys = (weight, -np.where(good, mac, 0.0), np.where(good, error, 0.0))
     # rounded: differences of 1e-10 are float64's, and then the order of the nodes decides
     order = np.lexsort((*np.round(keys, 10), group))
     nodes = np.array(places, dtype=np.int32)[tuples[order]]
@@ -297,6 +299,11 @@ def _warnings(result: Placement) -> list[str]:
         )
     if not result.ranked:
         return [*out, "no choice gives a physical model: use other candidates, more modes or fewer masses"]
+    if result.nodes.shape[1] == 1:
+        out.append(
+            "one mass has the rotor's first frequency at any node, and one reading any shape: frequency and "
+            "MAC say nothing here, and the lightest mass stands first, where the mode is largest"
+        )
     top = result.condition[: min(LOOKED_AT, result.ranked)]
     bad = int((top > BADLY).sum())
     if bad:

@@ -26,7 +26,7 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
                 support.node,
                 float(support.at(omega)[0][0, 0]),
                 name=support.name,
-                pedestal=None if stand is None else fem.Pedestal(stand.mass, stand.xy("stiffness")[0]),
+                pedestal=None if stand is None else fem.Pedestal(0.0, stand.xy("stiffness")[0]),
                 kind=support.kind,
                 tilting_stiffness=support.tilting_stiffness,
             )
@@ -40,6 +40,13 @@ def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, lis
             "formula (50) knows neither rotation nor coupling of the planes: the model holds for the plane x "
             "of the rotor at rest, without gyroscopic effect and cross-coupling"
         )
+    if any(support.pedestal is not None and support.pedestal.mass > 0 for support in rotor.supports):
+        said.append(
+            "the masses of the pedestals are left out here, of the rotor and of the model: they come back in "
+            "the small model (response, stability, model file)"
+        )
+    if not rotor.symmetric:
+        said.append("the supports are not the same in x and y: only x is fitted and compared here")
     if not rotor.constant:
         which = "the lowest of" if speed is None else "chosen in"
         said.append(f"the stiffness of the supports (kxx) is that at {omega:.6g} rad/s, {which} their tables")

@@ -10,8 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import fem
-from fem.matrices import ignored_inertia
-from rotorid.estimate import Estimate
+from rotorid.reduction.judging import (
+    far_off,
+    of_regression,
+    of_shaft,
+    other_frequencies,
+    other_shapes,
+    too_heavy,
+)
 from rotorid.reduction.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
 from rotorid.reduction.plane import plane_at_rest
 from rotorid.reduction.result import Choices, Reduction
@@ -21,15 +27,6 @@ from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_unc
 from rotorid.reduction.vibration import like, mac, natural_frequencies
 
 FloatArray = NDArray[np.float64]
-
-SENSITIVE = 0.1
-"""A report warns where input errors of 1 % move a mass by more than this share."""
-
-ALIKE = 0.9
-"""Below this MAC two shapes are not those of one mode."""
-
-APART = 0.05
-"""A measured frequency that differs by more from the rotor's is said."""
 
 
 def reduce(
@@ -85,6 +82,11 @@ def reduce(
     places = _places(rotor, nodes)
     n = len(places)
     plane, said = plane_at_rest(rotor, speed)
+    if measured is not None and any(s.pedestal is not None and s.pedestal.mass for s in rotor.supports):
+        raise ValueError(
+            "measured modes hold the masses of the pedestals, which formula (50) cannot take apart: give the "
+            "pedestals no mass in the rotor file (the equivalent masses then hold it), or use computed modes"
+        )
     full = fem.critical_speeds(plane, n)
     index = np.array(places) - 1
     seals, apart = np.zeros(n), None
@@ -98,7 +100,7 @@ def reduce(
         omega, shapes = full.frequencies, full.shapes[index]
     else:
         omega, shapes = _modes(measured, n)
-        said += _apart(omega, full.frequencies)
+        said += other_frequencies(omega, full.frequencies) + other_shapes(shapes, full.shapes[index], places)
     result = _reduced(
         places,
         alpha,
@@ -114,7 +116,7 @@ def reduce(
         rotor=rotor,
         rotor_modes=full,
         separated=apart,
-        warnings=(*said, *_of_shaft(rotor, full), *result.warnings),
+        warnings=(*said, *of_shaft(rotor, full), *result.warnings, *too_heavy(rotor, result.masses.solution)),
     )
 
 
@@ -204,7 +206,8 @@ def _reduced(
     frequencies, own = natural_frequencies(alpha, estimate.solution, seal_stiffness=seals)
     compared = shapes[:, :n]
     own[:, : compared.shape[1]] = like(own[:, : compared.shape[1]], compared)
-    agreement = np.diag(mac(own, compared))[:modes]
+    agreement = np.diag(mac(own, compared))
+    errors_of_frequency = frequencies[: len(agreement)] / omega[: len(agreement)] - 1
     return Reduction(
         rotor=None,
         nodes=places,
@@ -221,7 +224,11 @@ def _reduced(
         choices=choices,
         uncertainty=uncertainty,
         separated=None,
-        warnings=(*bound, *_warnings(estimate, sensitivity, frequencies, places, agreement)),
+        warnings=(
+            *bound,
+            *of_regression(estimate, sensitivity, frequencies, places, agreement[:modes]),
+            *far_off(errors_of_frequency),
+        ),
     )
 
 
@@ -263,51 +270,3 @@ def _at_nodes(plane: fem.Rotor, nodes: tuple[int, ...]) -> list[float]:
         float(sum(s.dynamic_stiffness(zero)[0, 0, 0].real for s in plane.supports if s.node == node))
         for node in nodes
     ]
-
-
-def _apart(measured: FloatArray, computed: FloatArray) -> list[str]:
-    """What to say where the measured rotor is not the one of the model."""
-    out = []
-    for k, (f, g) in enumerate(zip(measured, computed, strict=False), start=1):
-        if abs(f / g - 1) > APART:
-            out.append(
-                f"the measured frequency {k}, {f:.6g} rad/s, differs by {100 * (f / g - 1):+.1f} % from "
-                f"that of the rotor model, {g:.6g} rad/s: its compliance may not be the measured rotor's"
-            )
-    return out
-
-
-def _of_shaft(rotor: fem.Rotor, full: fem.Modes) -> list[str]:
-    """Warnings of the modes, without those on what the plane at rest leaves out of a rotor that has it."""
-    ours = ignored_inertia(full.rotor)
-    return [*ignored_inertia(rotor), *(text for text in full.warnings if text not in ours)]
-
-
-def _warnings(
-    estimate: Estimate,
-    sensitivity: FloatArray,
-    omega: FloatArray,
-    places: tuple[int | str, ...],
-    agreement: FloatArray,
-) -> list[str]:
-    out = [
-        f"the mass at node {p} is {m:.4g} kg, not positive: no physical model; use other nodes or more modes"
-        for p, m in zip(places, estimate.solution, strict=True)
-        if m <= 0
-    ]
-    if np.isnan(omega).any():
-        out.append("with these masses the model has modes that do not vibrate")
-    out += [
-        f"mode {k} of the model does not have the shape of the rotor's (MAC {value:.2f}, below {ALIKE}): "
-        "do not rely on its frequency; use other nodes or more masses"
-        for k, value in enumerate(agreement, start=1)
-        if not value >= ALIKE
-    ]
-    if (sensitivity > SENSITIVE / 0.01).any():
-        moves = ", ".join(f"{x:.0f} %" for x in sensitivity)
-        out.append(
-            f"the regression is ill-conditioned (condition number "
-            f"{estimate.condition_number:.1f}): errors of "
-            f"1 % in the compliances and shapes move the masses by {moves}; more modes make them firmer"
-        )
-    return out

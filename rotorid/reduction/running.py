@@ -197,6 +197,9 @@ def compare_response(
     if not rotor.symmetric:
         sensors = (*((node, 0.0) for node in nodes), *((node, 90.0) for node in nodes))
     full = fem.influence(rotor, nodes, sensors, omega)
+    left = without_modal_damping(small)
+    if left:
+        small = small.undamped_modes
     own = _response(small, omega)
     criticals, said = _criticals(rotor, omega[-1] / (1 - bands))
     criticals = criticals[criticals * (1 + bands) > omega[0]]
@@ -215,7 +218,7 @@ def compare_response(
     k = int(used[np.argmax(worst[used])])
     c, p = np.unravel_index(int(np.argmax(relative[k])), relative.shape[1:])
     largest = float(worst[k])
-    warnings = [*(f"full rotor: {text}" for text in full.warnings), *said, *_growing(small, omega)]
+    warnings = [*left, *(f"full rotor: {text}" for text in full.warnings), *said, *_growing(small, omega)]
     if not largest <= CLOSE:
         warnings.append(
             f"at {omega[k]:.6g} rad/s the small model is {_percent(largest)} off: take more masses, other "
@@ -240,6 +243,13 @@ def compare_response(
         where=(float(omega[k]), sensors[int(c)], nodes[int(p)]),
         warnings=tuple(warnings),
     )
+
+
+def without_modal_damping(small: SmallRotor) -> tuple[str, ...]:
+    """What to say where the small model has modal damping, which a comparison must leave out."""
+    if not any(small.modal_damping):
+        return ()
+    return ("the modal damping of the small model is left out of this comparison: the full rotor has none",)
 
 
 def _response(small: SmallRotor, omega: FloatArray) -> ComplexArray:

@@ -88,6 +88,11 @@ class SmallRotor:
         """Names of the unknowns: the masses in x, in y, supports without mass, feet of pedestals."""
         return tuple(name for name, _ in self._order())
 
+    @property
+    def undamped_modes(self) -> SmallRotor:
+        """The same without modal damping, which the full rotor does not have either."""
+        return replace(self, modal_damping=(), external=np.zeros_like(self.external))
+
     def motion(self, speed: float = 0.0, plane: Plane = "both", supports: Supports = "kept") -> fem.Motion:
         """Matrices of the equations of motion.
 

@@ -14,6 +14,7 @@ from fem.planes import both_planes
 from fem.rotor import RPM
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number
 from fem.whirlsolve import Whirl, solve_whirl
+from rotorid.reduction.running import without_modal_damping
 from rotorid.reduction.threshold import STEPS, grid, searched, stability_threshold
 from rotorid.reduction.turning import whirl_of
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from rotorid.reduction.small import SmallRotor
+from rotorid.reduction.small import SmallRotor
 
 __all__ = ["StabilityCost", "compare_stability", "stability_threshold"]
 
@@ -32,6 +33,13 @@ CONFIRMED = 1e-5
 
 APART = 0.2
 """Whirl frequencies at the thresholds that differ by more belong to different modes, or nearly so."""
+
+
+FAR = 0.3
+"""Smallest decrements that differ by more than this share of the full rotor's largest are said."""
+
+UNDAMPED = 1e-8
+"""A logarithmic decrement below this is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +123,9 @@ class StabilityCost:
                 f"{self.full.threshold:.6g} rad/s: {100 * difference:+.3g} %"
             )
         if self.full.status == self.small.status == "stable":
+            known = [a for a in (self.full_decrement, self.small_decrement) if np.isfinite(a).any()]
+            if all(np.abs(a[np.isfinite(a)]).max() < UNDAMPED for a in known):
+                return f"no damping acts on either model {where}: no motion grows, and none decays"
             return f"both models are stable {where}"
         if self.full.status == self.small.status:
             return f"both models are unstable already at {self.speeds[0]:.6g} rad/s"
@@ -190,6 +201,9 @@ def compare_stability(
     """
     speeds = grid(highest, lowest, steps)
     rotor = small.rotor
+    left = without_modal_damping(small)
+    if left:
+        small = small.undamped_modes
     whirl = whirl_of(small, speeds)
     n_small = int(np.isfinite(whirl.found.values).sum(axis=1).max())
     available = available_modes(rotor)
@@ -212,10 +226,12 @@ def compare_stability(
         n_full=n_full,
         n_small=n_small,
         warnings=(
+            *left,
             *(f"full rotor: {text}" for text in full.warnings),
             *(f"small model: {text}" for text in own.warnings),
             *_unconfirmed(full, n_full),
             *_doubts(full, own),
+            *_damping_differs(speeds, full_decrement, small_decrement),
         ),
     )
 
@@ -265,6 +281,22 @@ def _doubts(full: fem.Stability, small: fem.Stability) -> tuple[str, ...]:
             f"{_way(small.direction)}"
         )
     return tuple(texts)
+
+
+def _damping_differs(speeds: FloatArray, full: FloatArray, small: FloatArray) -> tuple[str, ...]:
+    """Where the two smallest decrements are furthest apart, if that is far."""
+    known = np.isfinite(full) & np.isfinite(small)
+    if not known.any():
+        return ()
+    apart = np.full(full.shape, -1.0)
+    apart[known] = np.abs(full[known] - small[known])
+    k = int(np.argmax(apart))
+    if apart[k] <= max(FAR * float(np.abs(full[known]).max()), UNDAMPED):
+        return ()
+    return (
+        f"the damping differs: at {speeds[k]:.6g} rad/s the smallest logarithmic decrement is {full[k]:.3g} "
+        f"of the full rotor, {small[k]:.3g} of the small model; take more masses or other nodes",
+    )
 
 
 def _way(direction: float | None) -> str:

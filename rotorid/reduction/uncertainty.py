@@ -187,11 +187,14 @@ class MassUncertainty:
             said = ", ".join(f"{name} {share:.0f} %" for name, share in shares if share >= 1)
             lines.append(text + (f"   of the variance: {said}" if said else ""))
         if self.drawn is not None:
-            half = zip(labels(n), self.drawn.ravel(), units(n), strict=True)
-            lines.append(
-                "drawn inputs instead of first order: "
-                + ", ".join(f"{label} ± {value:.2g} {unit}" for label, value, unit in half)
-            )
+            half = list(zip(labels(n), self.drawn.ravel(), units(n), strict=True))
+            known = [f"{label} ± {value:.2g} {unit}" for label, value, unit in half if np.isfinite(value)]
+            lines.append(f"drawn inputs instead of first order: {', '.join(known)}")
+            if lost := [label for label, value, _ in half if not np.isfinite(value)]:
+                lines.append(
+                    f"  some of the drawn inputs give masses that are not positive, and then no {lost[0]}: "
+                    f"these errors do not determine {', '.join(lost)}"
+                )
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
 
 
@@ -268,8 +271,9 @@ def mass_uncertainty(
 def _drawn(problem: Inputs, sigma: FloatArray) -> FloatArray:
     """Half of the span of the middle 68 % of exact recomputations, (2, n); NaN where a mode is often lost."""
     found = problem.exact(np.random.default_rng(0).normal(size=(2000, len(sigma))) * sigma)
-    low, high = np.quantile(found, (0.15866, 0.84134), axis=0)
-    return np.asarray((high - low) / 2)
+    lost = np.isnan(found).any(axis=0)
+    low, high = np.quantile(np.where(np.isnan(found), 0.0, found), (0.15866, 0.84134), axis=0)
+    return np.asarray(np.where(lost, np.nan, (high - low) / 2))
 
 
 def _nonlinearity(
