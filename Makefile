@@ -8,7 +8,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint format bench build clean
+.PHONY: demo test lint docs format bench build clean
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
@@ -23,12 +23,16 @@ lint: $(VENV)/.dev
 	$(BIN)/lint-imports
 	$(BIN)/codespell
 
+docs: $(VENV)/.dev
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
 format: $(VENV)/.dev
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
 bench: $(BENCH_VENV)/.bench $(HSBALANCE_VENV)/.peer
-	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks
+	ROTORID_HSBALANCE_PYTHON=$(HSBALANCE_VENV)/bin/python $(BENCH_VENV)/bin/python -m benchmarks --json docs/benchmarks.json
 
 build: $(VENV)/.dev
 	$(BIN)/python -m pip -q install build
@@ -62,4 +66,4 @@ $(HSBALANCE_VENV)/.peer:
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

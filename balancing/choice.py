@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from balancing.influence import Influence
+from fem.nearest import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
@@ -57,9 +58,9 @@ def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[in
         planes = [planes]
     unknown = [p for p in planes if p not in influence.planes]
     if unknown:
+        asked = ", ".join(f"{name!r}{did_you_mean(str(name), influence.planes)}" for name in unknown)
         raise ValueError(
-            f"there is no plane {', '.join(map(repr, unknown))}; the planes are "
-            f"{', '.join(map(repr, influence.planes))}"
+            f"there is no plane {asked}; the planes are {', '.join(map(repr, influence.planes))}"
         )
     if not planes or len(set(planes)) < len(planes):
         raise ValueError("choose at least one plane, each once")

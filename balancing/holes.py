@@ -130,6 +130,10 @@ def equal_holes(n: int, first: float = 0.0, direction: int = 1) -> FloatArray:
     direction
         +1 where the numbers grow with the rotation, −1 against it.
 
+    Returns
+    -------
+    In rad with the rotation, 0 … 2π, in the order of the numbers.
+
     Raises
     ------
     ValueError
@@ -156,7 +160,13 @@ def from_list(
     names: Sequence[str] = (),
     max_weight: float = np.inf,
 ) -> Holes:
-    """Holes from plain lists; the parameters are the attributes of `Holes`, which says what it raises."""
+    """Holes from plain lists.
+
+    Parameters
+    ----------
+    angles, pieces, per_hole, step, taken, stock, names, max_weight
+        The attributes of `Holes`, which says what it raises.
+    """
     return Holes(
         angles=np.asarray(angles, dtype=np.float64),
         pieces=np.asarray(pieces, dtype=np.float64),

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fem.nearest import did_you_mean
+
 FloatArray = NDArray[np.float64]
 Arc = tuple[float, float]
 """First angle and width, rad, with the rotation; 0 < width ≤ 2π."""
@@ -95,5 +97,6 @@ class Limits:
 
 def _place(name: str, names: Sequence[str], what: str) -> int:
     if name not in names:
-        raise ValueError(f"there is no {what} {name!r}; there are {', '.join(map(repr, names))}")
+        hint = did_you_mean(str(name), names)
+        raise ValueError(f"there is no {what} {name!r}{hint}; there are {', '.join(map(repr, names))}")
     return list(names).index(name)

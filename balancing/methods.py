@@ -21,6 +21,7 @@ from balancing.sampling import sampled_covariance
 from balancing.sectors import allowed_sectors, stands_in
 from balancing.solve import Method, Solution, solve
 from balancing.weighted_limits import STEPS, limited_fit
+from fem.nearest import did_you_mean
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -118,7 +119,8 @@ def fit_weights(
         Where the readings do not tell the planes apart and neither ridge nor truncation is asked for.
     """
     if method not in METHODS:
-        raise ValueError(f"there is no method {method!r}; methods are {', '.join(METHODS)}")
+        hint = did_you_mean(method, METHODS)
+        raise ValueError(f"there is no method {method!r}{hint}; methods are {', '.join(METHODS)}")
     if strength is not None or keep is not None:
         return _regularised(stack, method, strength, keep)
     if method == "weighted":

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from balancing.influence import Influence
 from balancing.labels import Labels
+from fem.nearest import did_you_mean
 
 if TYPE_CHECKING:
     from fem.rotor import Rotor
@@ -146,10 +147,11 @@ def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -
     unknown = [name for name in radii if name not in planes]
     lacking = [name for name in planes if name not in radii]
     if unknown or lacking:
+        hint = did_you_mean(unknown[0], lacking) if len(unknown) == 1 else ""
         raise ValueError(
             f"give the radius of every plane and of no other one: "
             f"{'there is no plane' if unknown else 'lacking is that of'} "
-            f"{', '.join(map(repr, unknown or lacking))}"
+            f"{', '.join(map(repr, unknown or lacking))}{hint}"
         )
     out = np.array([radii[name] for name in planes], dtype=np.float64)
     if not (np.isfinite(out) & (out > 0)).all():

@@ -24,6 +24,7 @@ from balancing.labels import Labels
 from balancing.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
 from balancing.trial_result import TrialWeight
+from fem.nearest import did_you_mean
 
 if TYPE_CHECKING:
     from balancing.influence import Influence
@@ -207,8 +208,9 @@ def trial_from_coefficients(
         larger than the limit.
     """
     if plane not in influence.planes:
+        hint = did_you_mean(str(plane), influence.planes)
         raise ValueError(
-            f"there is no plane {plane!r}; the planes are {', '.join(map(repr, influence.planes))}"
+            f"there is no plane {plane!r}{hint}; the planes are {', '.join(map(repr, influence.planes))}"
         )
     Y = np.asarray(readings, dtype=complex)
     w = influence.W[..., influence.planes.index(plane)]

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import platform
 import sys
+from dataclasses import asdict
+from pathlib import Path
 
 BENCHMARKS = (
     "startup",
@@ -21,6 +24,13 @@ BENCHMARKS = (
 
 
 def main(names: list[str]) -> int:
+    store = None
+    if "--json" in names:
+        at = names.index("--json")
+        if at + 1 == len(names):
+            print("--json takes the name of a file", file=sys.stderr)
+            return 2
+        store, names = Path(names[at + 1]), names[:at] + names[at + 2 :]
     unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:
         print(f"no benchmark is called {unknown[0]!r}; there are: {', '.join(BENCHMARKS)}", file=sys.stderr)
@@ -29,15 +39,18 @@ def main(names: list[str]) -> int:
     import scipy
 
     print(__import__("benchmarks").__doc__)
-    print(
+    machine = (
         f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}, "
-        f"{os.cpu_count()} processors\n"
+        f"{os.cpu_count()} processors"
     )
+    print(f"{machine}\n")
+    rows = []
     head = f"{'task':56}{'':16}{'ms':>9}  {'peer':29}{'ms':>10}{'ratio':>9}{'needed':>8}{'difference':>12}"
     print(head)
     failed = False
     for name in names or BENCHMARKS:
         for row in importlib.import_module(f"benchmarks.{name}").run():
+            rows.append(row)
             verdict = ""
             if not row.agrees:
                 verdict = f"  ANSWERS DIFFER by more than {row.allowed:.0e}"
@@ -50,6 +63,9 @@ def main(names: list[str]) -> int:
                 f"{row.difference:12.1e}{verdict}{'  ' if row.note else ''}{row.note}",
                 flush=True,
             )
+    if store is not None:
+        document = {"machine": machine, "rows": [asdict(row) for row in rows]}
+        store.write_text(json.dumps(document, indent=1) + "\n")
     return int(failed)
 
 

@@ -63,7 +63,7 @@ class Disc:
 
         >>> disc = Disc.from_geometry(3, width=0.07, outer_diameter=0.28, inner_diameter=0.05)
         >>> round(disc.mass, 3), round(disc.polar_inertia, 4), round(disc.diametral_inertia, 4)
-        (32.549, 0.3292, 0.1779)
+        (32.548, 0.3291, 0.1779)
         """
         what = f"disc{f' {name!r}' if name else ''} at node {node}"
         w = number(width, f"{what}: width")

@@ -82,6 +82,13 @@ class MeshCheck:
 def refined(rotor: Rotor, times: int) -> Rotor:
     """The same rotor with each element cut into equal parts; nodes are renumbered.
 
+    Parameters
+    ----------
+    rotor
+        Whose elements are cut.
+    times
+        Into how many parts, 1 or more.
+
     Raises
     ------
     ValueError
@@ -120,6 +127,13 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
 
     The frequencies f(h) of the elements of this package converge as h⁴ (`fem.elements`); with elements cut in
     two, f(h) − f(0) ≈ 16/15 (f(h) − f(h/2)) (Richardson). A third solution with h/4 shows the rate.
+
+    Parameters
+    ----------
+    rotor
+        With the mesh to be judged.
+    n
+        How many critical speeds.
 
     Raises
     ------

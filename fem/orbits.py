@@ -46,6 +46,13 @@ class Orbits:
 def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
     """Compute the ellipses of complex amplitudes x and y (peak values).
 
+    Parameters
+    ----------
+    x, y
+        Complex amplitudes of the same unit, shapes that broadcast.
+
+    Examples
+    --------
     >>> found = orbits(3.0, -2.0j)
     >>> float(found.major), float(found.minor), float(found.direction)
     (3.0, 2.0, 1.0)
@@ -74,7 +81,19 @@ def orbits(x: ArrayLike, y: ArrayLike) -> Orbits:
 
 
 def probe(x: ArrayLike, y: ArrayLike, angle: ArrayLike) -> ComplexArray:
-    """Complex amplitude that a probe reads, at an angle in rad from x with the rotation."""
+    """Complex amplitude that a probe reads.
+
+    Parameters
+    ----------
+    x, y
+        Complex amplitudes of the node in both directions.
+    angle
+        Where the probe points, rad from x with the rotation.
+
+    Returns
+    -------
+    x cos(angle) + y sin(angle), the shapes broadcast.
+    """
     angle = np.asarray(angle, dtype=float)
     return np.asarray(
         np.asarray(x, dtype=complex) * np.cos(angle) + np.asarray(y, dtype=complex) * np.sin(angle)
@@ -90,6 +109,10 @@ def whirl_direction(x: ArrayLike, y: ArrayLike) -> FloatArray:
     ----------
     x, y
         Complex amplitudes, nodes along the last axis, shape (…, N).
+
+    Returns
+    -------
+    1, −1 or 0, shape (…).
     """
     X, Y = np.asarray(x, dtype=complex), np.asarray(y, dtype=complex)
     area = (np.conj(X) * -Y).imag  # π times this is the area

@@ -208,6 +208,12 @@ def required_margin(amplification: float, *, above: bool, edition: Edition = "20
     edition
         "2005" or "1996".
 
+    Returns
+    -------
+    Percent of the operating speed next to it; 0 below an amplification of 2.5.
+
+    Examples
+    --------
     >>> required_margin(5.0, above=False), required_margin(50.0, above=True)
     (12.142857142857142, 26.0)
     """

@@ -12,6 +12,7 @@ import numpy as np
 
 from fem.checks import whole
 from fem.disc import STEEL_DENSITY, Disc
+from fem.nearest import did_you_mean
 from fem.supports import FloatArray, Pedestal, Support
 
 __all__ = ["RPM", "STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
@@ -136,7 +137,8 @@ class Rotor:
             if not name_or_number.strip().isdecimal():
                 known = ", ".join(self.stations) or "none"
                 raise ValueError(
-                    f"no station is called {name_or_number!r} (stations: {known}); "
+                    f"no station is called {name_or_number!r}{did_you_mean(name_or_number, self.stations)} "
+                    f"(stations: {known}); "
                     f"give one of these or a node number from 1 to {self.n_nodes}"
                 )
             name_or_number = int(name_or_number)

@@ -68,6 +68,11 @@ class Estimate:
         residuals (Student's t).
     chi_square
         Weighted sum of squared residuals over the stated variances; None without stated errors.
+    row_space
+        Combinations of the parameters that the data determine: rows that span them all, shape (rank, n).
+    solution_covariance
+        Of `solution`, shape (n, n): right for combinations that the data determine; None where errors are
+        unknown.
     curved
         What a nonlinear model determines instead of its parameters, such as products; None: linear
         combinations.

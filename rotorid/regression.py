@@ -73,7 +73,22 @@ def stretch(a: ArrayLike) -> FloatArray:
 
 
 def unstretch(v: ArrayLike) -> ComplexArray:
-    """Turn a stretched vector (2n,) of Re, Im pairs back into a complex one (n,)."""
+    """Turn a stretched vector back into a complex one.
+
+    Parameters
+    ----------
+    v
+        Re, Im pairs, shape (2n,).
+
+    Returns
+    -------
+    Shape (n,).
+
+    Raises
+    ------
+    ValueError
+        For another shape.
+    """
     pairs = np.ascontiguousarray(v, dtype=np.float64)
     if pairs.ndim != 1 or len(pairs) % 2:
         raise ValueError(f"a stretched vector has Re, Im pairs in one dimension; got shape {pairs.shape}")

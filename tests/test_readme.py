@@ -33,9 +33,14 @@ def test_every_command_of_the_readme_runs(cli, workplace, command):
     words = shlex.split(command)[1:]
     outcome = cli(*words)
     assert outcome.code == 0, outcome.err
-    for option in ("--plot", "--output"):
+    for option in ("--plot", "--output", "--report"):
         if option in words:
             assert (workplace / words[words.index(option) + 1]).stat().st_size > 0
+
+
+def test_the_last_line_of_validate_is_quoted(cli):
+    quoted = [text.strip() for kind, text in BLOCKS if kind == "text"]
+    assert cli("validate").out.splitlines()[-1] in quoted
 
 
 @pytest.mark.parametrize("script", SCRIPTS)

@@ -6,6 +6,7 @@ import contextlib
 import os
 import sys
 import warnings
+from collections.abc import Callable
 
 import typer
 
@@ -23,28 +24,38 @@ from rotorid.cli import (
     tolerance,
     trial_weight,
     unbalance,
+    validate,
 )
+from rotorid.cli.suggest import NearestGroup, markup_mode
+from rotorid.cli.verbose import verbosely
 
 app = typer.Typer(
     name="rotorid",
+    cls=NearestGroup,
+    rich_markup_mode=markup_mode(),
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("demo")(demo.demo)
-app.command("critical")(critical.critical)
-app.command("campbell")(campbell.campbell)
-app.command("response")(response.response)
-app.command("influence")(influence.influence)
-app.command("balance")(balance.balance)
-app.command("trial-weight")(trial_weight.trial_weight)
-app.command("split")(split.split)
-app.command("tolerance")(tolerance.tolerance)
-app.command("unbalance")(unbalance.unbalance)
-app.command("reduce")(reduce.reduce)
-app.command("identify")(identify.identify)
-app.command("fit")(fit.fit)
+_COMMANDS: dict[str, Callable[..., None]] = {
+    "demo": demo.demo,
+    "critical": critical.critical,
+    "campbell": campbell.campbell,
+    "response": response.response,
+    "influence": influence.influence,
+    "balance": balance.balance,
+    "trial-weight": trial_weight.trial_weight,
+    "split": split.split,
+    "tolerance": tolerance.tolerance,
+    "unbalance": unbalance.unbalance,
+    "reduce": reduce.reduce,
+    "identify": identify.identify,
+    "fit": fit.fit,
+    "validate": validate.validate,
+}
+for _name, _command in _COMMANDS.items():
+    app.command(_name)(verbosely(_command))
 
 
 def _version(show: bool) -> None:
@@ -64,7 +75,8 @@ def _rotorid(
     """Rotor models, flexible-rotor balancing and identification of oscillating systems.
 
     Every command has --json (one JSON document on standard output), --plot FILE and --output FILE where they
-    make sense, and --help with an example. Exit status: 0, or 2 for bad input with one message.
+    make sense, --verbose for the numbers behind a result (on standard error), and --help with an example.
+    Exit status: 0, or 2 for bad input with one message.
     """
 
 

@@ -29,6 +29,12 @@ PlotOption = Annotated[
 OutputOption = Annotated[
     Path | None, typer.Option("--output", metavar="FILE", help="Table, .csv or .xlsx.", show_default=False)
 ]
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", metavar="FILE", help="Sheet to print or to send, .html, one file.", show_default=False
+    ),
+]
 RotorArgument = Annotated[
     Path,
     typer.Argument(
@@ -68,10 +74,11 @@ def check_targets(
     *more: Path | None,
     model: Path | None = None,
     state_space: Path | None = None,
+    report: Path | None = None,
 ) -> None:
     """Refuse files that could not be written, before any work is done; `more` are tables, too."""
     targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more)]
-    targets += [(model, (".toml",)), (state_space, STATE_SPACES)]
+    targets += [(model, (".toml",)), (state_space, STATE_SPACES), (report, (".html",))]
     asked: list[Path] = []
     for path, endings in targets:
         if path is None:
@@ -118,11 +125,17 @@ def emit(
     figure: tuple[Path | None, Callable[[], Figure]] | None = None,
     table: tuple[Path | None, Callable[[], pd.DataFrame]] | None = None,
     more: Sequence[tuple[Path | None, Callable[[], bytes]]] = (),
+    report: tuple[Path | None, Callable[[dict[str, Any], dict[str, Any]], bytes]] | None = None,
 ) -> None:
-    """Print a result as text or JSON; write its picture, its table and `more`, all of them or none."""
+    """Print a result as text or JSON; write its picture, table, sheet and `more`, all of them or none.
+
+    The sheet is made from the document and the provenance.
+    """
+    from rotorid.cli.verbose import note
     from rotorid.tables.writing import table_bytes, write_files
 
-    check_inputs([t[0] for t in (figure, table, *more) if t and t[0]], files)
+    note(document)
+    check_inputs([t[0] for t in (figure, table, *more, report) if t and t[0]], files)
     record = provenance(files, options)
     written: dict[Path, bytes] = {}
     if figure and figure[0]:
@@ -130,6 +143,8 @@ def emit(
     if table and table[0]:
         written[table[0]] = table_bytes(table[0], table[1]())
     written |= {path: build() for path, build in more if path is not None}
+    if report and report[0]:
+        written[report[0]] = report[1](dict(document), record)
     write_files(written)
     if as_json:
         typer.echo(

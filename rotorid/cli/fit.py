@@ -11,6 +11,7 @@ import typer
 
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
 from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -160,6 +161,8 @@ def fit(
             rtol=RTOL if rtol is None else rtol,
             weigh=weigh,
         )
+    note({"degrees_of_freedom": result.estimate.dof})
+    note({"singular_values": result.estimate.singular_values.tolist()})
 
     def draw() -> Figure:
         return figure_fit(result)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fem.nearest import did_you_mean
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
 from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,10 +89,11 @@ def identify(
     from rotorid.tables import read_harmonic_model, read_measurements
 
     check_targets(plot, output)
-    if method not in METHODS:
-        raise ValueError(f"--method {method!r} is not known: {' or '.join(METHODS)}")
-    if loss not in LOSSES:
-        raise ValueError(f"--loss {loss!r} is not known: one of {', '.join(LOSSES)}")
+    for option, value, known in (("--method", method, METHODS), ("--loss", loss, LOSSES)):
+        if value not in known:
+            raise ValueError(
+                f"{option} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
+            )
     if loss != LOSSES[0] and method != METHODS[1]:
         raise ValueError(f"--loss belongs to --method {METHODS[1]}: linear regression has none")
     if data is None and (design is None or plot is not None):
@@ -110,6 +113,8 @@ def identify(
                 file.model, experiments, method=method, bounds=file.bounds or None, loss=loss, start=start
             )
         chosen = None if design is None else plan(file, result, design, choose)
+    if result is not None:
+        note({"degrees_of_freedom": result.dof})
 
     def draw() -> Figure:
         assert result is not None

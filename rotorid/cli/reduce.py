@@ -12,12 +12,14 @@ from rotorid.cli.common import (
     JsonOption,
     OutputOption,
     PlotOption,
+    ReportOption,
     check_targets,
     emit,
     one_speed,
     rising_speeds,
 )
 from rotorid.cli.common import nodes as parse_nodes
+from rotorid.cli.verbose import note
 
 
 class Place(StrEnum):
@@ -212,6 +214,7 @@ def reduce(
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
+    sheet: ReportOption = None,
 ) -> None:
     """Equivalent masses at chosen nodes (formula 50), how good they are, and the small model to go on with.
 
@@ -226,7 +229,7 @@ def reduce(
     from rotorid.cli.reduce_report import Report
     from rotorid.tables import read_rotor, rotor_files
 
-    check_targets(plot, output, model=model, state_space=state_space)
+    check_targets(plot, output, model=model, state_space=state_space, report=sheet)
     how: dict[str, Any] = {"normalise": normalise.value, "rows": rows.value}
     signed = how | {"nonnegative": nonnegative}
     if rotor is None:
@@ -316,6 +319,9 @@ def reduce(
             report.add_response(None if response == "auto" else rising_speeds(response, "--response"))
         if stability is not None:
             report.add_stability(*given.speed_range(stability))
+    solved = report.result.masses
+    note({"rank": solved.rank, "degrees_of_freedom": solved.dof})
+    note({"singular_values": solved.singular_values.tolist()})
     if what_if is not None:
         report.shift = report.result.what_if(given.changes(what_if))
     emit(
@@ -347,6 +353,7 @@ def reduce(
         },
         figure=(plot, lambda: report.figure(None if view is None else view.value)),
         table=(output, report.frame),
+        report=(sheet, report.sheet),
         more=(
             (model, lambda: report.model_bytes("" if rotor is None else rotor.name)),
             (state_space, lambda: report.state_space_bytes(state_space or Path())),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem.nearest import did_you_mean
 from rotorid.cli.common import band
 from rotorid.cli.common import nodes as parse_nodes
 
@@ -115,8 +116,9 @@ def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) 
     at = tuple(int(d) - 1 for d in found.group(2, 3, 5) if d) if found else ()
     if not found or any(not 0 <= i < size for i, size in zip(at, shapes[stem], strict=True)):
         raise ValueError(
-            f"--errors: {name!r} is not known; known are {', '.join(ERRORS)}, or one input of {n} masses and "
-            f"{modes} mode(s): alpha11 to alpha{n}{n}, U11 to U{n}{modes}, omega1 to omega{modes}, c1 to c{n}"
+            f"--errors: {name!r} is not known{did_you_mean(name, ERRORS)}; known are {', '.join(ERRORS)}, or "
+            f"one input of {n} masses and {modes} mode(s): alpha11 to alpha{n}{n}, U11 to U{n}{modes}, "
+            f"omega1 to omega{modes}, c1 to c{n}"
         )
     table = np.array(np.broadcast_to(stated.get(kinds[stem], 0.0), shapes[stem]))
     table[at] = value

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fem.nearest import did_you_mean
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names
 from rotorid.cli.tolerance import quantity, speed_with_unit
 
@@ -182,7 +183,8 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
     if missing:
         raise ValueError(f"without a job, give --{' and --'.join(missing)}")
     if asked["measures"] not in MEASURES:
-        raise ValueError(f"--measures {asked['measures']!r} is not known: one of {', '.join(MEASURES)}")
+        hint = did_you_mean(asked["measures"], MEASURES)
+        raise ValueError(f"--measures {asked['measures']!r} is not known{hint}: one of {', '.join(MEASURES)}")
     known = Conventions(as_phase(asked["phase"] or "lead"), as_angles(asked["angles"] or "with rotation"))
     shown = units.one_of(units.MASS)(asked["unit"])
     labels = Labels(weight_unit=shown.name, weight_scale=shown.scale, phase=known.phase, angles=known.angles)

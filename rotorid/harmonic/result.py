@@ -25,7 +25,15 @@ METHODS = {"equation-error": "linear regression (equation error)", "output-error
 
 @dataclass(frozen=True)
 class FoundCombination:
-    """A combination of parameters that the data determine; std None: unknown."""
+    """A combination of parameters that the data determine.
+
+    Attributes
+    ----------
+    words
+        The combination, such as "b*(1 - delta)".
+    value, std
+        Its estimate and one standard deviation, None where that is unknown.
+    """
 
     words: str
     value: float
@@ -71,6 +79,8 @@ class Identification:
         Shape (experiments, n): change of each parameter if the experiment is left out; NaN where unknown.
     left_out
         Rows without effect because an amplitude was not measured, in words.
+    notes
+        How the numbers came about, in words.
     warnings
         What should be known before the numbers are used.
     """

@@ -73,9 +73,20 @@ class Matching:
 
 
 def matching_masses(compliance: ArrayLike, frequencies: ArrayLike) -> FloatArray:
-    """All positive mass sets whose n-mass model has exactly these n frequencies, kg, shape (s, n).
+    """All positive mass sets whose n-mass model has exactly these n frequencies.
 
     `match` with its masses only; for four masses and more look at what it says about completeness.
+
+    Parameters
+    ----------
+    compliance
+        m/N, shape (n, n).
+    frequencies
+        rad/s, shape (n,).
+
+    Returns
+    -------
+    kg, shape (s, n): s sets, which may be none.
 
     Examples
     --------

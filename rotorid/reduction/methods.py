@@ -99,7 +99,15 @@ def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None =
 def irs(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
     """Reduce a rotor by the improved reduced system: Guyan's shapes corrected by their inertia forces.
 
-    Parameters and errors are those of `guyan`; refused, too, where Guyan's mass matrix is singular.
+    Parameters
+    ----------
+    rotor, nodes, speed
+        As for `guyan`.
+
+    Raises
+    ------
+    ValueError
+        As `guyan`; and where Guyan's mass matrix is singular.
     """
     return _irs(_condense(rotor, nodes, speed))
 
@@ -107,8 +115,16 @@ def irs(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = N
 def serep(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
     """Reduce a rotor to as many of its modes as there are masters (SEREP): exact for these.
 
-    Parameters and errors are those of `guyan`; refused, too, where the modes' shapes at the masters
-    depend on one another, as at a node of all of them.
+    Parameters
+    ----------
+    rotor, nodes, speed
+        As for `guyan`.
+
+    Raises
+    ------
+    ValueError
+        As `guyan`; and where the modes' shapes at the masters depend on one another, as at a node of all of
+        them.
     """
     return _serep(_condense(rotor, nodes, speed))
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fem.nearest import did_you_mean
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,
@@ -259,7 +260,8 @@ def input_index(name: str, names: tuple[str, ...]) -> int:
         i, mark, j = rest.partition(",")
         found = f"alpha{j},{i}" if mark else f"alpha{rest[::-1]}"
     if found not in names:
-        raise ValueError(f"there is no input {name!r}: choose among {', '.join(names)}")
+        hint = did_you_mean(name, names) if found == name else ""
+        raise ValueError(f"there is no input {name!r}{hint}: choose among {', '.join(names)}")
     return names.index(found)
 
 

@@ -13,7 +13,7 @@ from balancing.labels import Angles as Angles
 from balancing.labels import Labels, Rotation, View, check_turning
 from balancing.labels import Phase as Phase
 from balancing.trials import ReadingErrors
-from rotorid.tables.problems import listing
+from rotorid.tables.problems import did_you_mean, listing
 from rotorid.tables.tomlfile import Section
 
 PHASES = ("lead", "lag")
@@ -187,7 +187,8 @@ def check_angles(word: str) -> None:
         Naming the allowed words.
     """
     if word not in STATED_ANGLES:
-        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {word!r}")
+        hint = did_you_mean(word, STATED_ANGLES)
+        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {word!r}{hint}")
 
 
 def resolve_angles(stated: str, rotation: str | None) -> Angles:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+from fem.nearest import did_you_mean, suggest
+
+__all__ = ["InputError", "Problem", "Problems", "TableWarning", "did_you_mean", "listing"]
+__all__ += ["printable", "quote", "suggest"]
 
 LONGEST_VALUE = 60
 FEW = 3
@@ -151,28 +155,6 @@ def quote(value: str) -> str:
         return "nothing (a blank)"
     shown = value if len(value) <= LONGEST_VALUE else value[: LONGEST_VALUE - 1] + "…"
     return repr(shown)
-
-
-def suggest(name: str, known: Iterable[str]) -> str | None:
-    """The known name nearest to a misspelt one, or None."""
-    names = list(known)
-    folded = {candidate.casefold(): candidate for candidate in reversed(names)}
-    longer = next(
-        (candidate for candidate in names if candidate.casefold().startswith(f"{name.casefold()}_")), None
-    )
-    if longer is not None:
-        return longer  # only the unit is missing
-    close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.6)
-    if close:
-        return folded[close[0]]
-    begun = [candidate for candidate in folded if len(name) > 2 and candidate.startswith(name.casefold())]
-    return folded[begun[0]] if len(begun) == 1 else None
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`" (did you mean 'x'?)"`, or an empty text."""
-    near = suggest(name, known)
-    return f" (did you mean {near!r}?)" if near else ""
 
 
 def listing(names: Iterable[str], conjunction: str = "or") -> str:

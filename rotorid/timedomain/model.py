@@ -41,6 +41,8 @@ class OdeModel:
         Lower and upper bounds of the parameters, shape (n_p, 2), ±inf where there is none.
     texts
         The expressions as written, by place ("state x1").
+    rates, initial, observed
+        f, x(0) and h as expressions, one for each state or output.
     per_record
         Parameters that every one of several records has for itself.
     """

@@ -1,0 +1,42 @@
+"""`rotorid validate`: printed numbers of the references beside those computed now."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.common import JsonOption, OutputOption, check_targets, emit
+from rotorid.cli.progress import busy
+
+
+def validate(
+    every: Annotated[bool, typer.Option("--all", help="Every number, not only the sources.")] = False,
+    json: JsonOption = False,
+    output: OutputOption = None,
+) -> None:
+    """Every number that the references print, beside what this program computes now.
+
+    Example: rotorid validate
+
+    Example: rotorid validate --output numbers.csv
+
+    A number agrees within half a unit of its last printed digit, or within a stated tolerance that has its
+    reason; an erratum of the print has its reason, too. Exit status 0 if no number differs, 1 if one does.
+    """
+    from rotorid.validation import validate as prove
+    from rotorid.validation.row import tables
+
+    check_targets(None, output)
+    with busy("validation"):
+        proof = prove()
+    emit(
+        proof.to_dict(),
+        lambda: proof.summary(every=every),
+        as_json=json,
+        files=tables(),
+        options={"all": every},
+        table=(output, proof.to_frame),
+    )
+    if not proof.holds:
+        raise typer.Exit(1)

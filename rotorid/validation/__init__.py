@@ -1,0 +1,238 @@
+"""The proof: every printed number of the references beside what the program computes now.
+
+`validate()` asks each provider (`rotor`, `masses`, `lessons`, `time_records`, `balancing`) for its rows.
+Nothing is stored but what is printed; all else is computed by the public functions when it is asked for.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Key = TypeVar("Key", bound=Hashable)
+
+__all__ = ["Group", "Row", "Status", "Validation", "row", "validate"]
+
+PROVIDERS = {
+    "rotor": "Rotor of 23 elements: critical speeds and mode shapes",
+    "masses": "Equivalent masses of that rotor, formula (50)",
+    "lessons": "Coefficients from amplitudes, frequencies and shapes",
+    "time_records": "Parameters from time records",
+    "balancing": "Published balancing examples",
+}
+WIDTH = 100
+
+
+@dataclass(frozen=True)
+class Group:
+    """Rows that belong together.
+
+    Attributes
+    ----------
+    name, title
+        In one word, and in words.
+    rows
+        In the order of their source.
+    """
+
+    name: str
+    title: str
+    rows: tuple[Row, ...]
+
+    def sources(self) -> dict[str, list[Row]]:
+        """Rows by where they are printed."""
+        return _by(self.rows, lambda r: r.source)
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Printed and computed numbers.
+
+    Attributes
+    ----------
+    groups
+        In the order of reading.
+    """
+
+    groups: tuple[Group, ...]
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """All rows."""
+        return tuple(r for group in self.groups for r in group.rows)
+
+    @property
+    def counts(self) -> dict[Status, int]:
+        """How many rows agree, are errata, differ."""
+        return _counts(self.rows)
+
+    @property
+    def holds(self) -> bool:
+        """Whether no row differs."""
+        return not self.counts[DIFFERS]
+
+    @property
+    def last_line(self) -> str:
+        """The result in one line."""
+        n = self.counts
+        return f"{len(self.rows)} numbers: {n[AGREES]} agree, {n[ERRATUM]} errata, {n[DIFFERS]} differ"
+
+    def summary(self, *, every: bool = False) -> str:
+        """Text: a line for each source, then what differs, errata and wide tolerances with their reasons.
+
+        Parameters
+        ----------
+        every
+            Every row, too.
+        """
+        width = max([len(source) for group in self.groups for source in group.sources()] or [0]) + 2
+        head = f"{'':{width}}{'numbers':>8}{'agree':>8}{'errata':>8}{'differ':>8}   worst agreement"
+        lines = [head]
+        for group in self.groups:
+            lines.append(group.title)
+            for source, rows in group.sources().items():
+                lines.append(_source_line(source, rows, width))
+                if every:
+                    lines += [_row_line(r) for r in rows]
+        lines += [
+            "",
+            "Worst agreement: the largest difference among those that agree, in percent of its tolerance.",
+        ]
+        lines += _chapter("Differ", [r for r in self.rows if r.status == DIFFERS], _difference)
+        lines += _chapter("Errata of the print", [r for r in self.rows if r.status == ERRATUM], _erratum)
+        wide = [r for r in self.rows if r.reason]
+        lines += _chapter("Tolerances other than half a unit of the last printed digit", wide, _tolerance)
+        return "\n".join([*lines, "", self.last_line])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per number, with the group before the columns of `to_dict`."""
+        import pandas as pd
+
+        return pd.DataFrame([{"group": g.name, **r.to_dict()} for g in self.groups for r in g.rows])
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types: `rows`, `groups` with their counts, `counts`."""
+        return {
+            "rows": [{"group": g.name, **r.to_dict()} for g in self.groups for r in g.rows],
+            "groups": [
+                {"group": g.name, "title": g.title, "numbers": len(g.rows), **_counts(g.rows)}
+                for g in self.groups
+            ],
+            "counts": {"numbers": len(self.rows), **self.counts},
+        }
+
+
+def validate(groups: Iterable[str] | None = None) -> Validation:
+    """Compute every printed number of the references and compare.
+
+    Parameters
+    ----------
+    groups
+        Some of the providers, by name; default all.
+
+    Raises
+    ------
+    ValueError
+        For a group that does not exist.
+
+    Examples
+    --------
+    >>> validate(["rotor"]).last_line
+    '75 numbers: 75 agree, 0 errata, 0 differ'
+    """
+    chosen = list(PROVIDERS) if groups is None else list(groups)
+    for name in chosen:
+        if name not in PROVIDERS:
+            raise ValueError(
+                f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
+            )
+    return Validation(
+        tuple(
+            Group(name, PROVIDERS[name], tuple(import_module(f"rotorid.validation.{name}").rows()))
+            for name in chosen
+        )
+    )
+
+
+def _counts(rows: Sequence[Row]) -> dict[Status, int]:
+    found: dict[Status, int] = {AGREES: 0, ERRATUM: 0, DIFFERS: 0}
+    for r in rows:
+        found[r.status] += 1
+    return found
+
+
+def _by(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
+    found: dict[Key, list[Row]] = {}
+    for r in rows:
+        found.setdefault(key(r), []).append(r)
+    return found
+
+
+def _source_line(source: str, rows: Sequence[Row], width: int) -> str:
+    n = _counts(rows)
+    agreeing = [r.misfit for r in rows if r.status == AGREES]
+    worst = f"{100 * max(agreeing):10.0f} %" if agreeing else f"{'–':>10}"
+    return (
+        f"  {source:{width - 2}}{len(rows):>8}{n[AGREES]:>8}{n[ERRATUM]:>8}{n[DIFFERS]:>8}   {worst}".rstrip()
+    )
+
+
+def _row_line(r: Row) -> str:
+    return (
+        f"    {r.quantity:<44} {r.text:>24} {r.computed:>16.9g} {r.difference:>+11.2e}"
+        f" (± {r.tolerance:.1e})  {r.status}"
+    )
+
+
+def _chapter(title: str, rows: Sequence[Row], words: Callable[[Sequence[Row]], str]) -> list[str]:
+    """A heading and a paragraph for each source and reason."""
+    if not rows:
+        return []
+    lines = ["", f"{title}:"]
+    for own in _by(rows, lambda r: (r.source, r.erratum, r.reason)).values():
+        lines += textwrap.wrap(words(own), WIDTH, initial_indent="  ", subsequent_indent="    ")
+    return lines
+
+
+def _named(rows: Sequence[Row], most: int = 6) -> str:
+    """The quantities, the first few of many."""
+    names = [_printed_and_right(r) for r in rows[:most]]
+    more = f" and {len(rows) - most} more" if len(rows) > most else ""
+    return f"{rows[0].source}: {'; '.join(names)}{more}"
+
+
+def _printed_and_right(r: Row) -> str:
+    return f"{r.quantity}: printed {r.text}, computed {r.computed:.{_digits(r)}g}"
+
+
+def _digits(r: Row) -> int:
+    """As many digits as were printed, and two more; at least five, at most twelve."""
+    return min(12, max(5, sum(c.isdigit() for c in r.text.lower().split("e")[0].lstrip("-+.0")) + 2))
+
+
+def _difference(rows: Sequence[Row]) -> str:
+    note = rows[0].note
+    return _named(rows, len(rows)) + (f" ({note})" if note else "")
+
+
+def _erratum(rows: Sequence[Row]) -> str:
+    return f"{_named(rows)}. {_sentence(rows[0].erratum)}"
+
+
+def _tolerance(rows: Sequence[Row]) -> str:
+    what = rows[0].quantity if len(rows) == 1 else f"{len(rows)} numbers"
+    low, high = min(r.tolerance for r in rows), max(r.tolerance for r in rows)
+    size = f"{low:.2g}" if low == high else f"{low:.2g} to {high:.2g}"
+    return f"{rows[0].source}, {what}: {size}. {_sentence(rows[0].reason)}"
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
