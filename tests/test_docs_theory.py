@@ -1,0 +1,153 @@
+"""The theory pages: Python blocks run in order, formulas can be shown, links lead somewhere."""
+
+import re
+from dataclasses import replace
+from importlib import import_module
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from balancing import correct
+from fem import equations_of_motion, influence, probe
+from rotorid import equivalent_masses, stretch
+from rotorid.harmonic.experiments import experiments
+from rotorid.samples import sample_data
+from rotorid.timedomain import simulate
+
+ROOT = sample_data().parent
+FOLDER = ROOT / "docs" / "theory"
+INDEX = (FOLDER / "index.md").read_text(encoding="utf-8")
+TOCTREE = re.search(r"```\{toctree\}\n(.*?)```", INDEX, re.DOTALL)
+PAGES = [line for line in TOCTREE[1].split() if not line.startswith(":") and not line.isdigit()]
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+FENCED = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
+
+
+def text_of(page):
+    return (FOLDER / f"{page}.md").read_text(encoding="utf-8")
+
+
+def formulas(text):
+    """Displayed and inline formulas of a page, without its code."""
+    text = re.sub(r"`[^`\n]*`", "", FENCED.sub("", text))
+    shown = re.findall(r"\$\$(.*?)\$\$", text, re.DOTALL)
+    rest = re.sub(r"\$\$.*?\$\$", "", text, flags=re.DOTALL)
+    assert rest.count("$") % 2 == 0
+    return shown, re.findall(r"\$([^$]+)\$", rest)
+
+
+def test_the_index_lists_every_page():
+    assert sorted(PAGES) == sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
+    assert len(PAGES) == 8
+
+
+def run(page):
+    """Run the blocks of a page in order; an error shows its line of the page."""
+    text = text_of(page)
+    names = {"__name__": "__theory__"}
+    for block in BLOCK.finditer(text):
+        first = text.count("\n", 0, block.start(1))
+        exec(compile("\n" * first + block[1], str(FOLDER / f"{page}.md"), "exec"), names)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_code_of_a_page_runs_and_its_formulas_hold(page, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    run(page)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_checks_something(page):
+    blocks = BLOCK.findall(text_of(page))
+    assert len(blocks) >= 4
+    assert all("assert " in block for block in blocks)
+
+
+def other_direction(x, y, angle):
+    return probe(x, y, -np.asarray(angle))
+
+
+def other_gyroscopic_sign(rotor, **options):
+    motion = equations_of_motion(rotor, **options)
+    return replace(motion, C=motion.C.T)
+
+
+def lagging_coefficients(*arguments):
+    found = influence(*arguments)
+    return replace(found, W=found.W.conj())
+
+
+def minus_in_the_lower_left(a):
+    return stretch(np.conj(a))
+
+
+def heavy_spot_for_light_spot(*arguments):
+    found = correct(*arguments)
+    return replace(found, weights=-found.weights)
+
+
+def pushing_seal(*arguments, seal_stiffness=0.0, **options):
+    return equivalent_masses(*arguments, seal_stiffness=-np.asarray(seal_stiffness), **options)
+
+
+def lagging_amplitudes(model, frequencies, signals):
+    return experiments(model, frequencies, {name: np.conj(value) for name, value in signals.items()})
+
+
+def record_less_model(*arguments):
+    found = simulate(*arguments)
+    return replace(found, S=-found.S)
+
+
+@pytest.mark.parametrize(
+    ("page", "place", "wrong"),
+    [
+        ("signs", "fem.probe", other_direction),
+        ("beams", "fem.equations_of_motion", other_gyroscopic_sign),
+        ("response", "fem.influence", lagging_coefficients),
+        ("regression", "rotorid.stretch", minus_in_the_lower_left),
+        ("balancing", "balancing.correct", heavy_spot_for_light_spot),
+        ("reduction", "rotorid.equivalent_masses", pushing_seal),
+        ("identification", "rotorid.harmonic.experiments.experiments", lagging_amplitudes),
+        ("records", "rotorid.timedomain.simulate", record_less_model),
+    ],
+)
+def test_a_wrong_sign_is_found(page, place, wrong, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    module, _, name = place.rpartition(".")
+    monkeypatch.setattr(import_module(module), name, wrong)
+    with pytest.raises(AssertionError):
+        run(page)
+
+
+@pytest.mark.parametrize("page", ["index", *PAGES])
+def test_every_formula_becomes_mathml(page):
+    """As docs/_ext/mathml.py writes it: no command is left over as text, and the result is well-formed."""
+    from latex2mathml.converter import convert
+
+    shown, within = formulas(text_of(page))
+    assert within
+    for formula, display in [(f, "block") for f in shown] + [(f, "inline") for f in within]:
+        tree = ElementTree.fromstring(convert(formula.strip(), display=display))
+        assert "\\" not in "".join(tree.itertext()), formula
+        assert "$" not in formula
+
+
+@pytest.mark.parametrize("page", ["index", *PAGES])
+def test_links_lead_somewhere_and_lines_fit(page):
+    text = text_of(page)
+    for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", FENCED.sub("", text)):
+        assert (FOLDER / link).exists(), link
+    assert text.startswith("# ")
+    if page != "index":
+        assert 80 <= text.count("\n") <= 200
+    assert max(map(len, text.splitlines())) <= 120
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_files_and_functions_named_in_a_page_exist(page):
+    for name in re.findall(r"`((?:tests|examples|sample_data|docs)/[\w./]+)`", text_of(page)):
+        assert (ROOT / name).exists(), name
+    for package, name in re.findall(r"`(fem|balancing|rotorid)\.(\w+)`", text_of(page)):
+        assert hasattr(import_module(package), name), f"{package}.{name}"
