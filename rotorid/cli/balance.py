@@ -11,6 +11,7 @@ from rotorid.cli.common import (
     JsonOption,
     OutputOption,
     PlotOption,
+    ReportOption,
     check_inputs,
     check_targets,
     emit,
@@ -35,13 +36,13 @@ class Overrides(TypedDict):
 
 def balance(
     files: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="JOB | RUNS WEIGHTS | RUNS",
             help="Job (.toml, .xlsx); or runs and weights tables; or a runs table with --influence.",
             show_default=False,
         ),
-    ],
+    ] = None,
     method: Annotated[
         str, typer.Option(metavar="METHOD", help=f"{', '.join(METHODS)} (the smallest largest amplitude).")
     ] = METHODS[0],
@@ -187,6 +188,11 @@ def balance(
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
     ] = None,
+    template: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.xlsx", help="Write an empty workbook to fill in.", show_default=False),
+    ] = None,
+    sheet: ReportOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
@@ -195,26 +201,40 @@ def balance(
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 
+    Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
+
     Example: rotorid balance runs.csv weights.csv --amplitude-error 2 --phase-error 2 --max-mass 5g
+
+    Example: rotorid balance --template job.xlsx, and when it is filled in: rotorid balance job.xlsx --output
+    sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
     """
     from balancing import correct
     from balancing.check import compare_check
     from balancing.mounted import mount
     from rotorid.cli.balance_report import Report
+    from rotorid.cli.balance_workbook import as_workbook, workbook, write_template
     from rotorid.cli.coefficients import choose, compare_planes
     from rotorid.cli.verdict import Places, judge, tolerance_of
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.influence import influence_bytes
     from rotorid.tables.joblimits import with_limits
+    from rotorid.tables.jobsource import JobSource
 
+    if template is not None:
+        write_template(template, files)
+        return
+    if not files:
+        raise ValueError(
+            "give a job (.toml, .xlsx) or a runs table and a weights table; --template writes a form"
+        )
     _check_options(method, coefficients, ridge, truncate)
     if split and (ridge is not None or truncate is not None):
         raise ValueError(
             "--split takes the planes as they are, and would undo --ridge and --truncate: use fewer planes "
             "(--planes, --best-planes) instead"
         )
-    check_targets(plot, output, save_influence)
-    targets = [path for path in (plot, output, save_influence) if path is not None]
+    check_targets(plot, output, save_influence, report=sheet)
+    targets = [path for path in (plot, output, save_influence, sheet) if path is not None]
     check_inputs(targets, [*files, *([influence] if influence is not None else [])])
     settings: Overrides = {
         "phase": phase,
@@ -245,6 +265,7 @@ def balance(
         keep=truncate,
         remove=sorted(job.remove),
     )
+    source = JobSource(tuple(files), influence, **settings, max_mass=max_mass, limits=tuple(limit or ()))
     report = Report(result, found.influence, subsets=subsets)
     if split:
         report.mounted = mount(
@@ -265,35 +286,40 @@ def balance(
     report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
     if trade_off:
         report.add_trade_off(job)
+    options = {
+        **settings,
+        "method": method,
+        "planes": planes,
+        "speeds": speed,
+        "influence": influence,
+        "coefficients": coefficients,
+        "model_error": model_error,
+        "max_mass": max_mass,
+        "limit": ", ".join(limit) if limit else None,
+        "ridge": ridge,
+        "truncate": truncate,
+        "split": split,
+        "refine": refine,
+        "grade": grade,
+        "rotor_mass": rotor_mass,
+        "service_speed": service_speed,
+        "positions": positions,
+        "bearings": bearings,
+        "centre": centre,
+    }
     emit(
         report.to_dict(),
         report.text,
         as_json=json,
         files=job.files,
-        options={
-            **settings,
-            "method": method,
-            "planes": planes,
-            "speeds": speed,
-            "influence": influence,
-            "coefficients": coefficients,
-            "model_error": model_error,
-            "max_mass": max_mass,
-            "limit": ", ".join(limit) if limit else None,
-            "ridge": ridge,
-            "truncate": truncate,
-            "split": split,
-            "refine": refine,
-            "grade": grade,
-            "rotor_mass": rotor_mass,
-            "service_speed": service_speed,
-            "positions": positions,
-            "bearings": bearings,
-            "centre": centre,
-        },
+        options=options,
         figure=(plot, report.figure),
-        table=(output, report.frame),
-        more=[(save_influence, lambda: influence_bytes(save_influence or Path(), found.influence))],
+        table=(None if as_workbook(output) else output, report.frame),
+        more=[
+            (save_influence, lambda: influence_bytes(save_influence or Path(), found.influence)),
+            workbook(job, source, output, report, options),
+        ],
+        report=(sheet, lambda document, record: report.sheet(document, job, record)),
     )
 
 
@@ -303,8 +329,11 @@ def _check_options(method: str, coefficients: str | None, ridge: str | None, tru
         ("--coefficients", coefficients, (*COEFFICIENTS, None)),
     ):
         if value not in known:
+            from fem.nearest import did_you_mean
+
+            names = [name for name in known if name is not None]
             raise ValueError(
-                f"{option} {value!r} is not known: one of {', '.join(k for k in known if k is not None)}"
+                f"{option} {value!r} is not known{did_you_mean(str(value), names)}: one of {', '.join(names)}"
             )
     if ridge is not None and truncate is not None:
         raise ValueError("--ridge and --truncate are two ways to the same end: choose one")

@@ -101,6 +101,20 @@ class Report:
             return self._with_tolerance(self.verdict)
         return plots.overview(self.result) if self.curve is None else plots_tradeoff.overview(self.curve)
 
+    def sheet(self, document: dict[str, Any], job: Job, provenance: dict[str, Any]) -> bytes:
+        """To print: one HTML file."""
+        from rotorid.report.balance import balance_report
+
+        return balance_report(
+            document,
+            self.result,
+            self.influence,
+            job,
+            provenance,
+            mounted=self.mounted,
+            verdict=self.verdict,
+        )
+
     def _with_tolerance(self, verdict: Verdict) -> Figure:
         """Corrections, and residual unbalance inside or outside its tolerance circles."""
         from matplotlib.figure import Figure

@@ -12,6 +12,7 @@ from rotorid.cli.common import (
     OperatingOption,
     OutputOption,
     PlotOption,
+    ReportOption,
     RotorArgument,
     band,
     check_targets,
@@ -40,6 +41,7 @@ def critical(
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Critical speeds with their whirl directions, and mode shapes.
 
@@ -51,7 +53,7 @@ def critical(
     from fem.plots import draw_speed_map
     from rotorid.tables import read_rotor, rotor_files
 
-    check_targets(plot, output)
+    check_targets(plot, output, report=report)
     service = band(operating)
     model = read_rotor(rotor)
     with busy("critical speeds"):
@@ -75,6 +77,11 @@ def critical(
             return modes.plot(ax)
         return draw_speed_map(chart.stiffness, chart.speeds, ax, supports=chart.own, operating=service)
 
+    def sheet(document: dict[str, Any], record: dict[str, Any]) -> bytes:
+        from rotorid.report.rotor import critical_report
+
+        return critical_report(document, modes, provenance=record, chart=chart, operating=service)
+
     emit(
         document,
         lambda: "\n\n".join(
@@ -89,6 +96,7 @@ def critical(
         options={"number": n, "mesh_check": mesh_check, "map": speed_map, "operating": operating},
         figure=(plot, picture(draw, 10.0, 6.0 if chart else 5.0)),
         table=(output, modes.to_frame if chart is None else chart.to_frame),
+        report=(report, sheet),
     )
 
 

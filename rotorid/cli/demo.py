@@ -1,94 +1,138 @@
-"""`rotorid demo`: the main job on sample data."""
+"""`rotorid demo`: the main job, or another, on sample data."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import contextlib
+import io
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption, figure_bytes, picture, provenance
+from rotorid.cli.common import JsonOption, provenance
+from rotorid.cli.demo_samples import SAMPLES, Sample
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-JOB = "turbo_job"
-ROTOR = "rotor23.csv"
-NODES, MODES = (7, 12, 18), 2
+COPIED = (".csv", ".toml", ".md")
 
 
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
     ),
+    sample: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(SAMPLES)}.")] = "main",
+    show: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Write the sample job to DIR, run the main job on it, and say where the pictures are.
+    """Write a sample to DIR, run its commands on it, and say where the pictures are.
 
     Example: rotorid demo demo
+
+    Example: rotorid demo demo --sample holes
     """
-    import fem
-    from balancing import correct, estimate_influence
-    from balancing.plots import overview
-    from rotorid.reduction import reduce
+    if show:
+        _list(as_json=json)
+        return
+    if sample not in SAMPLES:
+        from rotorid.tables.problems import did_you_mean
+
+        raise ValueError(
+            f"there is no sample {sample!r}{did_you_mean(sample, SAMPLES)}: one of {', '.join(SAMPLES)}"
+        )
+    chosen = SAMPLES[sample]
+    copies = _copy(folder, chosen)
+    pictures = [folder / name for name in chosen.pictures]
+    if json:
+        document = {
+            "folder": str(folder),
+            "sample": sample,
+            "pictures": [str(path) for path in pictures],
+            "commands": [shlex.join(command) for command in _commands(folder, chosen)],
+            **_documents(folder, chosen),
+            "provenance": provenance(copies, {"folder": folder, "sample": sample}),
+        }
+        _print_json(document)
+        return
+    for number, (step, command) in enumerate(
+        zip(chosen.steps, _commands(folder, chosen), strict=True), start=1
+    ):
+        typer.echo(f"{number}. {step.title}\n$ {shlex.join(command)}\n")
+        _run(command)
+        typer.echo("")
+    typer.echo("Pictures:\n" + "\n".join(f"  {path}" for path in pictures))
+
+
+def _list(*, as_json: bool) -> None:
+    """The samples, one line each."""
+    if as_json:
+        about = [{"name": name, "about": sample.about} for name, sample in SAMPLES.items()]
+        _print_json({"samples": about, "provenance": provenance([], {"list": True})})
+        return
+    width = max(map(len, SAMPLES))
+    for name, sample in SAMPLES.items():
+        typer.echo(f"{name:{width}}  {sample.about}")
+
+
+def _commands(folder: Path, sample: Sample) -> list[list[str]]:
+    """The commands as typed, `rotorid` first."""
+    return [
+        ["rotorid", *(part.replace("{}", str(folder), 1) for part in step.arguments)] for step in sample.steps
+    ]
+
+
+def _run(command: list[str]) -> None:
+    """One command, as if typed."""
+    from rotorid.cli import app
+
+    app(command[1:], prog_name=command[0], standalone_mode=False)
+
+
+def _documents(folder: Path, sample: Sample) -> dict[str, Any]:
+    """The results of all commands, without what the demo states itself."""
+    import json
+
+    found: dict[str, Any] = {}
+    for step, command in zip(sample.steps, _commands(folder, sample), strict=True):
+        with contextlib.redirect_stdout(io.StringIO()) as text:
+            _run([*command, "--json"])
+        found[step.key] = {k: v for k, v in json.loads(text.getvalue()).items() if k != "provenance"}
+    return found
+
+
+def _print_json(document: Mapping[str, Any]) -> None:
+    import json
+
+    typer.echo(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1))
+
+
+def _copy(folder: Path, sample: Sample) -> list[Path]:
+    """Write the files of a sample; refuse before anything is written."""
     from rotorid.samples import sample_data
-    from rotorid.tables import read_job, read_rotor
     from rotorid.tables.writing import write_files
 
     samples = sample_data()
-    job_files = [f for f in sorted((samples / JOB).iterdir()) if f.suffix in (".csv", ".toml", ".md")]
-    copies = {folder / f.relative_to(samples): f.read_bytes() for f in (samples / ROTOR, *job_files)}
-    _check_folder(folder, samples, copies)
-    (folder / JOB).mkdir(parents=True, exist_ok=True)
+    sources: list[Path] = []
+    for name in sample.sources:
+        place = samples / name
+        inside = [f for f in sorted(place.iterdir()) if f.suffix in COPIED] if place.is_dir() else [place]
+        sources += inside
+    copies = {folder / f.relative_to(samples): f.read_bytes() for f in sources}
+    _check_folder(folder, samples, copies, sample)
+    for path in copies:
+        path.parent.mkdir(parents=True, exist_ok=True)
     write_files({path: data for path, data in copies.items() if not path.exists()})
-
-    rotor = read_rotor(folder / ROTOR)
-    modes = fem.critical_speeds(rotor, 3)
-    small = reduce(rotor, NODES, MODES)
-    job = read_job(folder / JOB / "job.toml")
-    correction = correct(estimate_influence(job.trials))
-    pictures: dict[str, Callable[[], Figure]] = {
-        "modes.png": picture(modes.plot),
-        "reduction.png": picture(small.plot),
-        "balance.png": lambda: overview(correction),
-    }
-    write_files({folder / name: figure_bytes(build(), folder / name) for name, build in pictures.items()})
-
-    if json:
-        import json as json_module
-
-        document = {
-            "folder": str(folder),
-            "pictures": [str(folder / name) for name in pictures],
-            "critical": modes.to_dict(),
-            "reduce": small.to_dict(),
-            "balance": correction.to_dict(),
-            "provenance": provenance([folder / ROTOR, *job.files], {"folder": folder}),
-        }
-        typer.echo(json_module.dumps(document, ensure_ascii=False, allow_nan=False, indent=1))
-        return
-    blocks = [
-        f"1. Critical speeds: rotorid critical {folder / ROTOR}",
-        modes.summary(),
-        f"2. Balancing: rotorid balance {folder / JOB / 'job.toml'}",
-        correction.summary(),
-        f"3. Reduction: rotorid reduce {folder / ROTOR} --nodes {','.join(map(str, NODES))} --modes {MODES}",
-        small.summary(),
-        "Pictures:\n" + "\n".join(f"  {folder / name}" for name in pictures),
-    ]
-    typer.echo("\n\n".join(blocks))
+    return list(copies)
 
 
-def _check_folder(folder: Path, samples: Path, copies: Mapping[Path, bytes]) -> None:
+def _check_folder(folder: Path, samples: Path, copies: Mapping[Path, bytes], sample: Sample) -> None:
     """Refuse a folder whose files the demo would overwrite."""
     remedy = "choose another folder: rotorid demo DIR"
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: this is a file; {remedy}")
     inside = folder.resolve()
-    if (
-        samples.resolve() in (inside, *inside.parents)
-        or (folder / JOB).resolve() == (samples / JOB).resolve()
+    if samples.resolve() in (inside, *inside.parents) or any(
+        (folder / name).resolve() == (samples / name).resolve() for name in sample.sources
     ):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     changed = [str(p) for p, data in copies.items() if p.exists() and (p.is_dir() or p.read_bytes() != data)]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fem.nearest import did_you_mean
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note
@@ -91,6 +90,8 @@ def identify(
     check_targets(plot, output)
     for option, value, known in (("--method", method, METHODS), ("--loss", loss, LOSSES)):
         if value not in known:
+            from fem.nearest import did_you_mean
+
             raise ValueError(
                 f"{option} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
             )

@@ -159,6 +159,20 @@ class Report:
             part.plot(figure.add_subplot())
         return figure
 
+    def sheet(self, document: dict[str, Any], record: dict[str, Any]) -> bytes:
+        """HTML to print, from the document and the provenance."""
+        from rotorid.report.reduction import reduce_report
+
+        return reduce_report(
+            document,
+            self.result,
+            provenance=record,
+            placement=self.placement,
+            methods=self.methods,
+            response=self.response,
+            stability=self.stability,
+        )
+
     def model_bytes(self, name: str) -> bytes:
         """The small model as a file for `rotorid fit` and `identify`.
 

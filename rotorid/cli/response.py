@@ -15,6 +15,7 @@ from rotorid.cli.common import (
     OperatingOption,
     OutputOption,
     PlotOption,
+    ReportOption,
     RotorArgument,
     band,
     check_targets,
@@ -75,6 +76,7 @@ def response(
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
+    report: ReportOption = None,
 ) -> None:
     """Vibration under unbalance: readings, orbits, bearing forces, and the peaks after API 684.
 
@@ -85,7 +87,7 @@ def response(
     import fem
     from rotorid.tables import read_rotor, read_unbalance, rotor_files
 
-    check_targets(plot, output)
+    check_targets(plot, output, report=report)
     model = read_rotor(rotor)
     service = band(operating)
     places = _places(model, sensors)
@@ -115,6 +117,12 @@ def response(
     }
     if at is not None:
         _index(result, at)
+
+    def sheet(document: dict[str, Any], record: dict[str, Any]) -> bytes:
+        from rotorid.report.rotor import response_report
+
+        return response_report(document, finer, places, peaks, provenance=record, operating=service)
+
     emit(
         _document(result, finer, places, labels, peaks),
         lambda: _summary(result, finer, Z, labels, peaks),
@@ -123,6 +131,7 @@ def response(
         options={"speeds": speed, "sensors": sensors, "operating": operating},
         figure=(plot, drawn[view]),
         table=(output, lambda: _frame(result, places, labels)),
+        report=(report, sheet),
     )
 
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fem.nearest import did_you_mean
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names
 from rotorid.cli.tolerance import quantity, speed_with_unit
 
@@ -183,6 +182,8 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
     if missing:
         raise ValueError(f"without a job, give --{' and --'.join(missing)}")
     if asked["measures"] not in MEASURES:
+        from fem.nearest import did_you_mean
+
         hint = did_you_mean(asked["measures"], MEASURES)
         raise ValueError(f"--measures {asked['measures']!r} is not known{hint}: one of {', '.join(MEASURES)}")
     known = Conventions(as_phase(asked["phase"] or "lead"), as_angles(asked["angles"] or "with rotation"))

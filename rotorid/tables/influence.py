@@ -16,6 +16,7 @@ from fem.sensors import label
 from rotorid.tables import units
 from rotorid.tables.columns import Column, make_table, must_be, read_grid
 from rotorid.tables.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.grid import Grid
 from rotorid.tables.influence_comments import (
     PHASE_MEANING,
     check_notes,
@@ -127,11 +128,11 @@ def read_influence(
 
 
 def load_influence(
-    path: Path, phase: Phase | None, angles: Angles | None, problems: Problems
+    source: Path | Grid, phase: Phase | None, angles: Angles | None, problems: Problems
 ) -> Stored | None:
-    """As `read_influence`, or None and problems."""
+    """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
     before = len(problems)
-    grid = read_grid(path, "influence", problems)
+    grid = source if isinstance(source, Grid) else read_grid(source, "influence", problems)
     columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
     table = None if grid is None else make_table(grid, columns, problems)
     if table is None:

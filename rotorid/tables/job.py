@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rotorid.tables.grid import Grid
+from rotorid.tables.grid import Grid, Row
 from rotorid.tables.influence import fit_to_readings, load_influence
-from rotorid.tables.jobbook import read_job_book
+from rotorid.tables.jobbook import TABLES, read_job_book
 from rotorid.tables.jobcompletion import completed
-from rotorid.tables.jobdata import Job
+from rotorid.tables.jobdata import Job, Source, source_name
 from rotorid.tables.jobkeys import COLUMNS, read_plane, read_sensor
 from rotorid.tables.jobmodel import collect, read_model
 from rotorid.tables.jobsettings import (
     Overrides,
     Settings,
-    file_of,
     read_extra,
     read_settings,
     settle_conventions,
+    source_of,
 )
 from rotorid.tables.problems import InputError, Problems
-from rotorid.tables.sheet import is_workbook
+from rotorid.tables.sheet import is_workbook, read_workbook
 from rotorid.tables.tomlfile import Section, read_toml
 from rotorid.tables.trials import make_trials
 
@@ -62,31 +62,50 @@ def read_job(
     problems = Problems()
     overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
     if is_workbook(path):
-        book = read_job_book(path, COLUMNS, problems)
-        if book is None:
-            problems.stop()
-            raise AssertionError
-        top = Section(str(path), book.settings, problems, where=book.where)
-        runs: Path | Grid | None = book.runs
-        weights: Path | Grid | None = book.weights
-        if "runs" in top or "weights" in top:
-            for key in ("runs", "weights"):
-                if top.take(key) is not None:
-                    top.complain(key, f"the table in the sheet {key!r} of this workbook, not a file")
-    elif path.suffix.lower() == ".toml":
+        sheets = read_workbook(path, problems)
+        problems.stop()
+        return job_from_sheets(path, sheets or {}, overrides)
+    if path.suffix.lower() == ".toml":
         data = read_toml(path, problems)
         problems.stop()
         top = Section(str(path), data or {}, problems)
-        runs, weights = file_of(top, "runs", path), file_of(top, "weights", path)
         if "runs" not in top:
             top.missing("runs", 'the runs table, runs = "runs.csv"')
-    else:
-        expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
-        problems.add(str(path), None, None, None, expected)
+        return _read(path, top, {}, overrides, problems)
+    expected = "a job: a .toml file, or an .xlsx workbook with sheets runs and weights"
+    problems.add(str(path), None, None, None, expected)
+    problems.stop()
+    raise AssertionError
+
+
+def job_from_sheets(path: Path, sheets: Mapping[str, Sequence[Row]], overrides: Overrides) -> Job:
+    """The job in the sheets of a workbook; `path` is where it is, or will be.
+
+    Raises
+    ------
+    InputError
+        With all problems.
+    """
+    problems = Problems()
+    book = read_job_book(path, sheets, COLUMNS, problems)
+    if book is None:
         problems.stop()
         raise AssertionError
-    influence, extra = file_of(top, "influence", path), read_extra(top, path)
-    if weights is None and "weights" not in top and "influence" not in top and "rotor" not in top:
+    top = Section(str(path), book.settings, problems, where=book.where)
+    for key in TABLES:
+        if key in top and (key in book.tables or key in TABLES[:2]) and top.take(key) is not None:
+            top.complain(key, f"the table in the sheet {key!r} of this workbook, not a file")
+    return _read(path, top, book.tables, overrides, problems)
+
+
+def _read(
+    path: Path, top: Section, sheets: Mapping[str, Grid], overrides: Overrides, problems: Problems
+) -> Job:
+    """The job of these settings; its tables are files or sheets."""
+    runs, weights, influence = (source_of(top, key, path, sheets) for key in TABLES[:3])
+    extra = read_extra(top, path, sheets)
+    stated = [key for key in ("weights", "influence", "rotor") if key in top]
+    if weights is None and influence is None and not stated:
         top.missing("weights", "a weights table, or an influence table of stored coefficients, or a rotor")
     settings = read_settings(top, overrides, problems)
     unclear = len(problems) > 0
@@ -156,9 +175,9 @@ def job_from_files(
 
 def _read_tables(
     job: Path,
-    runs: Path | Grid,
-    weights: Path | Grid | None,
-    stored: Path | None,
+    runs: Source,
+    weights: Source | None,
+    stored: Source | None,
     settings: Settings,
     problems: Problems,
     *,
@@ -177,21 +196,21 @@ def _read_tables(
 
 def _assemble(
     job: Path | None,
-    runs: Path | Grid,
-    weights: Path | Grid | None,
-    stored: Path | None,
+    runs: Source,
+    weights: Source | None,
+    stored: Source | None,
     settings: Settings,
     problems: Problems,
 ) -> Job | None:
-    found = None
+    found, name = None, "" if stored is None else source_name(stored)
     if stored is not None:
         found = load_influence(stored, settings.phase, settings.angles, problems)
-    conventions, notes = settle_conventions(settings, stored, found)
+    conventions, notes = settle_conventions(settings, name, found)
     trials = make_trials(runs, weights, conventions, settings.errors, problems)
     influence = None
     if found is not None and trials is not None:
         tolerance = conventions.speed_tolerance_percent
-        influence = fit_to_readings(found.influence, trials, tolerance, str(stored), problems)
+        influence = fit_to_readings(found.influence, trials, tolerance, name, problems)
     if trials is None or len(problems):
         return None
     labels = conventions.on(trials.labels if influence is None else influence.labels)

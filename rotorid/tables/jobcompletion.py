@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -74,7 +75,7 @@ def completed(
         check = replace(check, warnings=tuple(w for w in check.warnings if w not in trials.warnings))
     slow_file = None if extra.slow_roll is None else extra.slow_roll.path
     named = (extra.check, extra.check_weights, slow_file)
-    more = (*model.files, *(file for file in named if file is not None))
+    more = (*model.files, *(file for file in named if isinstance(file, Path)))
     return replace(
         job,
         trials=trials,

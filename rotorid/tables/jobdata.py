@@ -15,10 +15,19 @@ from balancing.influence import Influence
 from balancing.limits import Limits
 from balancing.trials import Trials
 from rotorid.tables.conventions import Conventions
+from rotorid.tables.grid import Grid
 
 if TYPE_CHECKING:
     from fem.rotor import Rotor
     from fem.sensors import Sensor
+
+Source = Path | Grid
+"""A table of a job: a file, or the cells of a sheet."""
+
+
+def source_name(source: Source) -> str:
+    """How messages name a table."""
+    return source.source if isinstance(source, Grid) else str(source)
 
 
 @dataclass(frozen=True, eq=False)

@@ -178,6 +178,39 @@ def with_limits(job: Job, max_mass: str | None, limits: Sequence[str]) -> Job:
     return replace(job, limits=Limits(weight, residual, old.forbidden), holes=holes)
 
 
+Keys = dict[str, tuple[str, float]]
+
+
+def limit_keys(job: Job, max_mass: str | None, limits: Sequence[str]) -> tuple[Keys, Keys]:
+    """The limits of the command line as a job file would write them, key and number by plane and by sensor.
+
+    Parameters
+    ----------
+    job, max_mass, limits
+        As `with_limits` takes them; it has accepted them already.
+
+    Returns
+    -------
+    planes, sensors
+        Numbers of sensors in the unit of the readings.
+    """
+    own = job.trials.labels
+    planes: Keys = {}
+    for name, text in _assignments(max_mass, _OPTION_MASS, "plane", job.planes):
+        value, word = _split(text, _OPTION_MASS, "5g")
+        unit = units.weight(word or own.weight_unit)
+        kind = "max_mass" if unit.kind == "mass" else "max_unbalance"
+        planes |= dict.fromkeys(job.used if name is None else (name,), (f"{kind}_{unit.name}", value))
+    sensors: Keys = {}
+    for option in limits:
+        for name, text in _assignments(option, _OPTION_LIMIT, "sensor", job.trials.sensors, several=False):
+            value, word = _split(text, _OPTION_LIMIT, "20")
+            if word and units.spelt(word) != own.vibration_unit:
+                value = units.vibration(word).to_si(value) * own.vibration_scale
+            sensors |= dict.fromkeys(job.trials.sensors if name is None else (name,), ("limit", value))
+    return planes, sensors
+
+
 def _assignments(
     option: str | None, what: str, kind: str, names: Sequence[str], *, several: bool = True
 ) -> list[tuple[str | None, str]]:

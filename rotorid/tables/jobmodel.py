@@ -13,6 +13,7 @@ from balancing.trials import Trials
 from fem.sensors import Sensor
 from rotorid.tables import units
 from rotorid.tables.conventions import Conventions, StatedErrors
+from rotorid.tables.jobdata import Source, source_name
 from rotorid.tables.jobkeys import PlaneKeys, SensorKeys
 from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
 from rotorid.tables.speeds import same_speed, show_speed
@@ -123,8 +124,8 @@ def weight_unit_without_weights(trials: Trials, planes: Sequence[str], radii: Ma
 
 
 def read_check(
-    runs: Path,
-    weights: Path | None,
+    runs: Source,
+    weights: Source | None,
     conventions: Conventions,
     errors: StatedErrors | None,
     trials: Trials,
@@ -154,10 +155,11 @@ def read_check(
     assert check is not None
     before = len(problems)
     _complain_about_units(check, trials, runs, weights, problems)
-    source = str(runs)
+    source = source_name(runs)
+    mounted_source = source if weights is None else source_name(weights)
     for names, known, what, table in (
         (check.sensors, trials.sensors, "sensor", source),
-        (check.planes, planes, "plane", str(weights)),
+        (check.planes, planes, "plane", mounted_source),
     ):
         for name in names:
             if name not in known:
@@ -189,7 +191,7 @@ def read_check(
 
 
 def _complain_about_units(
-    check: Trials, trials: Trials, runs: Path, weights: Path | None, problems: Problems
+    check: Trials, trials: Trials, runs: Source, weights: Source | None, problems: Problems
 ) -> None:
     """What does not convert into the units of the job."""
     ours, theirs = trials.labels, check.labels
@@ -197,7 +199,7 @@ def _complain_about_units(
         expected = (
             f"readings in {ours.vibration_unit or 'no unit'}, as in the runs table, or converting to it"
         )
-        problems.add(str(runs), None, "amplitude", theirs.vibration_unit or "no unit", expected)
+        problems.add(source_name(runs), None, "amplitude", theirs.vibration_unit or "no unit", expected)
     if weights is not None and (units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind):
         expected = f"weights in {ours.weight_unit}, as the job has, or in a unit that converts to it"
-        problems.add(str(weights), None, "weight", theirs.weight_unit, expected)
+        problems.add(source_name(weights), None, "weight", theirs.weight_unit, expected)

@@ -21,7 +21,9 @@ from rotorid.tables.conventions import (
     read_turning,
     resolve_angles,
 )
+from rotorid.tables.grid import Grid
 from rotorid.tables.influence import Stored
+from rotorid.tables.jobdata import Source
 from rotorid.tables.jobkeys import by_speed
 from rotorid.tables.problems import Problems
 from rotorid.tables.slowroll import SlowRollKeys, take_slow_roll
@@ -89,7 +91,7 @@ class Extra:
     Attributes
     ----------
     rotor, check, check_weights
-        Files.
+        Files; the tables may be sheets.
     speed_weights
         Weight in the fit by speed.
     slow_roll
@@ -99,25 +101,34 @@ class Extra:
     """
 
     rotor: Path | None
-    check: Path | None
-    check_weights: Path | None
+    check: Source | None
+    check_weights: Source | None
     speed_weights: Mapping[str, float]
     slow_roll: SlowRollKeys | None = None
     key_phasor: float = 0.0
 
 
-def read_extra(top: Section, job: Path) -> Extra:
-    """Take the files besides the tables, and the weights of the speeds."""
-    rotor, check, weights = (file_of(top, key, job) for key in ("rotor", "check", "check_weights"))
-    if "check_weights" in top and "check" not in top:
-        top.complain("check_weights", 'the check runs too, check = "check.csv"')
-    slow_roll, key_phasor = take_slow_roll(top, job), read_key_phasor(top)
+def read_extra(top: Section, job: Path, sheets: Mapping[str, Grid]) -> Extra:
+    """Take the files (or sheets) besides the tables, and the weights of the speeds."""
+    rotor = file_of(top, "rotor", job)
+    check, weights = (source_of(top, key, job, sheets) for key in ("check", "check_weights"))
+    if ("check_weights" in top or weights is not None) and not ("check" in top or check is not None):
+        top.complain("check_weights", 'the check runs too, check = "check.csv" (in a workbook a sheet check)')
+    slow_roll, key_phasor = take_slow_roll(top, job, sheets.get("slow_roll")), read_key_phasor(top)
     by: Mapping[str, float] = {}
     if "speed_weights" in top and not isinstance(top.take("speed_weights"), (dict, str)):
         top.complain("speed_weights", 'a table of weights by speed, such as { "3000" = 2, "4500" = 0.5 }')
     else:
         by = by_speed(top, "speed_weights", "a weight of 0 or more", above_zero=False)
     return Extra(rotor, check, weights, by, slow_roll, key_phasor)
+
+
+def source_of(top: Section, key: str, job: Path, sheets: Mapping[str, Grid]) -> Source | None:
+    """The sheet of this name, else the file that a key names; None without both, or with a problem."""
+    if key in sheets or (sheets and key in ("runs", "weights")):  # these are no files beside a workbook
+        top.take(key)
+        return sheets.get(key)
+    return file_of(top, key, job)
 
 
 def file_of(top: Section, key: str, job: Path) -> Path | None:
@@ -170,7 +181,7 @@ def _errors(top: Section, problems: Problems) -> StatedErrors | None:
 
 
 def settle_conventions(
-    settings: Settings, stored: Path | None, found: Stored | None
+    settings: Settings, stored: str, found: Stored | None
 ) -> tuple[Conventions, tuple[str, ...]]:
     """Conventions of the readings and weights: stated ones, else those of stored coefficients; and notes."""
     said = {} if found is None else found.said

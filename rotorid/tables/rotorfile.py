@@ -55,7 +55,17 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
 
 
 def rotor_files(path: str | Path) -> tuple[Path, ...]:
-    """The files that `read_rotor` reads, for provenance: a rotor file has tables too."""
+    """The files that `read_rotor` reads, for provenance: a rotor file has tables too.
+
+    Parameters
+    ----------
+    path
+        A rotor table or a rotor file.
+
+    Returns
+    -------
+    The file itself first, then the tables that it names.
+    """
     path = Path(path)
     if path.suffix.lower() != ".toml":
         return (path,)

@@ -73,6 +73,8 @@ def _cell(cell: Any, written: Any) -> Cell:  # noqa: ANN401
     if isinstance(value, (datetime.date, datetime.time, datetime.timedelta)):
         return BadCell(str(value), "a number or text; the spreadsheet turned the cell into a date or time")
     if isinstance(value, (int, float)):
+        if "%" in str(cell.number_format):
+            return BadCell(f"{100 * value:g}%", "a plain number; the cell is formatted as a percentage")
         return value
     return clean(str(value))
 

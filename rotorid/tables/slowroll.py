@@ -25,6 +25,7 @@ from balancing.labels import Labels
 from balancing.trials import ReadingErrors, Trials
 from rotorid.tables import units
 from rotorid.tables.conventions import Conventions, polar
+from rotorid.tables.grid import Grid
 from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
 from rotorid.tables.runs import Runs, read_runs
 from rotorid.tables.speeds import same_speed, show_speed
@@ -55,10 +56,10 @@ class VectorKeys:
 
 @dataclass(frozen=True)
 class SlowRollKeys:
-    """What a job says about slow roll: a file, or vectors by sensor."""
+    """What a job says about slow roll: a file or the cells of a sheet, or vectors by sensor."""
 
     top: Section
-    path: Path | None
+    path: Path | Grid | None
     vectors: Mapping[str, VectorKeys]
 
 
@@ -93,7 +94,7 @@ class SlowRoll:
         return np.asarray(self.vectors[np.ix_(rows, columns)])
 
 
-def take_slow_roll(top: Section, job: Path) -> SlowRollKeys | None:
+def take_slow_roll(top: Section, job: Path, sheet: Grid | None = None) -> SlowRollKeys | None:
     """Take the key `slow_roll` of a job; None without it, or with a problem.
 
     Parameters
@@ -102,10 +103,12 @@ def take_slow_roll(top: Section, job: Path) -> SlowRollKeys | None:
         The settings of the job; problems are noted with it.
     job
         Its file: a file that it names is found relative to it.
+    sheet
+        Cells of the sheet `slow_roll` of a workbook.
     """
     value = top.take("slow_roll")
     if value is None:
-        return None
+        return None if sheet is None else SlowRollKeys(top, sheet, {})
     if isinstance(value, str) and not value.isprintable():
         expected = "a file's name without control characters: write / for \\, or put it in single quotes"
         top.complain("slow_roll", expected)
@@ -209,7 +212,9 @@ def _from_vectors(keys: SlowRollKeys, trials: Trials, conventions: Conventions) 
     return _Found(vectors, None, tuple(keys.vectors))
 
 
-def _from_file(path: Path, trials: Trials, conventions: Conventions, problems: Problems) -> _Found | None:
+def _from_file(
+    path: Path | Grid, trials: Trials, conventions: Conventions, problems: Problems
+) -> _Found | None:
     """Vectors of a runs table."""
     own = Problems()  # what is wrong with the job must not hide what is wrong with this file, nor the reverse
     runs = read_runs(path, conventions, own)

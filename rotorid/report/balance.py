@@ -1,0 +1,201 @@
+"""The balancing sheet: one page that a balancing engineer can work from without the program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.report import conventions
+from rotorid.report.balance_data import sheet_data
+from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
+from rotorid.report.page import inline_svg, render_report
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+    from balancing import Correction, Influence
+    from balancing.mounted import Mounted
+    from balancing.verdict import Verdict
+    from rotorid.tables import Job
+
+RUNS_ABREAST = 4
+PLANES_ABREAST = 3
+
+_METHODS = {
+    "least-squares": "Least squares: the sum of squared amplitudes is the smallest possible.",
+    "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
+    "minmax": "Min–max: the largest amplitude is the smallest possible.",
+    "ridge": "Ridge: small weights where planes act alike.",
+    "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
+}
+_SOURCES = {
+    "stated": "as stated in the job",
+    "repeats": "from repeated readings",
+    "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
+    "residuals": "from the disagreement of the runs",
+    "unknown": "not known",
+}
+
+
+def balance_report(
+    document: Mapping[str, Any],
+    result: Correction,
+    influence: Influence,
+    job: Job,
+    provenance: Mapping[str, Any],
+    *,
+    mounted: Mounted | None = None,
+    verdict: Verdict | None = None,
+    title: str | None = None,
+) -> bytes:
+    """Make the sheet of a balancing job: one HTML file that needs nothing else.
+
+    Parameters
+    ----------
+    document
+        What `rotorid balance --json` prints, without its provenance: warnings, check and verdict are taken
+        from it. The sheet holds it as JSON, with what only the sheet shows under the key "sheet".
+    result, influence, job
+        The correction, its coefficients, and the job of both.
+    provenance
+        Program version, input files with hashes, date and options.
+    mounted
+        Pieces in the holes of the planes, where they were chosen.
+    verdict
+        Its tolerances of planes are drawn.
+    title
+        Name of the machine or job; by default that of the job's file and folder.
+
+    Raises
+    ------
+    ValueError
+        If the document holds a number that is not finite.
+    """
+    labels = result.labels
+    sheet = sheet_data(result, influence, job, mounted)
+    whole = {**document, "sheet": sheet}
+    places = {s: job.sensor_places[s].angle for s in result.sensors if s in job.sensor_places}
+    key_phasor = job.key_phasor if places or job.key_phasor else None
+    runs = sheet["runs"]
+    name = title or _name(job)
+    text = {
+        "vibration": conventions.vibration_words(labels.vibration_unit),
+        "weight": conventions.weight_words(labels.weight_unit),
+        "seen": conventions.seen_from(labels),
+        "method": _METHODS.get(result.method, result.method),
+        "errors": _SOURCES.get(result.error_source, result.error_source),
+        "coefficients": _coefficients(influence, job, provenance),
+        "turn": _turn(result),
+    }
+    return render_report(
+        "balance.html",
+        whole,
+        title=f"Balancing sheet: {name}",
+        warnings=_warnings(document),
+        provenance=provenance,
+        job_files=[path.name for path in job.files],
+        text=text,
+        conventions=conventions.words(labels, places, key_phasor),
+        rotor_figure=inline_svg(
+            conventions.rotor_figure(labels, places, key_phasor),
+            "The rotor from its end: rotation, mark, a weight at 60°, sensor and key phasor",
+        ),
+        phase_figure=inline_svg(
+            conventions.phase_figure(labels), f"A reading over time with a phase of 60° ({labels.phase})"
+        ),
+        discs=_discs(result, job, mounted, verdict, text["seen"]),
+        residual_figure=inline_svg(
+            residual_figure(sheet["residuals"], text["vibration"]), "Vibration before and predicted after"
+        ),
+        rows_shown=ROWS_SHOWN,
+        run_groups=_groups(len(runs), RUNS_ABREAST),
+        plane_groups=_groups(len(influence.planes), PLANES_ABREAST),
+        influence_planes=influence.planes,
+        several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
+        unsplit=[p for p in result.planes if p in job.holes] if mounted is None else [],
+    )
+
+
+def _name(job: Job) -> str:
+    """The folder and the file of a job, "turbo_job, holes"; of a job called job the folder alone."""
+    first = Path(job.files[0]).resolve()
+    folder, own = first.parent.name, first.stem
+    if folder in ("", own):
+        return own
+    return folder if own.casefold() in ("job", "runs") else f"{folder}, {own}"
+
+
+def _warnings(document: Mapping[str, Any]) -> list[str]:
+    """All sentences of all parts, each once, and a verdict that is not a pass."""
+    found: list[str] = []
+    verdict = document.get("verdict")
+    if verdict is not None and verdict["verdict"] == "fail":
+        found.append(f"the limits are not kept: the verdict ({verdict['source']}) is fail")
+    for part in (document, document.get("check"), verdict):
+        found += [] if part is None else part["warnings"]
+    check = document.get("check")
+    if check is not None and check["explained"] is False:
+        found.append(f"check run: {check['verdict']}")
+    return [sentence(words) for words in dict.fromkeys(found)]
+
+
+def sentence(words: str) -> str:
+    """Write a clause as a sentence.
+
+    Examples
+    --------
+    >>> sentence("the runs agree")
+    'The runs agree.'
+    """
+    return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') else '.'}"
+
+
+def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any]) -> str:
+    """Where the coefficients come from, in words."""
+    kind = provenance["options"].get("coefficients")
+    if kind == "combined":
+        return "from the runs and the rotor model together"
+    if influence.last_run is not None:
+        return "from the runs above"
+    return "stored ones" if job.influence is not None and kind != "computed" else "from the rotor model"
+
+
+def _turn(result: Correction) -> str:
+    """What the angle of a weight does to the phase of its vibration."""
+    labels = result.labels
+    same = labels.phase_sign == labels.angle_sign
+    return "is added to" if same else "is taken from"
+
+
+def _discs(
+    result: Correction, job: Job, mounted: Mounted | None, verdict: Verdict | None, seen: str
+) -> list[tuple[str, Markup]]:
+    """Each plane with its picture."""
+    rows = () if verdict is None else verdict.rows
+    tolerances = {row.name: row.limit for row in rows if row.kind == "plane"}
+    return [
+        (
+            plane,
+            inline_svg(
+                plane_figure(
+                    result,
+                    plane,
+                    holes=job.holes.get(plane),
+                    mounted=mounted,
+                    tolerance=tolerances.get(plane),
+                ),
+                f"Plane {plane}, {seen}: what to {'take away' if plane in result.remove else 'add'}",
+            ),
+        )
+        for plane in result.planes
+    ]
+
+
+def _groups(count: int, size: int) -> list[list[int]]:
+    """Indices in groups that fit side by side, as even as possible."""
+    if count == 0:
+        return []
+    parts = -(-count // size)
+    each = -(-count // parts)
+    return [list(range(first, min(first + each, count))) for first in range(0, count, each)]

@@ -1,0 +1,151 @@
+"""Figures of the balancing sheet: each plane from its end, and vibration before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.report.conventions import plain, weight_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing import Correction
+    from balancing.holes import Holes
+    from balancing.mounted import Mounted
+
+ROWS_SHOWN = 60
+"""Readings in one figure; beyond that the largest ones are shown."""
+_WIDTH, _REACH = 4.6, 2.25
+"""Of the picture of a plane: inches, and half of its width in radii of the disc (room for texts)."""
+
+
+def plane_figure(
+    result: Correction,
+    plane: str,
+    *,
+    holes: Holes | None = None,
+    mounted: Mounted | None = None,
+    tolerance: float | None = None,
+) -> Figure:
+    """Draw one plane with what goes into it; material to remove is drawn as a crossed circle.
+
+    Parameters
+    ----------
+    result
+        The correction.
+    plane
+        One of its planes.
+    holes
+        Of the plane, where nothing was chosen for them.
+    mounted
+        Pieces in the holes of all planes, or None: the weight is drawn where it stands.
+    tolerance
+        Permissible residual, kg or kg·m.
+    """
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    from balancing.plots_discs import disc
+
+    p = result.planes.index(plane)
+    labels = replace(result.labels, weight_unit=weight_words(result.labels.weight_unit))
+    wanted, mounting = complex(result.weights[p]), None
+    if mounted is not None:
+        holes, mounting = mounted.holes[p], mounted.found.mountings[p]
+        if mounted.on_top_of is not None and result.to_add is not None and result.mounted is not None:
+            wanted = complex(result.to_add[result.mounted[1].index(plane)])
+    loose = (wanted,) if mounting is None and wanted != 0 else ()
+    if mounted is not None and mounting is None and mounted.weights[p] != 0:
+        loose = (complex(mounted.weights[p]),)
+    with mpl.rc_context({"font.size": 11.0}):
+        lines = 1 + 2 * (mounted is not None) + (tolerance is not None)
+        axes = _WIDTH * 3.2 / (2 * _REACH)
+        height = axes + 0.3 + 0.2 * lines  # a title above the axes, lines of text below
+        figure = Figure(figsize=(_WIDTH, height))
+        ax = figure.add_axes((0.0, 1 - (axes + 0.3) / height, 1.0, axes / height))
+        disc(
+            ax,
+            plain(plane),
+            holes,
+            mounting,
+            labels,
+            remove=plane in result.remove,
+            weight=wanted,
+            tolerance=tolerance,
+            loose=loose,
+            clockwise=labels.drawn_sign < 0,
+        )
+        ax.set_xlim(-_REACH, _REACH)
+    return figure
+
+
+def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
+    """Draw readings before (bars) and after (dots with 95 %), and limits (thick lines), one below the other.
+
+    Parameters
+    ----------
+    rows
+        `residuals` of `rotorid.report.balance_data.sheet_data`; of more than `ROWS_SHOWN` the largest.
+    unit
+        Of the amplitudes, in words.
+    """
+    from matplotlib.figure import Figure
+
+    if len(rows) > ROWS_SHOWN:
+        largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
+        rows = [rows[i] for i in sorted(largest[:ROWS_SHOWN])]
+    figure = Figure(figsize=(5.8, 1.2 + 0.185 * len(rows)), layout="constrained")
+    ax = figure.add_subplot()
+    speeds = [row["speed_rpm"] for row in rows]
+    step = [0.0] + [0.5 * (b != a) for a, b in pairwise(speeds)]
+    y = np.arange(len(rows)) + np.cumsum(step)
+    old, new = (np.array([row[key] for row in rows]) for key in ("before", "after"))
+    ax.barh(y, old, 0.75, color="0.87", edgecolor="0.45", lw=0.6, label="before")
+    error = None
+    label = "predicted"
+    if all(row["within_95"] is not None for row in rows):
+        reach = np.array([row["within_95"] for row in rows])
+        error = [np.minimum(reach, new), reach]
+        label += " with 95 % of a check run"
+    ax.errorbar(new, y, xerr=error, fmt="o", color="black", ms=4, lw=1.1, capsize=2, label=label)
+    limited = [(at, row["limit"]) for at, row in zip(y, rows, strict=True) if row["limit"] is not None]
+    if limited:
+        at, limits = np.array(limited).T
+        ax.vlines(limits, at - 0.45, at + 0.45, color="black", lw=2.6, label="limit")
+    top = float(max(old.max(), new.max()))
+    if top > 0 and min(new.min(), old[old > 0].min(initial=top)) < top / 20:
+        linear = 10.0 ** np.floor(np.log10(max(float(new.min()), top / 300)))
+        ax.set_xscale("symlog", linthresh=linear)
+        ax.xaxis.set_major_formatter("{x:g}")
+    ax.set_yticks(y, [_short(row["sensor"]) for row in rows], fontsize="small")
+    for speed in dict.fromkeys(speeds):
+        first = y[speeds.index(speed)]
+        ax.text(
+            1.01, first, f"{speed:.6g} rpm", transform=ax.get_yaxis_transform(), fontsize="small", va="center"
+        )
+    ax.set_xlim(left=0)
+    ax.set_ylim(y[-1] + 0.7, -0.7)
+    ax.set_xlabel(f"amplitude, {plain(unit)}" if unit else "amplitude")
+    ax.tick_params(axis="y", length=0)
+    ax.spines[["top", "right"]].set_visible(False)
+    shown = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    order = [name for name in ("before", label, "limit") if name in shown]
+    figure.legend(
+        [shown[name] for name in order],
+        order,
+        loc="outside upper left",
+        ncols=3,
+        fontsize="small",
+        frameon=False,
+    )
+    return figure
+
+
+def _short(name: str) -> str:
+    """Beginning and end of a long name: sensors often differ in their last letters."""
+    return plain(name if len(name) <= 24 else f"{name[:14]}…{name[-9:]}")

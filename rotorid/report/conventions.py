@@ -1,0 +1,331 @@
+"""What the numbers of a job mean: words, and two small figures, for a reader who has only the sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.tables import units
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from balancing.labels import Labels
+
+_SAMPLE = 60.0
+"""Angle, degrees, of the weight and of the phase that the figures show."""
+_SIDE, _TALL, _FLAT, _INNER, _OUTER, _KEY = 2.45, 2.1, 1.6, 1.3, 1.52, 1.13
+_BASES = {
+    "um": "µm",
+    "m_s": "m/s",
+    "mm_s": "mm/s",
+    "in_s": "in/s",
+    "m_s2": "m/s²",
+    "mm_s2": "mm/s²",
+}
+
+
+def vibration_words(unit: str) -> str:
+    """Write the unit of a reading for people; one that the program only prints stays as it is.
+
+    Examples
+    --------
+    >>> vibration_words("um_pp"), vibration_words("mm_s_rms"), vibration_words("mm"), vibration_words("V")
+    ('µm pp', 'mm/s rms', 'mm peak', 'V')
+    """
+    if unit not in units.VIBRATION:
+        return unit
+    for suffix, word in (("_pp", "pp"), ("_rms", "rms")):
+        if unit.endswith(suffix):
+            base = unit.removesuffix(suffix)
+            return f"{_BASES.get(base, base)} {word}"
+    return f"{_BASES.get(unit, unit)} peak"
+
+
+def weight_words(unit: str) -> str:
+    """Write the unit of a weight for people.
+
+    Examples
+    --------
+    >>> weight_words("g_mm"), weight_words("g")
+    ('g·mm', 'g')
+    """
+    return unit.replace("_", "·")
+
+
+def plain(name: str) -> str:
+    r"""Keep a name in a figure from being read as a formula.
+
+    Examples
+    --------
+    >>> plain("A$1$")
+    'A\\$1\\$'
+    """
+    return name.replace("$", r"\$")
+
+
+def seen_from(labels: Labels) -> str:
+    """Say from which end discs are drawn and how the rotor turns there."""
+    if labels.view is not None:
+        return f"seen from the {labels.view}, where the rotor turns {labels.rotation}"
+    way = "counter-clockwise" if labels.drawn_sign > 0 else "clockwise"
+    return f"seen from the end from which the rotor turns {way}"
+
+
+def words(
+    labels: Labels, places: Mapping[str, float] | None = None, key_phasor: float | None = None
+) -> list[tuple[str, str]]:
+    """Say every convention of a job, as pairs of what it is about and what holds.
+
+    Parameters
+    ----------
+    labels
+        Units and conventions.
+    places
+        Direction of each sensor that has one, degrees with the rotation from x.
+    key_phasor
+        Direction of the key phasor, degrees with the rotation from x; None where nobody states it.
+    """
+    found = [("Rotation", _rotation(labels)), ("Angles of weights", _angles(labels))]
+    found.append(("Phase", _phase(labels)))
+    if key_phasor is not None:
+        at = _stated(labels, key_phasor)
+        found.append(
+            ("Key phasor", f"at {at} from x. It gives a pulse when the mark on the rotor passes it.")
+        )
+    else:
+        found.append(
+            (
+                "Key phasor",
+                "gives a pulse when the mark on the rotor passes it. Its place is not stated, and does not "
+                "matter as long as it stays where it was during the runs.",
+            )
+        )
+    if places:
+        at = "; ".join(f"{name} at {_stated(labels, angle)}" for name, angle in places.items())
+        found.append(("Sensors", f"{at}; from x, in the direction in which weights are counted."))
+    else:
+        found.append(
+            (
+                "Sensors",
+                "their directions are not stated, and do not matter as long as the sensors stay where they "
+                "were during the runs.",
+            )
+        )
+    found.append(("Vibration", _amplitude(labels)))
+    found.append(("Weights", _weight(labels)))
+    return found
+
+
+def _rotation(labels: Labels) -> str:
+    if labels.rotation is None:
+        return (
+            "the job does not say which way the rotor turns. With the rotation means: the way in which the "
+            "surface of the rotor moves. Look at the machine before you count angles."
+        )
+    end = "" if labels.view is None else f" seen from the {labels.view}"
+    more = "" if labels.view is not None else "; from which end that is seen is not stated"
+    return f"{labels.rotation}{end}{more}."
+
+
+def _angles(labels: Labels) -> str:
+    if labels.clock:
+        side = "with" if labels.angle_sign > 0 else "against"
+        end = "" if labels.view is None else f" seen from the {labels.view}"
+        return f"degrees from the mark, {labels.angle_words}{end}, which is {side} the rotation."
+    if labels.angle_sign > 0:
+        return (
+            "degrees from the mark, with the rotation: go from the mark the way in which the surface moves."
+        )
+    return (
+        "degrees from the mark, against the rotation: go from the mark against the way in which the surface "
+        "moves. A fixed pointer sees the numbers rise while the rotor turns."
+    )
+
+
+def _phase(labels: Labels) -> str:
+    if labels.phase == "lag":
+        return (
+            "lag: the angle by which the rotor turns from the pulse to the next positive peak of the sensor."
+        )
+    return "lead: the angle by which the rotor turns from a positive peak of the sensor to the next pulse."
+
+
+def _amplitude(labels: Labels) -> str:
+    unit = labels.vibration_unit
+    if unit not in units.VIBRATION:
+        return f"in {unit}, as the runs give it." if unit else "in the unit of the runs, which is not stated."
+    kind = (
+        "from peak to peak" if unit.endswith("_pp") else "rms" if unit.endswith("_rms") else "peak amplitude"
+    )
+    return f"in {vibration_words(unit)} ({kind}), the part that turns with the rotor (1×)."
+
+
+def _weight(labels: Labels) -> str:
+    shown = weight_words(labels.weight_unit)
+    if "·" in shown:
+        return f"in {shown}: mass times radius. Divide by the radius to get the mass."
+    return f"in {shown}, at the radius of the plane."
+
+
+def _stated(labels: Labels, angle: float) -> str:
+    """An angle with the rotation as the job counts it."""
+    return f"{np.mod(labels.angle_sign * angle, 360.0):g}°"
+
+
+def rotor_figure(
+    labels: Labels, places: Mapping[str, float] | None = None, key_phasor: float | None = None
+) -> Figure:
+    """Draw the rotor from its end at the moment of the pulse: rotation, mark, angles, sensors, key phasor.
+
+    Parameters
+    ----------
+    labels, places, key_phasor
+        As of `words`. Sensors without a direction are drawn once, dashed, anywhere.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Circle
+
+    steep = [abs(np.sin(np.radians(angle))) > 0.6 for angle in (places or {}).values()]
+    tall = _TALL if any(steep) else _FLAT
+    figure = Figure(figsize=(4.4, 4.4 * tall / _SIDE))
+    ax = figure.add_axes((0, 0, 1, 1))
+    ax.set_aspect("equal")
+    ax.set(xlim=(-_SIDE, _SIDE), ylim=(-tall, tall))
+    ax.axis("off")
+    drawn = labels.drawn_sign
+    mark = drawn * np.radians(key_phasor or 0.0)
+    count = drawn * labels.angle_sign
+    ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
+    _turning(ax, 0.27, np.radians(100), drawn * np.radians(250))
+    ax.text(0, 0, "rotation", ha="center", va="center", fontsize=7)
+    for degrees in (0, 90, 180, 270):
+        way = np.exp(1j * (mark + count * np.radians(degrees)))
+        ax.plot([0.94 * way.real, way.real], [0.94 * way.imag, way.imag], color="black", lw=1)
+        if degrees:
+            ax.text(1.17 * way.real, 1.14 * way.imag, f"{degrees}°", ha="center", va="center", fontsize=8)
+    tip = np.exp(1j * mark)
+    ax.plot(
+        0.93 * tip.real, 0.93 * tip.imag, marker=(3, 0, 90 + np.degrees(mark)), color="black", ms=11, zorder=5
+    )
+    ax.text(0.66 * tip.real, 0.66 * tip.imag, "mark\n0°", ha="center", va="center", fontsize=8)
+    _weight_at(ax, mark, count)
+    _sensors(ax, labels, places, key_phasor)
+    return figure
+
+
+def _weight_at(ax: Axes, mark: float, count: int) -> None:
+    """A weight, and the arrow along which its angle is counted."""
+    from matplotlib.patches import Circle
+
+    way = np.exp(1j * (mark + count * np.radians(_SAMPLE)))
+    ax.plot([0, 0.78 * way.real], [0, 0.78 * way.imag], color="black", lw=0.8, ls=":")
+    ax.add_patch(Circle((0.84 * way.real, 0.84 * way.imag), 0.075, fc="black", zorder=5))
+    _turning(ax, 0.48, mark + count * 0.42, count * (np.radians(_SAMPLE) - 0.42))
+    text = np.exp(1j * (mark + count * np.radians(_SAMPLE + 34))) * 0.7
+    ax.text(text.real, text.imag, f"weight\nat {_SAMPLE:g}°", ha="center", va="center", fontsize=8)
+
+
+def _sensors(ax: Axes, labels: Labels, places: Mapping[str, float] | None, key_phasor: float | None) -> None:
+    drawn = labels.drawn_sign
+    key = np.exp(1j * drawn * np.radians(key_phasor or 0.0))
+    ax.plot(
+        _KEY * key.real,
+        _KEY * key.imag,
+        marker=(3, 0, 90 + np.degrees(np.angle(key))),
+        color="black",
+        mfc="white",
+        ms=11,
+    )
+    beside = abs(key.real) > 0.5
+    ax.text(
+        (1.18 if beside else 1.0) * key.real,
+        1.15 * key.imag - 0.2 - 0.1 * max(0.0, -float(key.imag)),
+        "key phasor",
+        ha="center" if not beside else "left" if key.real > 0 else "right",
+        va="top",
+        fontsize=8,
+    )
+    by_angle: dict[float, list[str]] = {}
+    for name, angle in (places or {}).items():
+        by_angle.setdefault(float(np.mod(angle, 360.0)), []).append(name)
+    if key_phasor is not None and 0.0 not in by_angle and key_phasor % 360:
+        ax.annotate("", (1.9, 0), (1.4, 0), arrowprops={"arrowstyle": "->", "lw": 0.8})
+        ax.text(1.95, 0, "x", ha="left", va="center", fontsize=8)
+    if not by_angle:
+        away = -45.0 if abs((np.degrees(np.angle(key)) + 135 + 180) % 360 - 180) < 60 else -135.0
+        _probe(ax, away, "sensor, place\nnot stated", dashed=True)
+    for angle, names in by_angle.items():
+        shown = "\n".join(_short(name) for name in names[:2])
+        if len(names) > 2:
+            shown = f"{_short(names[0])} …\n{_short(names[-1])}"
+        _probe(ax, drawn * angle, f"{shown}\n{_stated(labels, angle)}", dashed=False)
+
+
+def _short(name: str) -> str:
+    return plain(name if len(name) <= 12 else f"{name[:11]}…")
+
+
+def _probe(ax: Axes, paper: float, text: str, *, dashed: bool) -> None:
+    """A sensor that looks at the shaft from an angle on the paper, degrees."""
+    way = np.exp(1j * np.radians(paper))
+    inner, outer = _INNER * way, _OUTER * way
+    ax.plot(
+        [inner.real, outer.real],
+        [inner.imag, outer.imag],
+        color="0.55" if dashed else "black",
+        lw=6,
+        solid_capstyle="butt",
+    )
+    at = (_OUTER + 0.07) * way
+    ax.text(
+        at.real,
+        at.imag,
+        text,
+        ha="center" if abs(way.real) < 0.5 else "left" if way.real > 0 else "right",
+        va="center" if abs(way.imag) < 0.5 else "bottom" if way.imag > 0 else "top",
+        fontsize=8,
+    )
+
+
+def _turning(ax: Axes, radius: float, start: float, turn: float) -> None:
+    """An arc with an arrow at its end; rad on the paper."""
+    around = start + np.linspace(0.0, turn, 61)
+    x, y = radius * np.cos(around), radius * np.sin(around)
+    ax.plot(x[:-3], y[:-3], color="black", lw=1.3)
+    ax.annotate(
+        "",
+        (x[-1], y[-1]),
+        (x[-6], y[-6]),
+        arrowprops={"arrowstyle": "-|>,head_length=0.45,head_width=0.22", "color": "black", "lw": 1.3},
+    )
+
+
+def phase_figure(labels: Labels) -> Figure:
+    """Draw a reading over time with the pulses of the key phasor, and what its phase is."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.9, 2.4), layout="constrained")
+    ax = figure.add_subplot()
+    ax.axis("off")
+    turn = np.linspace(-100.0, 560.0, 600)
+    peak = _SAMPLE if labels.phase == "lag" else -_SAMPLE
+    ax.plot(turn, np.cos(np.radians(turn - peak)), color="black", lw=1.5)
+    ax.plot([-100, 575], [0, 0], color="0.5", lw=0.7)
+    ax.text(585, 0, "time", ha="left", va="center", fontsize=8)
+    for pulse in (0.0, 360.0):
+        ax.plot([pulse, pulse], [-1.75, 1.5], color="0.5", lw=0.7, ls=":")
+        ax.plot(
+            [pulse - 12, pulse - 6, pulse, pulse + 6, pulse + 12], [-1.75, -1.75, -1.35, -1.75, -1.75], "k-"
+        )
+        ax.text(pulse, -1.8, "pulse", ha="center", va="top", fontsize=8)
+    ax.plot([360 + peak] * 2, [1.0, 1.5], color="0.5", lw=0.7, ls=":")
+    ends = (360.0, 360.0 + peak) if labels.phase == "lag" else (360.0 + peak, 360.0)
+    ax.annotate("", (ends[1], 1.38), (ends[0], 1.38), arrowprops={"arrowstyle": "-|>", "lw": 1.2})
+    ax.text(sum(ends) / 2, 1.5, f"phase {_SAMPLE:g}° ({labels.phase})", ha="center", va="bottom", fontsize=8)
+    ax.text(-100, 1.12, "reading of\na sensor", ha="left", va="bottom", fontsize=8)
+    ax.set(xlim=(-110, 660), ylim=(-2.15, 1.95))
+    return figure

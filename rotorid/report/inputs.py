@@ -1,0 +1,207 @@
+"""The rotor on a sheet: a drawing of it, and tables of its sections, discs and supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fem.rotor import RPM, Rotor
+from rotorid.report.grids import Grid, texts
+from rotorid.report.pictures import Drawing, rotor_picture
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from fem.sensors import SensorLike
+    from fem.supports import Support
+
+
+@dataclass(frozen=True)
+class RotorSheet:
+    """What a sheet says about its rotor.
+
+    Attributes
+    ----------
+    facts
+        Short ones: name and words.
+    drawing
+        To scale.
+    tables
+        Sections, discs and masses, supports, tabulated coefficients.
+    """
+
+    facts: tuple[tuple[str, str], ...]
+    drawing: Drawing
+    tables: tuple[Grid, ...]
+
+
+def rotor_sheet(
+    rotor: Rotor,
+    *,
+    planes: Sequence[str | int] = (),
+    sensors: Sequence[SensorLike] = (),
+    meaning: str = "",
+) -> RotorSheet:
+    """Describe a rotor.
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    planes, sensors
+        Nodes or stations to mark in the drawing.
+    meaning
+        What stands at the planes.
+
+    Raises
+    ------
+    ValueError
+        If a plane or sensor is no node of the rotor.
+    """
+    tables = [_sections(rotor), _discs(rotor), _supports(rotor), *_coefficients(rotor)]
+    return RotorSheet(
+        _facts(rotor),
+        rotor_picture(rotor, planes, sensors, meaning),
+        tuple(table for table in tables if table.rows),
+    )
+
+
+def place(rotor: Rotor, node: int) -> str:
+    """Print a node with the names of its stations."""
+    names = [name for name, where in rotor.stations.items() if where == node]
+    return f"{node} ({', '.join(names)})" if names else str(node)
+
+
+def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Grid:
+    """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
+    rows = [
+        texts(
+            (
+                place(rotor, node),
+                float(rotor.positions[node - 1]),
+                1e6 * float(abs(u)),
+                float(np.degrees(np.angle(u)) % 360),
+            )
+        )
+        for node, u in sorted(unbalance.items())
+    ]
+    heads = ("node", "position, m", "unbalance, g·mm", "angle, ° with the rotation")
+    return Grid("What is mounted", heads, tuple(rows), (0,))
+
+
+def _facts(rotor: Rotor) -> tuple[tuple[str, str], ...]:
+    model = rotor.model
+    counted = {
+        "shear": model.shear,
+        "rotary inertia": model.rotary_inertia,
+        "gyroscopic moments": model.gyroscopic,
+    }
+    used = [word for word, on in counted.items() if on]
+    left = [word for word, on in counted.items() if not on]
+    stations = ", ".join(f"{name} at node {node}" for name, node in rotor.stations.items())
+    facts = [
+        ("Rotor", f"{rotor.n_elements} elements, {rotor.positions[-1]:.6g} m, {rotor.total_mass:.6g} kg"),
+        ("Counted", ", ".join(["bending and mass", *used])),
+        ("Left out", ", ".join(left) or "nothing"),
+        ("Stations", stations),
+        *((name, text) for name, _, text in _material(rotor) if text),
+    ]
+    return tuple((name, text) for name, text in facts if text)
+
+
+def _material(rotor: Rotor) -> list[tuple[str, np.ndarray, str]]:
+    """What elements are made of: name with unit, values, and the one value if all have it."""
+    named = {
+        "Young's modulus, GPa": rotor.youngs_modulus / 1e9,
+        "Density, kg/m³": rotor.density,
+        "Poisson's ratio": rotor.poisson_ratio if rotor.model.shear else np.zeros(1),
+        "Material damping, s": rotor.material_damping,
+    }
+    kept = {name: values for name, values in named.items() if values.any()}
+    return [(n, v, f"{v[0]:.6g}" if (v == v[0]).all() else "") for n, v in kept.items()]
+
+
+def _sections(rotor: Rotor) -> Grid:
+    """One row per element."""
+    columns = {
+        "element": np.arange(1, rotor.n_elements + 1),
+        "from, m": rotor.positions[:-1],
+        "length, mm": 1e3 * rotor.length,
+        "outer diameter, mm": 1e3 * rotor.outer_diameter,
+    }
+    if rotor.inner_diameter.any():
+        columns["bore, mm"] = 1e3 * rotor.inner_diameter
+    columns |= {name: values for name, values, one in _material(rotor) if not one}
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    return Grid("Shaft, one row per element", tuple(columns), tuple(texts(row) for row in rows))
+
+
+def _discs(rotor: Rotor) -> Grid:
+    """Discs and concentrated masses; inertias and names only where there are any."""
+    turning = any(disc.polar_inertia or disc.diametral_inertia for disc in rotor.discs)
+    named = any(disc.name for disc in rotor.discs)
+    heads = ["node", *(["name"] if named else []), "mass, kg"]
+    heads += ["polar inertia, kg·m²", "diametral inertia, kg·m²"] if turning else []
+    rows = []
+    for disc in sorted(rotor.discs, key=lambda disc: disc.node):
+        inertias = (float(disc.polar_inertia), float(disc.diametral_inertia)) if turning else ()
+        rows.append(texts((disc.node, *([disc.name] if named else []), float(disc.mass), *inertias)))
+    return Grid("Discs and masses", tuple(heads), tuple(rows), (1,) if named else ())
+
+
+def _supports(rotor: Rotor) -> Grid:
+    rows = []
+    for support in rotor.supports:
+        said = f"{support.kind} {support.name}".strip()
+        rows.append(
+            (place(rotor, support.node), said, _words(support, 0), _words(support, 1), _beside(support))
+        )
+    heads = ("node", "support", "stiffness, N/m", "damping, N·s/m", "besides")
+    return Grid("Supports", heads, tuple(rows), tuple(range(5)))
+
+
+def _words(support: Support, which: int) -> str:
+    """Stiffness (0) or damping (1) of a support in words."""
+    if support.speeds:
+        return "tabulated over speed, see below"
+    (xx, xy), (yx, yy) = support.at(0.0)[which].tolist()
+    if xx == yy and xy == yx == 0:
+        return f"{xx:.6g}"
+    named = {"xx": xx, "xy": xy, "yx": yx, "yy": yy}
+    return ", ".join(f"{name} {value:.6g}" for name, value in named.items() if value)
+
+
+def _beside(support: Support) -> str:
+    """Pedestal and tilting stiffness in words."""
+    said = []
+    if support.pedestal is not None:
+        k, c = (
+            " and ".join(f"{value:.6g}" for value in dict.fromkeys(support.pedestal.xy(name)))
+            for name in ("stiffness", "damping")
+        )
+        said.append(f"pedestal {support.pedestal.mass:.6g} kg, {k} N/m (x and y), {c} N·s/m")
+    if support.tilting_stiffness:
+        said.append(f"tilting {support.tilting_stiffness:.6g} N·m/rad")
+    return "; ".join(said) or "–"
+
+
+def _coefficients(rotor: Rotor) -> list[Grid]:
+    """Tables of tabulated coefficients; supports that share them share the tables."""
+    tables: dict[tuple[str, tuple[tuple[str, ...], ...]], list[str]] = {}
+    for number, support in enumerate(rotor.supports, start=1):
+        if not support.speeds:
+            continue
+        for letter, unit, matrices in zip("kc", (1e6, 1e3), support.at(support.speeds), strict=True):
+            rows = tuple(
+                texts([omega * RPM, *(matrix.ravel() / unit).tolist()])
+                for omega, matrix in zip(support.speeds, matrices, strict=True)
+            )
+            tables.setdefault((letter, rows), []).append(f"{support.kind} {support.name or number}")
+    words = {"k": "Stiffness, MN/m", "c": "Damping, kN·s/m"}
+    return [
+        Grid(f"{words[k]}: {', '.join(named)}", ("rpm", f"{k}xx", f"{k}xy", f"{k}yx", f"{k}yy"), rows)
+        for (k, rows), named in tables.items()
+    ]

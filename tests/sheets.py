@@ -1,0 +1,181 @@
+"""Makes the sheets of the tests, and reads which numbers they show, and whether these are the document's."""
+
+import contextlib
+import functools
+import io
+import json
+import re
+import sys
+import tempfile
+from dataclasses import dataclass
+from decimal import Decimal
+from html.parser import HTMLParser
+from pathlib import Path
+from unittest import mock
+
+import pytest
+
+import rotorid.cli
+from rotorid.samples import sample_data
+
+COMPRESSOR = (
+    "response compressor/rotor.toml --unbalance compressor/unbalance.csv --speeds 1000:15000:500rpm "
+    "--operating 5300:6500rpm"
+)
+COMMANDS = {
+    "balance": "balance turbo_job/job.toml",
+    "balance checked": "balance turbo_job/checked.toml",
+    "balance holes": "balance turbo_job/holes.toml --split",
+    "balance two planes": "balance bk_two_plane/job.toml",
+    "critical": "critical compressor/rotor.toml -n 4 --map --mesh-check --operating 4000:6500rpm",
+    "critical table": "critical rotor23.csv -n 5",
+    "response": COMPRESSOR + " --sensors probe_DE:45,probe_NDE:45",
+    "response stations": COMPRESSOR,
+    "reduce": "reduce rotor23.csv --nodes 7,12,18 --methods --trade-off --rank --response auto "
+    "--stability 0:9000rpm --errors compliance=1,shapes=1 --what-if alpha12=1.3",
+    "reduce unstable": "reduce compressor/rotor.toml --nodes 8,14,20 --modes 1 --stability 1000:14000rpm "
+    "--damping 1,0.5 --model SMALL.toml",
+    "reduce apart": "reduce rotor23.csv --nodes 7,12,18 --supports-apart --nonnegative --rows relative",
+    "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
+    "book_task_9/modes_printed.csv --modes 1",
+}
+"""Sheets by name: the command, its files in the sample data, _ for a blank in a name."""
+
+NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
+ROUNDED = 3  # significant digits that a whole number with zeros at its end has at least
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An element that shows a value of the embedded document, times `scale`."""
+
+    key: str
+    text: str
+    scale: float = 1.0
+    visible: bool = True
+
+
+def value_at(document, key):
+    """What the document holds at a dotted path."""
+    for part in key.split("."):
+        document = document[int(part)] if isinstance(document, list) else document[part]
+    return document
+
+
+def disagreement(shown, document):
+    """Why an element does not show the document's number, or None: half a unit of the last digit is free."""
+    value = value_at(document, shown.key)
+    text = shown.text.replace("−", "-").strip()
+    if value is None:
+        return None if text in ("–", "-", "") else f"{shown.key} is null, shown as {text}"
+    found = NUMBER.match(text)
+    if found is None:
+        return None if text == str(value) else f"{shown.key} is {value}, shown as {text!r}"
+    number = Decimal(found.group())
+    digits = len(number.as_tuple().digits)
+    unit = Decimal(1).scaleb(number.as_tuple().exponent)
+    if number and number == number.to_integral() and "." not in found.group():
+        zeros = len(str(abs(int(number)))) - len(str(abs(int(number))).rstrip("0"))
+        unit *= 10 ** min(zeros, max(0, digits - ROUNDED))
+    expected = Decimal(float(value) * shown.scale)
+    off = abs(number - expected)
+    if text.endswith("°") or shown.key.endswith("_deg"):
+        off = min(off, abs(off - 360))
+    if off > unit / 2 + abs(expected) * Decimal("1e-12"):
+        return f"{shown.key} is {float(expected)!r}, shown as {text}"
+    return None
+
+
+def disagreements(shown, document):
+    """All of them."""
+    return [said for element in shown if (said := disagreement(element, document))]
+
+
+@dataclass(frozen=True)
+class Made:
+    """A sheet, and the document that the same run printed."""
+
+    html: bytes
+    document: dict
+
+
+@functools.cache
+def make(name):
+    """Run a command of COMMANDS once in this process, with --report and --json."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = []
+        for word in COMMANDS[name].split():
+            known = sample_data() / word
+            word = str(known) if "." in word and known.is_file() else word
+            words.append(word.replace("SMALL", f"{folder}/small").replace("probe_", "probe "))
+        return run(*words, report=Path(folder) / "sheet.html")
+
+
+def run(*words, report):
+    """Run `rotorid WORDS --json --report FILE` in this process."""
+    printed = io.StringIO()
+    arguments = ["rotorid", *map(str, words), "--json", "--report", str(report)]
+    with (
+        mock.patch.object(sys, "argv", arguments),
+        contextlib.redirect_stdout(printed),
+        pytest.raises(SystemExit) as stop,
+    ):
+        rotorid.cli.main()
+    assert not stop.value.code, f"{' '.join(arguments)} ended with {stop.value.code}"
+    return Made(report.read_bytes(), json.loads(printed.getvalue()))
+
+
+class _Reader(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.shown, self.ids, self.references, self.order, self.result = [], [], [], [], ""
+        self._open, self._script = [], False
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        self.ids += [attrs["id"]] if "id" in attrs else []
+        self.references += [
+            v for k, v in attrs.items() if k.split(":")[-1] in ("href", "src", "action", "data")
+        ]
+        self.order.append((tag, attrs.get("id"), attrs.get("class") or ""))
+        self._script = tag == "script"
+        if "data-key" in attrs:
+            self._open.append([attrs["data-key"], "", float(attrs.get("data-scale") or 1.0), tag])
+
+    def handle_endtag(self, tag):
+        self._script = False
+        if self._open and self._open[-1][3] == tag:
+            key, text, scale, _ = self._open.pop()
+            self.shown.append(Shown(key, text, scale))
+
+    def handle_data(self, data):
+        if self._script:
+            self.result += data
+        for element in self._open:
+            element[1] += data
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A sheet taken apart."""
+
+    text: str
+    document: dict
+    shown: list
+    ids: list
+    references: list
+    order: list
+
+    @property
+    def keys(self):
+        return {element.key for element in self.shown}
+
+
+def read_sheet(html):
+    """Take a sheet apart without a browser."""
+    text = html.decode("utf-8")
+    reader = _Reader()
+    reader.feed(text)
+    reader.close()
+    document = json.loads(reader.result)
+    return Sheet(text, document, reader.shown, reader.ids, reader.references, reader.order)

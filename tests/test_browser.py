@@ -1,0 +1,121 @@
+"""Every sheet in a real browser: silent, self-contained, fit for a telephone, true, printable.
+
+Without Chromium the tests are skipped, and say which packages bring it; where CI=true it must be there.
+"""
+
+import re
+
+import browser as chromium
+import pytest
+from sheets import COMMANDS, disagreements, make
+
+TELEPHONE, SCREEN = 390, 1280
+A4 = (595, 842)  # points
+MOST_PAGES = 12
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    lacking = chromium.missing()
+    if lacking and chromium.on_ci():
+        pytest.fail(f"CI needs a browser: {lacking}")
+    if lacking:
+        pytest.skip(lacking)
+    session = chromium.Browser(tmp_path_factory.mktemp("profile"))
+    yield session
+    session.close()
+
+
+@pytest.fixture(scope="session")
+def address(tmp_path_factory):
+    """Where the sheet with this name lies, made when it is first asked for."""
+    folder = tmp_path_factory.mktemp("sheets")
+
+    def find(name):
+        path = folder / f"{name}.html"
+        if not path.exists():
+            path.write_bytes(make(name).html)
+        return path
+
+    return find
+
+
+def foreign(visit, path):
+    """What a page asked for beyond its own file."""
+    return [url for url in visit.requests if url != path.resolve().as_uri() and not url.startswith("data:")]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
+    path = address(name)
+    document = make(name).document
+    for width in (TELEPHONE, SCREEN):
+        browser.resize(width)
+        visit = browser.open(path)
+        assert visit.console == []
+        assert foreign(visit, path) == []
+        assert browser.too_wide() == []
+        assert browser.widths() == (width, width)
+        assert browser.title().strip()
+
+        shown = browser.shown()
+        assert len(shown) >= 20
+        assert [element.key for element in shown if not element.visible] == []
+        inside = browser.document()  # what the command printed, and what the sheet adds for itself
+        assert {key: inside.get(key) for key in document} == document
+        assert disagreements(shown, inside) == []
+
+        (top,) = browser.tops("#warnings")
+        assert top < min(browser.tops("table, svg, h2:not(#warnings h2)"))
+        read = " ".join(browser.text("#warnings").split())
+        for warning in document["warnings"]:
+            assert " ".join(warning.split()) in read
+
+    pdf = browser.print()
+    boxes = re.findall(rb"/MediaBox\s*\[0 0 ([\d.]+) ([\d.]+)\]", pdf)
+    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", pdf)) <= MOST_PAGES
+    assert {(round(float(w)), round(float(h))) for w, h in boxes} == {A4}
+
+
+def test_the_browser_sees_what_a_sheet_must_not_do(browser, tmp_path):
+    page = tmp_path / "bad.html"
+    page.write_text(
+        '<!doctype html><meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
+        '<img src="https://example.org/picture.png"><script>console.error("look here")</script>'
+        '<p id="wide" style="width:600px">wide</p><div style="width:50px;overflow:hidden">cut_off_here</div>'
+        '<span data-key="a">2</span><span data-key="a" style="display:none">1</span>'
+        '<script type="application/json" id="result">{"a": 1}</script>',
+        encoding="utf-8",
+    )
+    browser.resize(TELEPHONE)
+    visit = browser.open(page)
+    assert any("look here" in line for line in visit.console)
+    assert foreign(visit, page) == ["https://example.org/picture.png"]
+    assert browser.widths() > (TELEPHONE, TELEPHONE)
+    assert any(line.startswith("P ") for line in browser.too_wide())
+    assert any("cut_off_here" in line for line in browser.too_wide())
+    shown = browser.shown()
+    assert [element.visible for element in shown] == [True, False]
+    assert disagreements(shown, browser.document()) == ["a is 1.0, shown as 2"]
+
+
+def test_a_good_page_is_not_complained_about(browser, tmp_path):
+    page = tmp_path / "good.html"
+    page.write_text(
+        '<!doctype html><meta name="viewport" content="width=device-width"><link rel="icon" href="data:,">'
+        "<p>short</p>",
+        encoding="utf-8",
+    )
+    browser.resize(TELEPHONE)
+    visit = browser.open(page)
+    assert (visit.console, foreign(visit, page), browser.too_wide()) == ([], [], [])
+    assert browser.widths() == (TELEPHONE, TELEPHONE)
+
+
+def test_a_machine_without_a_browser_says_what_to_install(monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    assert "chromium and chromium-driver" in chromium.missing()
+    monkeypatch.setenv("CI", "true")
+    assert chromium.on_ci()
+    monkeypatch.delenv("CI")
+    assert not chromium.on_ci()

@@ -1,0 +1,319 @@
+"""What makes the shell pleasant: nearest names, no colours where unwanted, progress, the numbers behind."""
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+import typer
+
+from rotorid.cli import progress, suggest, verbose
+from rotorid.samples import sample_data
+
+JOB = sample_data() / "turbo_job" / "job.toml"
+ROTOR = sample_data() / "rotor23.csv"
+COMPRESSOR = sample_data() / "compressor"
+TASK = sample_data() / "identify" / "task_5_1"
+COLOURS = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "TERM", "COLUMNS")
+
+
+def words(text):
+    """A message without the frame and the line breaks that rich gives it."""
+    return " ".join(text.replace("│", " ").split())
+
+
+def environment(**changes):
+    return {key: value for key, value in os.environ.items() if key not in COLOURS} | changes
+
+
+def at_terminal(*args, **changes):
+    """What `rotorid ARGS` writes to a terminal, standard error included."""
+    master, slave = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "rotorid", *args], stdout=slave, stderr=slave, env=environment(**changes)
+    ):
+        os.close(slave)
+        parts = []
+        while True:
+            try:
+                part = os.read(master, 4096)
+            except OSError:  # Linux: the other end is closed
+                break
+            if not part:
+                break
+            parts.append(part)
+    os.close(master)
+    return b"".join(parts).decode()
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["balanec"], "No such command 'balanec'. Did you mean 'balance'?"),
+        (["trail-weight"], "No such command 'trail-weight'. Did you mean 'trial-weight'?"),
+        (["xyzzy"], "No such command 'xyzzy'."),
+        (["--versoin"], "No such option '--versoin'. Did you mean '--version'?"),
+        (["balance", JOB, "--limt", "3"], "No such option '--limt'. Did you mean '--limit'?"),
+        (["critical", JOB, "--qqq"], "No such option '--qqq'."),
+        (
+            ["reduce", "a.csv", "--place", "bset"],
+            "Invalid value for '--place': 'bset' is not one of 'best', 'compromise', 'mac', 'book'. "
+            "Did you mean 'best'?",
+        ),
+    ],
+)
+def test_usage_with_the_nearest_name(cli, args, message):
+    outcome = cli(*args)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    said = words(outcome.err)
+    assert message in said
+    assert said.count("Did you mean") == message.count("Did you mean")
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["balance", JOB, "--method", "minmx"], "'minmx' is not known (did you mean 'minmax'?)"),
+        (["balance", JOB, "--coefficients", "measuredd"], "(did you mean 'measured'?)"),
+        (["balance", JOB, "--planes", "lefft"], "there is no plane 'lefft' (did you mean 'left'?)"),
+        (["balance", JOB, "--limit", "prob 4=2"], "there is no sensor 'prob 4' (did you mean 'probe 4'?)"),
+        (["balance", JOB, "--max-mass", "midddle=2"], "there is no plane 'midddle' (did you mean 'middle'?)"),
+        (["balance", JOB.with_name("jb.toml")], "(did you mean 'job.toml'?)"),
+        (
+            ["reduce", COMPRESSOR / "rotor.toml", "--nodes", "8,impeler 4"],
+            "no station is called 'impeler 4' (did you mean 'impeller 4'?)",
+        ),
+        (
+            ["influence", COMPRESSOR / "rotor.toml", "--planes=8", "--sensors=prob DE", "--speeds=500"],
+            "no station is called 'prob DE' (did you mean 'probe DE'?)",
+        ),
+        (
+            ["identify", TASK / "model.toml", TASK / "data.csv", "--method", "output-eror"],
+            "'output-eror' is not known (did you mean 'output-error'?)",
+        ),
+        (["balance", JOB, "--angles", "with rotatoin"], "(did you mean 'with rotation'?)"),
+        (
+            ["reduce", ROTOR, "--nodes=7,12,18", "--errors", "complianc=1"],
+            "'complianc' is not known (did you mean 'compliance'?)",
+        ),
+        (
+            ["reduce", ROTOR, "--nodes=7,12,18", "--what-if", "alph12=1.3"],
+            "there is no input 'alph12' (did you mean 'alpha12'?)",
+        ),
+        (
+            ["trial-weight", "--rotor-mass=5kg", "--speed=9rpm", "--radius=1m", "--measures", "velocty"],
+            "'velocty' is not known (did you mean 'velocity'?)",
+        ),
+        (["demo", "--sample", "hols"], "there is no sample 'hols' (did you mean 'holes'?)"),
+    ],
+)  # fmt: skip
+def test_values_with_the_nearest_name(cli, args, message):
+    outcome = cli(*args)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert outcome.err.startswith("rotorid: ")
+    assert message in outcome.err
+    assert outcome.err.count("did you mean") == 1
+
+
+def test_a_name_like_no_other_gets_no_suggestion(cli):
+    for args in (["--planes", "xyz"], ["--method", "xyz"], ["--limit", "xyz=3"]):
+        outcome = cli("balance", JOB, *args)
+        assert outcome.code == 2
+        assert "did you mean" not in outcome.err
+        assert "left" in outcome.err or "minmax" in outcome.err or "probe 4" in outcome.err
+
+
+def test_the_words_of_a_choice():
+    assert suggest.choice("Value error, 'bode' is not one of 'a', 'b'") == "'bode' is not one of 'a', 'b'."
+    assert suggest.choice("anything else") == "anything else"
+    assert suggest.unknown("sheet", "run", ["runs", "weights"]) == "No such sheet 'run'. Did you mean 'runs'?"
+    assert issubclass(typer.BadParameter, suggest.UsageError)
+    assert suggest.UsageError is not Exception
+
+
+@pytest.mark.parametrize("args", [["critical", "--help"], ["balanec"]])
+def test_colours_only_where_they_are_wanted(args):
+    assert "\x1b[" in at_terminal(*args, TERM="xterm-256color")
+    for changes in ({"NO_COLOR": "1", "TERM": "xterm-256color"}, {"TERM": "dumb"}):
+        text = at_terminal(*args, **changes)
+        assert "\x1b" not in text
+        assert "balance" in text or "--mesh-check" in text
+    piped = subprocess.run(
+        [sys.executable, "-m", "rotorid", *args],
+        capture_output=True,
+        text=True,
+        env=environment(TERM="xterm-256color", PYTHONIOENCODING="utf-8"),
+        check=False,
+    )
+    assert "\x1b" not in piped.stdout + piped.stderr
+    assert "balance" in piped.stderr or "--mesh-check" in piped.stdout
+
+
+def test_plain_terminals(monkeypatch):
+    for name in COLOURS:
+        monkeypatch.delenv(name, raising=False)
+    assert suggest.markup_mode() == "rich"
+    monkeypatch.setenv("NO_COLOR", "")  # as no-color.org has it: empty does not count
+    assert not suggest.plain()
+    monkeypatch.setenv("NO_COLOR", "0")
+    assert suggest.plain()
+    monkeypatch.delenv("NO_COLOR")
+    monkeypatch.setenv("TERM", "dumb")
+    assert suggest.markup_mode() is None
+
+
+def wait_for(said, word):
+    """Wait until the standard error holds a word; the other thread writes it."""
+    text = ""
+    for _ in range(500):
+        text += said()
+        if word in text:
+            return text
+        time.sleep(0.01)
+    return text
+
+
+def test_a_log_gets_a_line_now_and_then(monkeypatch, capsys):
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.05)
+    with progress.steps("bootstrap", 5) as advance:
+        advance()
+        advance()
+        text = wait_for(lambda: capsys.readouterr().err, "s so far")
+    assert re.match(r"rotorid: bootstrap, 2 of 5, \d+ s so far\n", text)
+    with progress.busy("fit"):
+        text = wait_for(lambda: capsys.readouterr().err, "s so far")
+    assert re.match(r"rotorid: fit, \d+ s so far\n", text)
+    assert "\x1b" not in text
+
+
+def test_lines_become_fewer(monkeypatch):
+    """The pauses double up to the longest, and end at once when the work is done."""
+
+    class Done:
+        def __init__(self):
+            self.pauses = []
+
+        def wait(self, pause):
+            self.pauses.append(pause)
+            return len(self.pauses) > 5
+
+    done = Done()
+    progress._lines(progress._Count("fit", None), done)
+    assert done.pauses == [10, 20, 40, 60, 60, 60]
+
+
+def test_a_terminal_gets_a_bar_and_a_dumb_one_lines(monkeypatch, capsys):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("NO_COLOR", "1")  # says nothing about movement
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "PATIENCE", 0.01)
+    with progress.steps("bootstrap", 5) as advance:
+        advance()
+        text = wait_for(lambda: capsys.readouterr().err, "1/5")
+    assert "bootstrap" in text
+    assert "1/5" in text
+    capsys.readouterr()
+    monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.setattr(progress, "FIRST_LINE", 0.05)
+    with progress.busy("fit"):
+        text = wait_for(lambda: capsys.readouterr().err, "s so far")
+    assert re.match(r"rotorid: fit, \d+ s so far\n", text)
+
+
+def test_progress_does_not_hide_an_error(monkeypatch):
+    with pytest.raises(ZeroDivisionError), progress.busy("division"):
+        1 / 0  # noqa: B018
+
+
+def numbers(text):
+    """Lines `rotorid: NAME = VALUE` of a command that ran with --verbose."""
+    pairs = (line.removeprefix("rotorid: ").partition(" = ") for line in text.splitlines())
+    return {name: value for name, sign, value in pairs if sign}
+
+
+def test_the_numbers_behind_a_balance(cli):
+    plain = cli("balance", JOB, "--json")
+    assert plain.err == ""
+    outcome = cli("balance", JOB, "--json", "--verbose")
+    document = json.loads(outcome.out)
+    assert {**document, "provenance": None} == {**plain.json, "provenance": None}
+    shown = numbers(outcome.err)
+    assert shown["rank"] == "3"
+    assert shown["condition_number"] == f"{document['condition_number']:.6g}"
+    assert shown["singular_values"] == ", ".join(f"{s:.6g}" for s in document["singular_values"])
+    assert shown["rms_after"] == f"{document['rms_after']:.6g}"
+    assert shown["errors.amplitude_percent"] == "0.15"
+    lines = outcome.err.splitlines()
+    assert lines[-2].startswith("rotorid: time: all ")
+    assert lines[-1].startswith("rotorid: versions: rotorid 0.1.0, python 3.")
+    assert all(name in lines[-1] for name in ("numpy", "scipy"))
+
+
+def test_the_numbers_behind_an_identification_and_a_fit(cli):
+    outcome = cli("identify", TASK / "model.toml", TASK / "data.csv", "--verbose")
+    shown = numbers(outcome.err)
+    assert (shown["rank"], shown["degrees_of_freedom"]) == ("2", "4")  # 3 complex equations, 2 unknowns
+    assert "time: identification " in outcome.err
+    outcome = cli("reduce", ROTOR, "--nodes", "7,12,18", "--verbose")
+    shown = numbers(outcome.err)
+    assert (shown["rank"], shown["degrees_of_freedom"]) == ("3", "3")  # 2 modes at 3 nodes, 3 masses
+    folder = sample_data() / "fit" / "run_down"
+    outcome = cli("fit", folder / "model.toml", folder / "record.csv", "--verbose")
+    shown = numbers(outcome.err)
+    assert shown["iterations"] == "11"
+    assert shown["history.cost"].endswith(" in 12 entries")
+    singular = [float(s) for s in shown["singular_values"].split(", ")]
+    assert singular[0] / singular[-1] == pytest.approx(float(shown["condition_number"]), rel=1e-4)
+    assert int(shown["degrees_of_freedom"]) == 1798
+    assert "converged in 11 iterations" in outcome.out
+    assert "time: fit " not in outcome.out
+
+
+def test_verbose_is_an_option_of_every_command(cli):
+    from rotorid.cli import app
+
+    commands = typer.main.get_command(app).commands
+    assert len(commands) >= 13
+    for name in commands:
+        assert "--verbose" in cli(name, "--help").out, name
+
+
+def test_notes_are_kept_only_for_those_who_ask(capsys):
+    verbose.note({"rank": 3})
+    verbose.span("nothing", 1.0)
+    assert verbose._NOTES.get() is None
+
+    def command(n: int = 1) -> None:
+        """Count."""
+        verbose.note({"rank": n, "provenance": {"rank": 9}, "masses": [1.0], "deep": {"mac": [0.5] * 20}})
+
+    verbose.verbosely(command)(4)
+    assert capsys.readouterr() == ("", "")
+    verbose.verbosely(command)(4, verbose=True)
+    shown = numbers(capsys.readouterr().err)
+    assert shown == {"rank": "4", "deep.mac": ", ".join(["0.5"] * 12) + ", … (20 in all)"}
+    assert verbose._NOTES.get() is None
+
+
+def test_an_exit_status_is_no_failure(capsys):
+    def command() -> None:
+        """Judge."""
+        verbose.note({"rank": 2})
+        raise typer.Exit(1)
+
+    with pytest.raises(typer.Exit):
+        verbose.verbosely(command)(verbose=True)
+    assert numbers(capsys.readouterr().err) == {"rank": "2"}
+    assert verbose._NOTES.get() is None
+
+
+def test_a_failing_command_says_only_what_is_wrong(cli):
+    outcome = cli("critical", "nowhere.csv", "--verbose")
+    assert outcome.code == 2
+    assert len(outcome.err.splitlines()) == 1

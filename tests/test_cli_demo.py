@@ -1,0 +1,96 @@
+"""`rotorid demo`: every sample runs, says what to type, and writes what it promises."""
+
+import json
+import shlex
+
+import pytest
+
+from rotorid.cli.demo_samples import SAMPLES
+from rotorid.samples import sample_data
+
+NUMBERS = {
+    "main": ["135.240", "134.203 kg", "416.9  171.6°"],
+    "balancing": ["416.9  171.6°", "explained by the stated errors", "13.20  155.9°"],
+    "holes": ["No other choice of pieces is better (proven).", "1 × 20 g in hole 4 (at 45°)"],
+    "rotor": ["4176.22", "10932.4 rpm", "4391.84"],
+    "reduction": ["134.203 kg", "SEREP", "three_masses.toml"],
+    "identification": ["c     = 999.935", "only c and b*(1 - delta) are determined"],
+    "record": ["d_x7  = 880.814 ± 45", "residual rms 1.906"],
+}
+
+
+def test_the_samples_have_numbers_here():
+    assert set(NUMBERS) == set(SAMPLES)
+    assert next(iter(SAMPLES)) == "main"
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_sample_runs_and_writes_its_pictures(cli, tmp_path, name):
+    folder = tmp_path / "a folder"
+    outcome = cli("demo", folder, "--sample", name)
+    assert outcome.code == 0, outcome.err
+    sample = SAMPLES[name]
+    for word in NUMBERS[name]:
+        assert word in outcome.out, word
+    for picture in sample.pictures:
+        assert (folder / picture).read_bytes().startswith(b"\x89PNG")
+    assert outcome.out.endswith("".join(f"\n  {folder / picture}" for picture in sample.pictures) + "\n")
+    written = sorted(path.name for path in folder.iterdir() if path.suffix == ".png")
+    assert written == sorted(sample.pictures)
+    for source in sample.sources:
+        assert (folder / source).exists()
+    assert "make_" not in " ".join(path.name for path in folder.rglob("*"))
+
+
+def test_the_commands_are_those_a_user_would_type(cli, tmp_path):
+    folder = tmp_path / "a folder"
+    outcome = cli("demo", folder, "--sample", "holes")
+    typed = [shlex.split(line.removeprefix("$ ")) for line in outcome.out.splitlines() if line[:2] == "$ "]
+    assert len(typed) == len(SAMPLES["holes"].steps)
+    for command in typed:
+        assert command[0] == "rotorid"
+        again = cli(*command[1:])
+        assert again.code == 0
+        assert again.out in outcome.out
+
+
+def test_json_is_one_document_with_all_results(cli, tmp_path):
+    name = "identification"
+    outcome = cli("demo", tmp_path / "d", "--sample", name, "--json")
+    document = outcome.json
+    sample = SAMPLES[name]
+    assert document["sample"] == name
+    assert document["folder"] == str(tmp_path / "d")
+    assert [path.rpartition("/")[2] for path in document["pictures"]] == list(sample.pictures)
+    assert len(document["provenance"]["inputs"]) >= 4
+    for step, typed in zip(sample.steps, document["commands"], strict=True):
+        alone = cli(*shlex.split(typed)[1:], "--json").json
+        alone.pop("provenance")
+        assert document[step.key] == alone
+
+
+def test_the_list_writes_nothing(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    lines = cli("demo", "--list").out.splitlines()
+    assert [line.split()[0] for line in lines] == list(SAMPLES)
+    for line, sample in zip(lines, SAMPLES.values(), strict=True):
+        assert line.endswith("  " + sample.about)
+        assert len(line) <= 110
+    document = json.loads(cli("demo", "--list", "--json").out)
+    assert [row["name"] for row in document["samples"]] == list(SAMPLES)
+    assert cli("demo", "--sample", "maine").code == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", [name for name in SAMPLES if name != "main"])
+def test_a_sample_keeps_what_people_changed(cli, tmp_path, name):
+    source = SAMPLES[name].sources[0]
+    place = sample_data() / source
+    first = place if place.is_file() else min(place.glob("*.toml"))
+    mine = tmp_path / "d" / first.relative_to(sample_data())
+    mine.parent.mkdir(parents=True)
+    mine.write_text("mine", encoding="utf-8")
+    outcome = cli("demo", tmp_path / "d", "--sample", name)
+    assert outcome.code == 2
+    assert f"{mine}: differs from the sample" in outcome.err
+    assert [path for path in (tmp_path / "d").rglob("*") if path.is_file()] == [mine]

@@ -1,0 +1,195 @@
+"""`rotorid balance`: one workbook with the job and its results, read back; and the form to fill in."""
+
+from __future__ import annotations
+
+import numpy as np
+import openpyxl
+import pandas as pd
+import pytest
+from workbook_jobs import SAMPLES
+
+from rotorid.samples import sample_data
+from rotorid.tables import read_influence, write_influence
+
+DATA = sample_data()
+TURBO = DATA / "turbo_job"
+
+
+def answer(outcome):
+    """The document of a result without what names files and dates."""
+    assert outcome.code == 0, outcome.err
+    return {key: value for key, value in outcome.json.items() if key != "provenance"}
+
+
+CALLS = [
+    *((sample, ()) for sample in SAMPLES),
+    ("turbo_job/holes", ("--split",)),
+    ("turbo_job/checked", ("--history",)),
+    ("turbo_job/checked", ("--refine",)),
+    ("turbo_job/job", ("--method", "minmax")),
+    ("bk_two_plane/job", ("--amplitude-error", "2", "--phase-error", "1", "--phase", "lag")),
+    ("left_in/job", ("--angles", "against rotation")),
+    ("turbo_job/job", ("--max-mass", "left=400,right=9oz_in", "--limit", "probe 1=20")),
+]
+ONCE = ("--amplitude-error", "--phase-error", "--phase", "--angles", "--max-mass", "--limit")
+"""What the workbook says from then on."""
+
+
+@pytest.mark.parametrize(("sample", "options"), CALLS)
+def test_a_workbook_gives_the_same_result(cli, tmp_path, sample, options):
+    job, sheet = DATA / f"{sample}.toml", tmp_path / "sheet.xlsx"
+    first = cli("balance", job, *options, "--output", sheet, "--json")
+    again = options if not options or options[0] not in ONCE else ()
+    assert answer(cli("balance", sheet, *again, "--json")) == answer(first)
+    second = tmp_path / "second.xlsx"
+    assert answer(cli("balance", sheet, *again, "--output", second, "--json")) == answer(first)
+    assert answer(cli("balance", second, *again, "--json")) == answer(first)
+
+
+def test_the_sheets_of_results(cli, tmp_path):
+    sheet = tmp_path / "sheet.xlsx"
+    document = cli("balance", TURBO / "holes.toml", "--split", "--output", sheet, "--json").json
+    book = openpyxl.load_workbook(sheet)
+    results = ["results", "results summary", "results residuals", "results holes", "results influence"]
+    assert book.sheetnames == ["runs", "weights", "planes", "sensors", "settings", *results]
+    assert book.active.title == "results"
+    corrections = pd.read_excel(sheet, sheet_name="results", comment="#")
+    assert corrections["plane"].tolist() == ["left", "middle", "right"]
+    assert corrections["mass"].tolist() == [row["mass"] for row in document["corrections"]]
+    assert corrections["angle_deg"].tolist() == [row["angle_deg"] for row in document["corrections"]]
+    residuals = pd.read_excel(sheet, sheet_name="results residuals", comment="#")
+    for key in ("speed_rpm", "sensor", "before", "before_phase_deg", "after", "after_phase_deg"):
+        assert residuals[key].tolist() == [row[key] for row in document["residuals"]]
+    holes = pd.read_excel(sheet, sheet_name="results holes", comment="#")
+    assert len(holes) == len(document["mounting"]["holes"])
+    summary = dict(book["results summary"].iter_rows(min_row=3, max_col=2, values_only=True))
+    assert summary["rms_after"] == document["rms_after"]
+    assert summary["provenance.options.split"] == "yes"
+    warned = [
+        row[0] for row in book["results"].iter_rows(values_only=True) if str(row[0]).startswith("# warn")
+    ]
+    assert warned == [f"# warning: {text}" for text in document["warnings"]]
+
+
+def test_the_influence_coefficients_of_the_results_are_a_table(cli, tmp_path):
+    sheet, stored = tmp_path / "sheet.xlsx", tmp_path / "influence.csv"
+    outcome = cli("balance", TURBO / "job.toml", "--output", sheet, "--save-influence", stored)
+    assert outcome.code == 0, outcome.err
+    book = openpyxl.load_workbook(sheet)
+    for title in book.sheetnames:
+        if title != "results influence":
+            del book[title]
+    book.save(tmp_path / "only.xlsx")
+    ours, saved = read_influence(tmp_path / "only.xlsx"), read_influence(stored)
+    np.testing.assert_allclose(ours.W, saved.W, rtol=1e-14)  # the deleting program keeps 16 digits
+    assert ours.sensors == saved.sensors
+
+
+def test_stored_coefficients_are_embedded(cli, tmp_path):
+    runs, stored = tmp_path / "runs.csv", tmp_path / "influence.csv"
+    assert cli("balance", TURBO / "job.toml", "--save-influence", stored).code == 0
+    lines = (TURBO / "runs.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    runs.write_text(
+        "".join(line for line in lines if line.startswith(("run,", "baseline"))), encoding="utf-8"
+    )
+    write_influence(stored, read_influence(stored), ["machine 7, summer"])
+    sheet = tmp_path / "sheet.xlsx"
+    first = cli("balance", runs, "--influence", stored, "--output", sheet, "--json")
+    stored.unlink()
+    runs.unlink()
+    assert answer(cli("balance", sheet, "--json")) == answer(first)
+    comments = [row[0] for row in openpyxl.load_workbook(sheet)["influence"].iter_rows(values_only=True)]
+    assert "# machine 7, summer" in comments
+
+
+def test_csv_output_holds_the_corrections_alone(cli, tmp_path):
+    table = tmp_path / "weights.csv"
+    document = cli("balance", TURBO / "job.toml", "--output", table, "--json").json
+    frame = pd.read_csv(table)
+    assert frame.columns.tolist() == ["plane", "mass", "unit", "angle_deg", "mass_std", "angle_std_deg"]
+    assert frame["mass"].tolist() == [row["mass"] for row in document["corrections"]]
+
+
+def test_what_cannot_be_kept_writes_nothing(cli, tmp_path):
+    for name in ("runs", "weights"):
+        (tmp_path / f"{name}.csv").write_bytes((TURBO / f"{name}.csv").read_bytes())
+    job, sheet, picture = tmp_path / "job.toml", tmp_path / "sheet.xlsx", tmp_path / "p.png"
+    job.write_text(
+        'runs = "runs.csv"\nweights = "weights.csv"\n[planes.left]\nholes = 2\nhole_names = ["A;B", "C"]\n'
+    )
+    assert cli("balance", job).code == 0
+    outcome = cli("balance", job, "--output", sheet, "--plot", picture)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "this job cannot be kept in a workbook" in outcome.err
+    assert "Traceback" not in outcome.err
+    assert not sheet.exists()
+    assert not picture.exists()
+
+
+def test_the_workbook_itself_is_not_overwritten(cli, tmp_path):
+    sheet = tmp_path / "sheet.xlsx"
+    assert cli("balance", TURBO / "job.toml", "--output", sheet).code == 0
+    before = sheet.read_bytes()
+    outcome = cli("balance", sheet, "--output", sheet)
+    assert outcome.code == 2
+    assert "must not be overwritten" in outcome.err
+    assert sheet.read_bytes() == before
+
+
+def test_the_form(cli, tmp_path):
+    form = tmp_path / "job.xlsx"
+    outcome = cli("balance", "--template", form)
+    assert outcome.code == 0, outcome.err
+    assert f"written: {form}" in outcome.out
+    empty = cli("balance", form)
+    assert (empty.code, empty.out) == (2, "")
+    assert empty.err.count("\n") == 1
+    assert "sheet 'runs'" in empty.err
+    assert "none are filled in yet" in empty.err
+    book = openpyxl.load_workbook(form)
+    for name in ("runs", "weights"):
+        lines = (DATA / "bk_two_plane" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        header, *body = [line.split(",") for line in lines if not line.startswith("#")]
+        for place, title in enumerate(header, start=1):
+            book[name].cell(1, place).value = title
+            for number, row in enumerate(body, start=2):
+                text = title in ("run", "sensor", "plane")
+                book[name].cell(number, place).value = row[place - 1] if text else float(row[place - 1])
+    book.save(form)
+    expected = answer(cli("balance", DATA / "bk_two_plane" / "job.toml", "--json"))
+    assert answer(cli("balance", form, "--json")) == expected
+    corrections = [(row["plane"], row["mass"], row["angle_deg"]) for row in expected["corrections"]]
+    assert corrections[0] == ("1", pytest.approx(2.951, rel=1e-3), pytest.approx(50.2, rel=1e-3))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--template", "form.csv"), "the name must end in .xlsx"),
+        (("--template", "there.xlsx"), "exists already, and may be filled in"),
+        (("--template", "none/form.xlsx"), "does not exist"),
+        ((TURBO / "job.toml", "--template", "form.xlsx"), "leave the job away"),
+        ((), "give a job"),
+    ],
+)
+def test_forms_that_are_refused(cli, tmp_path, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.xlsx").write_bytes(b"filled in")
+    outcome = cli("balance", *arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["there.xlsx"]
+    assert (tmp_path / "there.xlsx").read_bytes() == b"filled in"
+
+
+def test_only_weights_are_missing(cli, tmp_path):
+    form = tmp_path / "job.xlsx"
+    assert cli("balance", "--template", form).code == 0
+    book = openpyxl.load_workbook(form)
+    for place, value in enumerate(("initial", 3000, "1", 7.2, 238), start=1):
+        book["runs"].cell(2, place).value = value
+    book.save(form)
+    outcome = cli("balance", form)
+    assert outcome.code == 2
+    assert "weight" in outcome.err
+    assert "Traceback" not in outcome.err

@@ -1,0 +1,120 @@
+"""docs/files.md names every column and every key that the readers know."""
+
+import re
+
+import pytest
+
+import rotorid
+from rotorid.expressions import FUNCTIONS
+from rotorid.samples import sample_data
+from rotorid.tables import bearing, influence, jobbook, jobkeys, modes, rotor, runs, unbalance, weights
+from rotorid.tables.tomlfile import Section
+
+TEXT = (sample_data().parent / "docs" / "files.md").read_text(encoding="utf-8")
+WORDS = {word for code in re.findall(r"`([^`]+)`", TEXT) for word in re.findall(r"\w+", code)}
+NAMED_BY_USERS = {
+    "planes",
+    "sensors",
+    "slow_roll",
+    "estimate",
+    "known",
+    "initial",
+    "outputs",
+    "states",
+    "bounds",
+    "start",
+    "force",
+}
+JOB = """
+runs = "runs.csv"
+weights = "weights.csv"
+[errors]
+phase_deg = 2
+[key_phasor]
+angle_deg = 0
+[slow_roll."probe 1"]
+amplitude = 0
+phase_deg = 0
+[planes.left]
+[sensors."probe 1"]
+"""
+TABLES = {
+    "rotor": rotor.COLUMNS,
+    "bearing": bearing.COLUMNS,
+    "runs": runs.COLUMNS,
+    "weights": weights.COLUMNS,
+    "influence": influence.COLUMNS,
+    "unbalance": unbalance.COLUMNS,
+    "modes": modes.MODE_COLUMNS,
+    "compliance": modes.COMPLIANCE_COLUMNS,
+}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_column_of_a_table_is_described(table):
+    assert TABLES[table]
+    for column in TABLES[table]:
+        assert column.names[0] in WORDS, column.names
+
+
+def asked_for(monkeypatch, read, *files):
+    """The keys that a reader asks for, without the names that users choose."""
+    keys = set()
+    take = Section.take
+
+    def noted(self, key):
+        parts = [part for part in re.sub(r"\[\d+\]", "", self._prefix).split(".") if part]
+        if not (parts and parts[-1] in NAMED_BY_USERS):
+            keys.add(key)
+        return take(self, key)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Section, "take", noted)
+        for file in files:
+            read(file)
+    return keys
+
+
+@pytest.mark.parametrize(
+    ("read", "folder", "pattern", "least"),
+    [
+        (rotorid.read_job, "", "*_job/*.toml", 40),
+        (rotorid.read_rotor, "compressor", "rotor.toml", 45),
+        (rotorid.read_harmonic_model, "identify", "*/model.toml", 6),
+        (rotorid.read_ode_model, "fit", "*/model.toml", 15),
+    ],
+)
+def test_every_key_that_a_reader_asks_for_is_described(read, folder, pattern, least, monkeypatch):
+    files = sorted((sample_data() / folder).glob(pattern))
+    assert files
+    keys = asked_for(monkeypatch, read, *files)
+    assert len(keys) >= least
+    assert keys - WORDS == set()
+
+
+@pytest.mark.filterwarnings("ignore::rotorid.tables.TableWarning")
+def test_the_rarer_keys_of_a_job_are_described(tmp_path, monkeypatch):
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_bytes((sample_data() / "turbo_job" / name).read_bytes())
+    (tmp_path / "job.toml").write_text(JOB, encoding="utf-8")
+    keys = asked_for(monkeypatch, rotorid.read_job, tmp_path / "job.toml")
+    assert {"amplitude", "angle_deg", "floor", "forbidden_deg", "limit"} <= keys
+    assert keys - WORDS == set()
+
+
+def test_a_key_that_is_not_described_would_be_found(monkeypatch):
+    keys = asked_for(monkeypatch, rotorid.read_rotor, sample_data() / "compressor" / "rotor.toml")
+    assert (keys | {"mas_kg"}) - WORDS == {"mas_kg"}
+
+
+def test_every_sheet_and_every_column_of_a_workbook_is_described():
+    assert {*jobbook.TABLES, *jobbook.SETTINGS} <= WORDS
+    for sheet in ("planes", "sensors"):
+        columns = jobkeys.COLUMNS[sheet]
+        assert set(columns.usual) <= WORDS
+        for name in columns.more:  # in any unit: the beginning counts
+            assert any(name == word or name.startswith(word.rstrip("gm_") + "_") for word in WORDS), name
+
+
+def test_every_function_of_expressions_is_named():
+    assert set(FUNCTIONS) <= WORDS

@@ -1,0 +1,73 @@
+"""What the getting-started pages and the API pages tell a reader to type works as written."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from docs_blocks import blocks, commands, first_difference, run_page
+
+from rotorid.samples import sample_data
+
+DOCS = sample_data().parent / "docs"
+STARTS = sorted((DOCS / "getting_started").glob("*.md"))
+PAGES = [*STARTS, DOCS / "validation.md", *sorted((DOCS / "api").glob("*.md"))]
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    shutil.copytree(sample_data(), tmp_path / "sample_data")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_there_is_a_page_for_each_of_the_three_users():
+    assert {page.stem for page in STARTS} >= {"balancing", "rotor", "identification"}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
+def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplace, cli, capsys):
+    ran = run_page(page, workplace, cli, capsys)
+    assert ran == sum(
+        len(commands(block)) if block.kind == "console" else block.kind == "python" for block in blocks(page)
+    )
+    if page in STARTS:
+        assert ran >= 5
+        for block in blocks(page):
+            for command, _ in commands(block) if block.kind == "console" else ():
+                for target in re.findall(
+                    r"--(?:plot|output|report|model|state-space|template) (\S+)", command
+                ):
+                    assert (workplace / target).stat().st_size > 0, command
+
+
+@pytest.mark.parametrize(
+    ("expected", "wrong"),
+    [
+        (["a 1", "b 2"], None),
+        (["a 1", "...", "d 4"], None),
+        (["...", "b    2", "c 3"], None),
+        (["a 1", "c 3"], "c 3"),
+        (["b 2", "...", "a 1"], "a 1"),
+        (["a 2"], "a 2"),
+        (["...", "a 1", "x"], "x"),
+    ],
+)
+def test_a_line_that_is_not_printed_in_its_place_is_found(expected, wrong):
+    assert first_difference(expected, "a 1\n\nb  2\nc 3\nd 4\n") == wrong
+
+
+def test_a_wrong_number_on_a_page_is_found(tmp_path, workplace, cli, capsys):
+    text = (DOCS / "getting_started" / "rotor.md").read_text(encoding="utf-8")
+    page = tmp_path / "wrong.md"
+    page.write_text(text.replace("135.2404       1291.45", "135.2405       1291.45"), encoding="utf-8")
+    with pytest.raises(AssertionError, match=r"not printed: 1 135\.2405"):
+        run_page(page, workplace, cli, capsys)
+
+
+def test_every_file_that_a_page_shows_to_be_written_lies_beside_its_command():
+    shown = [
+        block for page in STARTS for block in blocks(page) if block.caption and block.caption != "prints"
+    ]
+    assert len(shown) >= 6
+    assert all(not Path(block.caption).is_absolute() and ".." not in block.caption for block in shown)

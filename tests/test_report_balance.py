@@ -1,0 +1,563 @@
+"""The balancing sheet: its numbers are those of the document, and it can be used without the program."""
+
+import doctest
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from balancing import correct
+from balancing.check import compare_check
+from balancing.labels import Labels
+from balancing.mounted import mount
+from rotorid.cli.balance_report import Report
+from rotorid.cli.coefficients import choose
+from rotorid.cli.common import provenance
+from rotorid.cli.verdict import Places, judge, tolerance_of
+from rotorid.report import balance, conventions, page
+from rotorid.report.balance_data import sheet_data
+from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
+from rotorid.tables import read_job
+
+DATA = Path(__file__).parents[1] / "sample_data"
+VOID = {"meta", "link", "br", "img", "input", "hr"}
+SETTINGS = """
+runs = "runs.csv"
+weights = "weights.csv"
+phase = "lag"
+angles = "counter-clockwise"
+rotation = "clockwise"
+view = "drive end"
+[key_phasor]
+angle_deg = 40
+[errors]
+amplitude_percent = 1
+phase_deg = 1
+[slow_roll."probe 1"]
+amplitude = 0.3
+phase_deg = 35
+[planes.left]
+radius_mm = 120
+holes = 12
+available_g_mm = [50, 100, 150]
+per_hole = 3
+max_unbalance_g_mm = 500
+[planes.middle]
+radius_mm = 100
+remove = true
+holes = 24
+available_g_mm = [50, 100]
+per_hole = 2
+[planes.right]
+max_unbalance_g_mm = 500
+forbidden_deg = [[20, 60]]
+[sensors."probe 1"]
+limit = 0.8
+[sensors."probe 3"]
+limit = 60
+"""
+
+
+class Sheet(HTMLParser):
+    """Texts by data-key, ids, references, sections in their order, cells of numbers."""
+
+    def __init__(self, made):
+        super().__init__()
+        self.open, self.shown, self.ids, self.targets = [], [], [], []
+        self.script, self.cells = "", []
+        self.feed(made)
+        self.document = json.loads(self.script)
+
+    def handle_starttag(self, tag, attrs):
+        attrs = dict(attrs)
+        if "id" in attrs:
+            self.ids.append(attrs["id"])
+        for name in ("href", "xlink:href"):
+            if name in attrs:
+                self.targets.append(attrs[name])
+        self.targets += re.findall(r"url\((.*?)\)", " ".join(v or "" for v in attrs.values()))
+        if tag == "td":
+            self.cells.append({"class": attrs.get("class", ""), "text": "", "keys": 0})
+        if "data-key" in attrs:
+            self.shown.append([attrs["data-key"], ""])
+            if any(t == "td" for t, _ in self.open):
+                self.cells[-1]["keys"] += 1
+        if tag not in VOID:
+            self.open.append((tag, attrs))
+
+    def handle_endtag(self, tag):
+        while self.open and self.open.pop()[0] != tag:
+            pass
+
+    def handle_data(self, data):
+        tags = [tag for tag, _ in self.open]
+        if "script" in tags:
+            self.script += data
+        if tags and tags[-1] == "span" and "data-key" in self.open[-1][1]:
+            self.shown[-1][1] += data
+        if "td" in tags:
+            self.cells[-1]["text"] += data
+
+
+def value_at(document, key):
+    for part in key.split("."):
+        document = document[int(part)] if isinstance(document, list) else document[part]
+    return document
+
+
+def parts_of(path, *, split=False, refine=False, grade=(None, None, None), **settings):
+    """Everything that the command makes of a job, as the command makes it."""
+    job = read_job(path, **settings)
+    found = choose(job, None, None, refined=refine)
+    result = correct(
+        found.influence,
+        baseline=found.baseline,
+        planes=list(found.used),
+        limits=job.limits_of(found.influence.planes),
+        row_weights=job.row_weights,
+        remove=sorted(job.remove),
+    )
+    report = Report(result, found.influence)
+    if split:
+        report.mounted = mount(
+            result, found.influence, found.baseline, job.holes, row_weights=job.row_weights, on_top=refine
+        )
+    if job.check is not None and not refine:
+        report.check = compare_check(result, job.check, found.influence, found.baseline)
+    tolerance = tolerance_of(*grade, result.planes, Places(None, None, None))
+    report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
+    return job, report
+
+
+def sheet_of(path, **options):
+    job, report = parts_of(path, **options)
+    made = balance.balance_report(
+        report.to_dict(),
+        report.result,
+        report.influence,
+        job,
+        provenance(job.files, {"split": options.get("split", False)}),
+        mounted=report.mounted,
+        verdict=report.verdict,
+    ).decode()
+    return made, Sheet(made), report, job
+
+
+def hard(folder, drop=""):
+    for name in ("runs.csv", "weights.csv"):
+        (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    (folder / "hard.toml").write_text(SETTINGS.replace(drop, "") if drop else SETTINGS)
+    return folder / "hard.toml"
+
+
+def on_top(folder):
+    """After a check run whose weights stay: further pieces in other holes."""
+    for name in ("runs.csv", "weights.csv", "check.csv", "check_weights.csv"):
+        (folder / name).write_text((DATA / "turbo_job" / name).read_text())
+    planes = "".join(
+        f"[planes.{plane}]\nholes = 12\navailable_g_mm = [5, 10]\ntaken = {{ '{hole}' = {size} }}\n"
+        for plane, hole, size in (("left", 7, 417), ("middle", 10, 282), ("right", 1, 448))
+    )
+    (folder / "job.toml").write_text((DATA / "turbo_job" / "checked.toml").read_text() + planes)
+    return folder / "job.toml"
+
+
+JOBS = {
+    "turbo": ("turbo_job/job.toml", {}),
+    "checked": ("turbo_job/checked.toml", {}),
+    "refined": ("turbo_job/checked.toml", {"refine": True}),
+    "on top": ("on top", {"split": True, "refine": True}),
+    "holes": ("turbo_job/holes.toml", {"split": True}),
+    "bk": ("bk_two_plane/job.toml", {"grade": ("G6.3", "500kg", "3000rpm"), "radius": True}),
+    "left in": ("left_in/job.toml", {}),
+    "model": ("model_job/job.toml", {}),
+    "hard": ("hard", {}),
+    "hard, holes": ("hard", {"split": True}),
+}
+
+
+@pytest.fixture(scope="module", params=JOBS)
+def made(request, tmp_path_factory):
+    name, options = JOBS[request.param]
+    options = dict(options)
+    folder = tmp_path_factory.mktemp("job")
+    if name == "hard":
+        path = hard(folder, "forbidden_deg = [[20, 60]]" if options else "")
+    elif name == "on top":
+        path = on_top(folder)
+    elif options.pop("radius", False):
+        for file in ("runs.csv", "weights.csv", "job.toml"):
+            (folder / file).write_text((DATA / "bk_two_plane" / file).read_text())
+        path = folder / "job.toml"
+        radii = "".join(f"\n[planes.{p}]\nradius_mm = 100\n" for p in (1, 2))
+        path.write_text(path.read_text() + radii)
+    else:
+        path = DATA / name
+    return sheet_of(path, **options)
+
+
+def test_every_number_shown_is_that_of_the_document(made):
+    _, sheet, _, _ = made
+    assert len(sheet.shown) > 30
+    for key, text in sheet.shown:
+        value = value_at(sheet.document, key)
+        if value is None:
+            assert text == "–", key
+            continue
+        number = re.fullmatch(r"(-?[\d.]+(?:e[-+]\d+)?)(°|\u202f%)?", text)
+        assert number, (key, text)
+        mantissa, _, exponent = number.group(1).partition("e")
+        last = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+        if "." not in mantissa and not exponent:  # 23900 with three digits
+            last *= 10.0 ** (len(mantissa) - len(mantissa.rstrip("0")))
+        apart = abs(float(number.group(1)) - value)
+        if number.group(2) == "°":
+            apart = min(apart, abs(apart - 360.0))
+        assert apart <= 0.5 * last * (1 + 1e-9) + 1e-9 * abs(value), (key, text, value)
+
+
+def test_every_cell_of_numbers_names_its_place_in_the_document(made):
+    _, sheet, _, _ = made
+    plain = {"nothing", "unknown", "not determined", "at its limit", "", "–"}
+    numbers = [cell for cell in sheet.cells if "n" in cell["class"].split()]
+    assert len(numbers) > 20
+    assert [c for c in numbers if not c["keys"] and c["text"].strip() not in plain] == []
+
+
+def test_the_document_inside_is_that_of_the_command(made):
+    _, sheet, report, _ = made
+    inside = dict(sheet.document)
+    assert inside.pop("provenance")["program"] == "rotorid"
+    assert set(inside.pop("sheet")) == {
+        "machine",
+        "runs",
+        "slow_roll",
+        "influence",
+        "corrections",
+        "add",
+        "residuals",
+    }
+    assert inside == json.loads(json.dumps(report.to_dict()))
+
+
+def test_nothing_of_the_result_is_left_out(made):
+    _, sheet, report, job = made
+    keys = {key for key, _ in sheet.shown}
+    document, result = sheet.document, report.result
+    S, C = result.before.shape
+    for i, row in enumerate(document["sheet"]["residuals"]):
+        assert {f"sheet.residuals.{i}.{k}" for k in ("before", "before_phase_deg", "after")} <= keys
+        assert (f"sheet.residuals.{i}.within_95" in keys) == (row["within_95"] is not None)
+        assert (row["limit"] is None) or f"sheet.residuals.{i}.limit" in keys
+    assert len(document["sheet"]["residuals"]) == S * C
+    for i in range(len(result.planes)):
+        assert {f"corrections.{i}.mass", f"sheet.corrections.{i}.place_deg"} <= keys
+        if result.covariance is not None and report.mounted is None:
+            assert f"sheet.corrections.{i}.mass_95" in keys
+    for i in range(report.influence.W.size):
+        assert {f"sheet.influence.rows.{i}.influence", f"sheet.influence.rows.{i}.phase_deg"} <= keys
+    for r, run in enumerate(document["sheet"]["runs"]):
+        assert {f"sheet.runs.{r}.weights.{w}.mass" for w in range(len(run["weights"]))} <= keys
+        readings = {f"sheet.runs.{r}.readings.{i}.values.0.amplitude" for i in range(len(run["readings"]))}
+        assert readings <= keys
+    assert len(document["sheet"]["runs"]) == len(job.trials.runs)
+    for i in range(len(document.get("mounting", {"holes": []})["holes"])):
+        assert {f"mounting.holes.{i}.mass", f"mounting.holes.{i}.angle_deg"} <= keys
+    for i in range(len(document.get("verdict", {"rows": []})["rows"])):
+        assert {f"verdict.rows.{i}.size", f"verdict.rows.{i}.limit"} <= keys
+    for i in range(len(document.get("check", {"readings": []})["readings"])):
+        assert {f"check.readings.{i}.predicted", f"check.readings.{i}.achieved"} <= keys
+
+
+def test_it_refers_to_nothing_outside_and_ids_are_unique(made):
+    text, sheet, _, _ = made
+    assert text.count("http") == text.count('xmlns="http://www.w3.org/2000/svg"') >= 4
+    assert len(sheet.ids) == len(set(sheet.ids))
+    own = {f"#{name}" for name in sheet.ids}
+    assert set(sheet.targets) - {"data:,"} <= own
+    assert not re.search(r"\bsrc=|@import|<style[^>]*>[^<]*url\(", text)
+
+
+def test_warnings_come_before_results(made):
+    text, sheet, report, _ = made
+    order = [name for name in sheet.ids if not name.startswith("f")]
+    assert order[:4] == ["warnings", "in-short", "machine", "conventions"]
+    assert order[-2:] == ["provenance", "result"]
+    head = text[: text.index('id="in-short"')]
+    first = re.sub(r"<[^>]*>", "", head).replace("&#39;", "'").replace("&#34;", '"').replace("&gt;", ">")
+    for warning in report.result.warnings + (report.verdict.warnings if report.verdict else ()):
+        assert balance.sentence(warning) in first
+    if not report.result.warnings and report.verdict is None:
+        assert "No warnings." in first
+
+
+def test_there_is_room_for_check_readings_and_a_signature(made):
+    text, sheet, report, _ = made
+    blank = [cell for cell in sheet.cells if cell["class"] == "write"]
+    assert len(blank) == 2 * report.result.before.size
+    assert all(cell["text"] == "" for cell in blank)
+    assert text.count('class="tall"') == 3
+    for word in ("date", "name", "signature", "amplitude read", "phase read"):
+        assert f"<th>{word}</th>" in text
+
+
+def test_each_plane_is_drawn_from_a_stated_end(made):
+    text, _, report, _ = made
+    labels = report.result.labels
+    for plane in report.result.planes:
+        what = "take away" if plane in report.result.remove else "add"
+        assert f'aria-label="Plane {plane}, {conventions.seen_from(labels)}: what to {what}"' in text
+    assert text.count("<svg") == 3 + len(report.result.planes)
+
+
+def test_a_job_as_its_files_have_it():
+    text, sheet, _, _ = sheet_of(DATA / "bk_two_plane" / "job.toml")
+    assert "<h1>Balancing sheet: bk_two_plane</h1>" in text
+    runs = sheet.document["sheet"]["runs"]
+    rows = [line.split(",") for line in (DATA / "bk_two_plane" / "runs.csv").read_text().splitlines()]
+    rows = [row for row in rows if not row[0].startswith("#") and row[0] != "run"]
+    found = [
+        (run["run"], r["speed_rpm"], r["sensor"], v["amplitude"], v["phase_deg"])
+        for run in runs
+        for r in run["readings"]
+        for v in r["values"]
+    ]
+    assert len(found) == len(rows)
+    for (run, speed, sensor, size, phase), row in zip(found, rows, strict=True):
+        assert (run, sensor) == (row[0], row[2])
+        assert (speed, size, phase) == pytest.approx([float(row[k]) for k in (1, 3, 4)], rel=1e-12)
+    Y = {(r[0], r[2]): float(r[3]) * np.exp(1j * np.radians(float(r[4]))) for r in rows}
+    weights = {run["run"]: run["weights"] for run in runs}
+    for row in sheet.document["sheet"]["influence"]["rows"]:
+        trial = next(run for run in weights if any(w["plane"] == row["plane"] for w in weights[run]))
+        (w,) = weights[trial]
+        T = w["mass"] * np.exp(1j * np.radians(w["angle_deg"]))
+        alpha = (Y[trial, row["sensor"]] - Y[runs[0]["run"], row["sensor"]]) / T
+        assert row["influence"] == pytest.approx(abs(alpha), rel=1e-9)
+        assert row["influence"] * np.exp(1j * np.radians(row["phase_deg"])) == pytest.approx(alpha, rel=1e-9)
+        assert row["influence_95_percent"] is None
+
+
+def test_errors_of_coefficients_follow_from_the_readings():
+    _, sheet, _, job = sheet_of(
+        DATA / "bk_two_plane" / "job.toml", amplitude_error_percent=3.0, phase_error_deg=0.5
+    )
+    Y, T = job.trials.mean[:, 0], job.trials.weights
+    for i, row in enumerate(sheet.document["sheet"]["influence"]["rows"]):
+        c, p = divmod(i, 2)
+        alpha = (Y[p + 1, c] - Y[0, c]) / T[p + 1, p]
+        variance = np.zeros(2)
+        for reading in (Y[0, c], Y[p + 1, c]):
+            # along a reading it is off by 3 % of itself, across by 0.5°: seen along and across alpha
+            share = reading / T[p + 1, p] / (alpha / abs(alpha))
+            e, f = 0.03 * share, 1j * np.radians(0.5) * share
+            variance += [e.real**2 + f.real**2, e.imag**2 + f.imag**2]
+        along, across = 1.959964 * np.sqrt(variance) / abs(alpha)
+        assert row["influence_95_percent"] == pytest.approx(100 * along, rel=1e-6)
+        assert row["phase_95_deg"] == pytest.approx(np.degrees(across), rel=1e-6)
+
+
+def test_removal_slow_roll_radii_and_limits(tmp_path):
+    text, sheet, report, job = sheet_of(hard(tmp_path))
+    own, document = sheet.document["sheet"], sheet.document
+    middle = next(i for i, row in enumerate(document["corrections"]) if row["plane"] == "middle")
+    row = document["corrections"][middle]
+    assert own["corrections"][middle]["place_deg"] == pytest.approx(row["remove_at_deg"], abs=1e-9)
+    assert (row["remove_at_deg"] - row["angle_deg"]) % 360 == pytest.approx(180)
+    assert own["corrections"][middle]["mass_at_radius"] == pytest.approx(row["mass"] / 100)
+    assert own["corrections"][0]["mass_at_radius"] == pytest.approx(document["corrections"][0]["mass"] / 120)
+    assert own["corrections"][2]["mass_at_radius"] is None
+    assert "take away from plane <strong>middle</strong>" in re.sub(r"\s+", " ", text)
+    assert own["slow_roll"][0]["amplitude"] == pytest.approx(0.3)
+    assert own["slow_roll"][0]["phase_deg"] == pytest.approx(35)
+    # the file says 3.36 at 89° (lag): what is left has the slow roll taken off
+    left = 3.36 * np.exp(1j * np.radians(89)) - 0.3 * np.exp(1j * np.radians(35))
+    first = own["runs"][0]["readings"][0]["values"][0]
+    assert first["amplitude"] * np.exp(1j * np.radians(first["phase_deg"])) == pytest.approx(left, rel=1e-9)
+    assert own["machine"]["planes"][2]["forbidden_deg"] == [[20.0, 60.0]]
+    assert own["machine"]["planes"][2]["max_weight"] == pytest.approx(500)
+    assert [own["residuals"][k]["limit"] for k in range(4)] == pytest.approx([0.8, None, 60.0, None])
+    assert document["verdict"]["verdict"] != "pass"
+    assert "seen from the drive end, where the rotor turns clockwise" in text
+    assert "phase read" in text
+    assert "phase as lag" in text
+    assert job.key_phasor == -40.0
+    assert "at 40° from x" in text
+    assert report.result.remove == ("middle",)
+
+
+def test_names_are_neither_formulas_nor_markup(tmp_path):
+    for name in ("runs.csv", "weights.csv"):
+        text = (
+            (DATA / "left_in" / name)
+            .read_text()
+            .replace("probe 1", "A$_1$ <i>")
+            .replace(",2,3.7", ",$<b>$,3.7")
+        )
+        (tmp_path / name).write_text(text)
+    (tmp_path / "job.toml").write_text((DATA / "left_in" / "job.toml").read_text())
+    text, sheet, report, _ = sheet_of(tmp_path / "job.toml")
+    assert report.result.planes[1] == "$<b>$"
+    assert "<b>" not in text[: text.index("<script")]
+    assert "$&lt;b&gt;$" in text
+    assert "A$_1$ &lt;i&gt;" in text
+    assert sheet.document["residuals"][0]["sensor"] == "A$_1$ <i>"
+    rows = sheet.document["sheet"]["residuals"]
+    ax = residual_figure(rows, "").axes[0]
+    assert ax.get_yticklabels()[0].get_text() == r"A\$_1\$ <i>"
+
+
+def test_a_verdict_that_fails_is_a_warning():
+    document = {
+        "warnings": ["first", "twice"],
+        "check": {"warnings": ["twice"], "explained": False, "verdict": "not explained"},
+        "verdict": {"verdict": "fail", "source": "check run x", "warnings": ["third"]},
+    }
+    assert balance._warnings(document) == [
+        "The limits are not kept: the verdict (check run x) is fail.",
+        "First.",
+        "Twice.",
+        "Third.",
+        "Check run: not explained.",
+    ]
+
+
+def test_what_stays_mounted_is_said(tmp_path):
+    text, sheet, report, _ = sheet_of(DATA / "left_in" / "job.toml")
+    add = sheet.document["sheet"]["add"]
+    assert "Instead, only if the weights of run “second weight” stay mounted" in text
+    for row, known in zip(add, sheet.document["add_to_mounted"], strict=True):
+        assert (row["mass"], row["place_deg"]) == pytest.approx((known["mass"], known["angle_deg"]))
+    assert report.mounted is None
+    # without weights in the last run there is nothing to choose
+    _, without, _, _ = sheet_of(DATA / "model_job" / "job.toml")
+    assert without.document["sheet"]["add"] is None
+
+
+def test_pieces_on_top_of_a_check_run_say_what_stays(tmp_path):
+    text, sheet, report, _ = sheet_of(on_top(tmp_path), split=True, refine=True)
+    words = re.sub(r"\s+", " ", text)
+    assert report.mounted.on_top_of == "check"
+    assert "Leave everything mounted that was mounted in run “check”." in words
+    assert "Wanted in addition to the weights of run “check”" in words
+    assert "Remove every trial weight" not in words
+    drawn = plane_figure(report.result, "left", mounted=report.mounted).axes[0]
+    want = sheet.document["add_to_mounted"][0]
+    said = "\n".join(t.get_text() for t in drawn.texts)
+    assert f"wanted (dashed): {want['mass']:.2f} g·mm at {want['angle_deg']:.1f}°" in said
+
+
+def test_pieces_are_drawn_in_their_holes():
+    from matplotlib.patches import Circle
+
+    _, report = parts_of(DATA / "turbo_job" / "holes.toml", split=True)
+    for plane in report.result.planes:
+        drawn = plane_figure(report.result, plane, mounted=report.mounted)
+        full = [
+            p for p in drawn.axes[0].patches if isinstance(p, Circle) and p.get_facecolor()[:3] == (0.2,) * 3
+        ]
+        rows = [row for row in report.mounted.to_dict()["holes"] if row["plane"] == plane]
+        angles = sorted(np.degrees(np.angle(complex(*p.center))) % 360 for p in full)
+        assert angles == pytest.approx(sorted(row["angle_deg"] for row in rows), abs=1e-6)
+
+
+def test_only_the_largest_readings_of_many_are_drawn():
+    rows = [
+        {
+            "speed_rpm": 1000.0 + k,
+            "sensor": "A",
+            "before": 1.0 + k,
+            "after": 0.5,
+            "within_95": None,
+            "limit": None,
+        }
+        for k in range(ROWS_SHOWN + 30)
+    ]
+    ax = residual_figure(rows, "µm pp").axes[0]
+    assert len(ax.get_yticks()) == ROWS_SHOWN
+    assert min(bar.get_width() for bar in ax.patches) == 31.0
+    assert len(residual_figure(rows[:3], "").axes[0].get_yticks()) == 3
+
+
+@pytest.mark.parametrize("rotation", ["clockwise", "counter-clockwise"])
+@pytest.mark.parametrize("angles", ["with rotation", "against rotation"])
+@pytest.mark.parametrize("key", [0.0, 130.0])
+def test_the_weight_of_the_figure_stands_where_its_angle_says(rotation, angles, key):
+    from matplotlib.patches import Circle
+
+    labels = Labels(rotation=rotation, angles=angles)
+    ax = conventions.rotor_figure(labels, {"A": 30.0, "B": 120.0}, key).axes[0]
+    weight = next(p for p in ax.patches if isinstance(p, Circle) and p.radius < 0.5)
+    ccw = 1 if rotation == "counter-clockwise" else -1
+    same = 1 if angles == "with rotation" else -1
+    expected = (ccw * key + ccw * same * 60.0) % 360
+    assert np.degrees(np.angle(complex(*weight.center))) % 360 == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize(("phase", "peak"), [("lag", 60.0), ("lead", 300.0)])
+def test_the_peak_of_the_figure_stands_where_the_phase_says(phase, peak):
+    line = conventions.phase_figure(Labels(phase=phase)).axes[0].lines[0]
+    turn, reading = line.get_data()
+    inside = (turn >= 0) & (turn < 360)
+    found = turn[inside][np.argmax(reading[inside])]
+    assert found == pytest.approx(peak, abs=1.2)
+
+
+def test_words_of_the_conventions():
+    said = dict(conventions.words(Labels(phase="lag", angles="against rotation"), {}, None))
+    assert said["Rotation"].startswith("the job does not say which way the rotor turns")
+    assert "against the rotation" in said["Angles of weights"]
+    assert said["Phase"].startswith("lag: the angle by which the rotor turns from the pulse")
+    assert "not stated" in said["Sensors"]
+    labels = Labels(rotation="clockwise", view="free end", clock=True, vibration_unit="mm_s_rms")
+    said = dict(conventions.words(labels, {"A": 30.0}, 90.0))
+    assert said["Rotation"] == "clockwise seen from the free end."
+    assert "clockwise seen from the free end, which is with the rotation" in said["Angles of weights"]
+    assert said["Sensors"].startswith("A at 30°")
+    assert said["Key phasor"].startswith("at 90° from x")
+    assert said["Vibration"] == "in mm/s rms (rms), the part that turns with the rotor (1×)."
+    turned = dict(conventions.words(Labels(angles="against rotation"), {"A": 30.0}, 90.0))
+    assert turned["Sensors"].startswith("A at 330°")
+    assert turned["Key phasor"].startswith("at 270° from x")
+
+
+@pytest.mark.parametrize(
+    ("phase", "angles", "turn"),
+    [
+        ("lead", "with rotation", "is added to"),
+        ("lag", "with rotation", "is taken from"),
+        ("lead", "against rotation", "is taken from"),
+        ("lag", "against rotation", "is added to"),
+    ],
+)
+def test_a_reader_can_predict_a_reading_by_hand(phase, angles, turn):
+    job, report = parts_of(DATA / "turbo_job" / "job.toml", phase=phase, angles=angles)
+    assert balance._turn(report.result) == turn
+    data = sheet_data(report.result, report.influence, job)
+    sign = 1 if turn == "is added to" else -1
+    start, weight = data["runs"][0]["readings"][5], data["runs"][2]["weights"][0]
+    row = next(
+        r
+        for r in data["influence"]["rows"]
+        if (r["speed_rpm"], r["sensor"], r["plane"]) == (start["speed_rpm"], start["sensor"], weight["plane"])
+    )
+
+    def vector(size, degrees):
+        return size * np.exp(1j * np.radians(degrees))
+
+    bare = start["values"][0]
+    caused = vector(row["influence"] * weight["mass"], row["phase_deg"] + sign * weight["angle_deg"])
+    read = data["runs"][2]["readings"][5]["values"][0]
+    assert vector(bare["amplitude"], bare["phase_deg"]) + caused == pytest.approx(
+        vector(read["amplitude"], read["phase_deg"]), rel=1e-9
+    )
+
+
+def test_examples_in_the_docstrings():
+    for module in (page, conventions, balance):
+        failed, tried = doctest.testmod(module)
+        assert failed == 0
+        assert tried > 0

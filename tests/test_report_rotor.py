@@ -1,0 +1,260 @@
+"""Sheets of critical, response and reduce: the document's numbers, the rotor's data, nothing from outside."""
+
+import html
+import re
+
+import numpy as np
+import pytest
+from sheets import COMMANDS, Shown, disagreement, disagreements, make, read_sheet, run
+
+import fem
+from rotorid.report.grids import Numbers, evenly, every_warning
+from rotorid.report.inputs import rotor_sheet, unbalance_table
+from rotorid.report.rotor import critical_report
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+MINE = [name for name in COMMANDS if not name.startswith("balance")]
+PROVENANCE = {"program": "rotorid", "version": "1", "date": "2026-01-01", "inputs": [], "options": {}}
+
+
+def rows_of(sheet, caption):
+    """Cells of the table with this caption, tags taken away."""
+    table = next(part for part in sheet.text.split("<table")[1:] if f"<caption>{caption}" in part)
+    body = table.split("<tbody>")[1].split("</tbody>")[0]
+    return [
+        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)]
+        for row in body.split("</tr>")[:-1]
+    ]
+
+
+@pytest.mark.parametrize("name", MINE)
+def test_the_sheet_holds_the_printed_document_and_shows_its_numbers(name):
+    made = make(name)
+    sheet = read_sheet(made.html)
+    assert sheet.document == made.document
+    assert len(sheet.shown) > 20
+    assert disagreements(sheet.shown, sheet.document) == []
+
+
+@pytest.mark.parametrize("name", MINE)
+def test_nothing_from_outside_and_ids_once(name):
+    sheet = read_sheet(make(name).html)
+    assert not [r for r in sheet.references if not r.startswith(("#", "data:"))]
+    assert sheet.text.replace('xmlns="http://www.w3.org/2000/svg"', "").count("http") == 0
+    assert len(sheet.ids) == len(set(sheet.ids))
+    assert [tag for tag, *_ in sheet.order].count("script") == 1
+
+
+@pytest.mark.parametrize("name", MINE)
+def test_warnings_stand_before_everything_else(name):
+    sheet = read_sheet(make(name).html)
+    place = {key: i for i, (tag, ident, _) in reversed([*enumerate(sheet.order)]) for key in (tag, ident)}
+    assert place["warnings"] < min(place[key] for key in ("table", "svg", "main", "provenance"))
+    listed = html.unescape(sheet.text.split("<main>")[0])
+    assert [warning for warning in every_warning(sheet.document) if warning not in listed] == []
+
+
+def test_critical_speeds_inside_the_operating_range_are_warned_of():
+    sheet = read_sheet(make("critical").html)
+    rows = sheet.document["operating"]["critical_speeds"]
+    inside = [k for k, row in enumerate(rows, start=1) if row["inside"]]
+    assert inside == [1, 2]
+    said = re.findall(r"critical speed (\d+), [\d.]+ rpm, lies inside the operating range", sheet.text)
+    assert [int(k) for k in said] == inside
+    table = rows_of(sheet, "Where the frequency of free whirl")
+    assert [row[5] == "INSIDE" for row in table] == [row["inside"] for row in rows]
+
+
+def test_every_critical_speed_and_shape_is_shown():
+    sheet = read_sheet(make("critical table").html)
+    count, nodes = len(sheet.document["mode_shapes"]), len(sheet.document["positions_m"])
+    assert (count, nodes) == (5, 24)
+    assert {f"mode_shapes.{k}.{i}" for k in range(count) for i in range(nodes)} <= sheet.keys
+    for key in ("critical_speeds_rad_s", "critical_speeds_rpm"):
+        assert {f"{key}.{k}" for k in range(count)} <= sheet.keys
+    hertz = [s for s in sheet.shown if s.key == "critical_speeds_rad_s.0" and s.scale != 1]
+    assert float(hertz[0].text) == pytest.approx(135.2404 / (2 * np.pi), abs=1e-4)
+
+
+def test_the_rotor_is_written_down_as_it_was_read():
+    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
+    sheet = read_sheet(make("critical").html)
+    shaft = rows_of(sheet, "Shaft")
+    assert len(shaft) == rotor.n_elements
+    assert [float(row[2]) for row in shaft] == pytest.approx(1e3 * rotor.length, rel=1e-6)
+    assert [float(row[3]) for row in shaft] == pytest.approx(1e3 * rotor.outer_diameter, rel=1e-6)
+    discs = {row[1]: row for row in rows_of(sheet, "Discs")}
+    for disc in rotor.discs:
+        assert int(discs[disc.name][0]) == disc.node
+        numbers = [float(cell) for cell in discs[disc.name][2:]]
+        assert numbers == pytest.approx([disc.mass, disc.polar_inertia, disc.diametral_inertia], rel=1e-5)
+    supports = rows_of(sheet, "Supports")
+    assert [row[0].split()[0] for row in supports] == [str(s.node) for s in rotor.supports]
+    assert "pedestal 900 kg, 7e+08 and 1.2e+09 N/m (x and y), 20000 N·s/m" in supports[1][4]
+    k, _ = rotor.supports[0].at(rotor.supports[0].speeds)
+    table = rows_of(sheet, "Stiffness, MN/m: bearing DE, bearing NDE")
+    shown = np.array([[float(cell.replace("−", "-")) for cell in row] for row in table])
+    assert shown[:, 1:] == pytest.approx(k.reshape(-1, 4) / 1e6, rel=1e-5)
+    assert shown[:, 0] == pytest.approx(np.array(rotor.supports[0].speeds) * 30 / np.pi, rel=1e-5)
+
+
+def test_bores_materials_and_springs_that_differ_get_their_columns():
+    rotor = fem.Rotor(
+        [0.2, 0.3],
+        [0.05, 0.06],
+        [0.0, 0.02],
+        youngs_modulus=[2.1e11, 7e10],
+        discs=[fem.Disc(2, 4.0)],
+        supports=[
+            fem.Support(1, ((1e6, 2e5), (-2e5, 1e6)), 10.0),
+            fem.Support(3, 2e6, tilting_stiffness=50.0),
+        ],
+    )
+    grids = {grid.caption.split(",")[0]: grid for grid in rotor_sheet(rotor).tables}
+    assert grids["Shaft"].heads[-2:] == ("bore, mm", "Young's modulus, GPa")
+    assert grids["Shaft"].rows[1] == ("2", "0.2", "300", "60", "20", "70")
+    assert grids["Discs and masses"].rows == (("2", "4"),)
+    first, second = grids["Supports"].rows
+    assert first[2:] == ("xx 1e+06, xy 200000, yx -200000, yy 1e+06", "10", "–")
+    assert second[2:] == ("2e+06", "0", "tilting 50 N·m/rad")
+
+
+def test_unbalance_is_printed_in_gram_millimetres_with_the_rotation():
+    rotor = fem.Rotor([0.2, 0.3], 0.05, stations={"fan": 2})
+    grid = unbalance_table(rotor, {3: -2e-5j, 2: 1e-4})
+    assert grid.rows == (("2 (fan)", "0.2", "100", "0"), ("3", "0.5", "20", "270"))
+
+
+def test_the_response_shows_peaks_margins_and_forces():
+    sheet = read_sheet(make("response").html)
+    peaks = sheet.document["peaks"]
+    assert len(peaks) == 6
+    for key in ("speed_rpm", "amplification_factor", "separation_margin_percent", "required_margin_percent"):
+        assert {f"peaks.{k}.{key}" for k in range(6)} <= sheet.keys
+    words = {True: "enough", False: "NOT ENOUGH", None: "–"}
+    assert [row[-1] for row in rows_of(sheet, "Peaks")] == [words[p["enough"]] for p in peaks]
+    assert {f"bearing_forces.largest_N.{k}" for k in range(3)} <= sheet.keys
+    micro = next(s for s in sheet.shown if s.key == "largest.0.amplitude_m")
+    assert float(micro.text) == pytest.approx(1e6 * sheet.document["largest"][0]["amplitude_m"], rel=1e-3)
+
+
+def test_a_margin_that_is_too_small_is_a_warning(tmp_path):
+    folder = sample_data() / "compressor"
+    made = run(
+        "response", folder / "rotor.toml", "--unbalance", folder / "unbalance.csv", "--speeds",
+        "3000:6000:200rpm", "--sensors", "probe DE:45", "--operating", "4600:5600rpm",
+        report=tmp_path / "sheet.html",
+    )  # fmt: skip
+    short = [peak for peak in made.document["peaks"] if peak["enough"] is False]
+    listed = read_sheet(made.html).text.split("<main>")[0]
+    assert short
+    for peak in short:
+        assert f"peak at {peak['speed_rpm']:.6g} rpm" in listed
+        assert f"API 684 requires {peak['required_margin_percent']:.1f} %" in listed
+
+
+def test_two_speeds_have_a_sheet_without_peaks(tmp_path):
+    folder = sample_data() / "compressor"
+    made = run(
+        "response", folder / "rotor.toml", "--unbalance", folder / "unbalance.csv",
+        "--speeds", "3000,4000rpm",
+        report=tmp_path / "sheet.html",
+    )  # fmt: skip
+    sheet = read_sheet(made.html)
+    assert made.document["peaks"] == []
+    assert "<caption>Peaks" not in sheet.text
+    assert disagreements(sheet.shown, sheet.document) == []
+
+
+def test_a_free_rotor_has_rigid_body_modes_and_no_supports():
+    modes = fem.critical_speeds(fem.Rotor([0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0)]), 3)
+    sheet = read_sheet(critical_report(modes.to_dict(), modes, provenance=PROVENANCE))
+    table = rows_of(sheet, "Where the frequency of free whirl")
+    assert [row[4] for row in table] == ["rigid body", "rigid body", "forward"]
+    assert "<caption>Supports" not in sheet.text
+
+
+def test_names_are_text_not_markup():
+    name = '<img src=x onerror="alert(1)">&'
+    rotor = fem.Rotor(
+        [0.3, 0.3], 0.05, discs=[fem.Disc(2, 3.0, name=name)], stations={name: 2},
+        supports=[fem.Support(1, 1e7, name=name), fem.Support(3, 1e7)],
+    )  # fmt: skip
+    modes = fem.critical_speeds(rotor, 1)
+    sheet = read_sheet(critical_report(modes.to_dict(), modes, provenance=PROVENANCE))
+    assert "img" not in [tag for tag, *_ in sheet.order]
+    assert sheet.text.count("&lt;img src=x onerror=&#34;alert(1)&#34;&gt;&amp;") >= 3
+
+
+def test_the_reduction_shows_masses_modes_and_comparisons():
+    sheet = read_sheet(make("reduce").html)
+    document = sheet.document
+    for key in ("masses_kg", "natural_frequencies_rad_s", "rotor_frequencies_rad_s", "relative_error", "mac"):
+        assert {f"{key}.{k}" for k in range(3)} <= sheet.keys
+    assert {f"compliance_m_per_N.{i}.{j}" for i in range(3) for j in range(3)} <= sheet.keys
+    assert {f"what_if.exact.masses_kg.{k}" for k in range(3)} <= sheet.keys
+    assert {f"uncertainty.masses_std_kg.{k}" for k in range(3)} <= sheet.keys
+    assert {f"methods.methods.{m}.mac.2" for m in range(len(document["methods"]["methods"]))} <= sheet.keys
+    assert len(document["placement"]["choices"]) == 20
+    assert {f"placement.choices.{r}.smallest_mac" for r in range(10)} <= sheet.keys
+    assert "no damping acts on either model" in sheet.text
+    error = next(s for s in sheet.shown if s.key == "relative_error.2")
+    assert float(error.text.replace("−", "-")) == pytest.approx(-8.124, abs=5e-4)
+
+
+def test_stability_thresholds_of_both_models_are_shown():
+    sheet = read_sheet(make("reduce unstable").html)
+    assert {f"stability.{which}.threshold_rpm" for which in ("full", "small")} <= sheet.keys
+    assert "Modal damping of the first modes: 1 % and 0.5 % of critical." in sheet.text
+
+
+def test_shares_of_bearings_are_shown_where_they_were_taken_apart():
+    sheet = read_sheet(make("reduce apart").html)
+    assert {f"separated.fractions.{i}.{s}" for i in range(3) for s in range(2)} <= sheet.keys
+    assert "no mass below 0" in sheet.text
+
+
+def test_measured_modes_have_no_rotor_on_the_sheet():
+    sheet = read_sheet(make("reduce measured").html)
+    assert "What it was computed from" not in sheet.text
+    assert next(s.text for s in sheet.shown if s.key == "rotor_frequencies_rad_s.2") == "–"
+
+
+def test_numbers_carry_their_place_and_factor():
+    show = Numbers({"a": [{"b": -1.25e-6}, None], "c": 2.2e-16})
+    assert show("a.0.b", 3, scale=1e6) == '<span data-key="a.0.b" data-scale="1000000.0">−1.25</span>'
+    assert show("a.1") == '<span data-key="a.1">–</span>'
+    assert show("c", decimals=3, sign=True) == '<span data-key="c">0.000</span>'
+    with pytest.raises(KeyError, match=r"nothing at a\.2"):
+        show("a.2")
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "scale"),
+    [("135.24", 135.2404, 1.0), ("−3.2", -3.24e-6, 1e6), ("23900", 23941.0, 1.0), ("0.0°", 359.96, 1.0),
+     ("2.5e-07", 2.46e-7, 1.0), ("–", None, 1.0), ("forward", "forward", 1.0), ("12.5 g", 12.53, 1.0)],
+)  # fmt: skip
+def test_what_agrees(text, value, scale):
+    assert disagreement(Shown("a", text, scale), {"a": value}) is None
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "scale"),
+    [("135.25", 135.2404, 1.0), ("3.2", -3.24e-6, 1e6), ("150", 147.76, 1.0), ("0.1°", 359.96, 1.0),
+     ("2.4e-07", 2.46e-7, 1.0), ("0", None, 1.0), ("backward", "forward", 1.0), ("–", 1.0, 1.0)],
+)  # fmt: skip
+def test_what_disagrees(text, value, scale):
+    assert disagreement(Shown("a", text, scale), {"a": value})
+
+
+def test_warnings_of_parts_are_found_once():
+    document = {"warnings": ["a"], "part": {"warnings": ["b", "a"], "deep": {"warnings": ["c"]}}, "n": [1]}
+    assert every_warning(document) == ["a", "b", "c"]
+
+
+def test_a_long_list_is_thinned_evenly():
+    assert evenly(3, 12) == [0, 1, 2]
+    picked = evenly(281, 12)
+    assert (len(picked), picked[0], picked[-1]) == (12, 0, 280)
+    assert set(np.diff(picked)) <= {25, 26}

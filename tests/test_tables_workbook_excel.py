@@ -1,0 +1,332 @@
+"""The form to fill in, and workbooks and CSV files as a European Excel saves them."""
+
+from __future__ import annotations
+
+import datetime
+import io
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
+
+from balancing import correct, estimate_influence
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+from rotorid.tables.jobcomparison import differences
+from rotorid.tables.jobsource import JobSource
+from rotorid.tables.jobtemplate import template_bytes
+from rotorid.tables.jobworkbook import job_workbook_bytes
+
+BK = sample_data() / "bk_two_plane"
+FORM = ("runs", "weights", "planes", "sensors", "settings")
+SETTINGS = [["key", "value"], ["phase", "lag"], ["errors.phase_deg", 0.5], ["speed_tolerance_percent", 1]]
+PLANES = [
+    ["plane", "max_mass_g", "forbidden_deg", "holes_deg", "available_g", "taken", "use"],
+    ["1", 20.5, "20.5-60", "0; 7.5; 90", "2.5; 5", "2: 2.5", None],
+    ["2", None, None, 7.5, 2.5, None, False],
+]
+SENSORS = [["sensor", "limit", "weight"], ["A", 6.5, 1], ["B", "1000: 6", 0.5]]
+BOOK = {"runs": RUNS, "weights": WEIGHTS, "planes": PLANES, "sensors": SENSORS, "settings": SETTINGS}
+
+
+def european(table):
+    """Every number as the text that a European spreadsheet program shows."""
+    return [
+        [str(cell).replace(".", ",") if type(cell) in (int, float) else cell for cell in row] for row in table
+    ]
+
+
+def filled(path, **sheets):
+    """The form with rows written into its sheets, below the header; settings by key."""
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    for name, rows in sheets.items():
+        sheet = book[name]
+        header = [cell.value for cell in sheet[1]]
+        for number, row in enumerate(rows, start=2):
+            for column, value in row.items():
+                sheet.cell(number, header.index(column) + 1).value = value
+    book.save(path)
+    return path
+
+
+def rows(table, **renamed):
+    """Rows of a table by column."""
+    names = [renamed.get(name, name) for name in table[0]]
+    return [dict(zip(names, row, strict=True)) for row in table[1:]]
+
+
+def bk(name):
+    lines = (BK / name).read_text(encoding="utf-8").splitlines()
+    header, *body = [line.split(",") for line in lines if not line.startswith("#")]
+    number = {"speed_rpm", "amplitude", "phase_deg", "mass_g", "angle_deg"}
+    return [
+        header,
+        *[[float(c) if h in number else c for h, c in zip(header, row, strict=True)] for row in body],
+    ]
+
+
+def solved(job):
+    return correct(estimate_influence(job.trials)).weights
+
+
+def test_an_empty_form_explains_itself(tmp_path):
+    path = filled(tmp_path / "job.xlsx")
+    problem = the_only(complaints(read_job, path), "job.xlsx", None, None, None, "none are filled in yet")
+    assert "sheet 'runs'" in problem.file
+    assert "one row per run, speed and sensor" in problem.expected
+
+
+def test_the_form_has_headers_explanations_and_choices():
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    assert tuple(book.sheetnames) == (*FORM, "notes")
+    for name in FORM:
+        sheet = book[name]
+        names = [cell.value for cell in sheet[1]]
+        assert None not in names
+        if name != "settings":
+            assert sheet.max_row == 1
+            for cell in sheet[1]:
+                assert cell.comment is not None, cell.coordinate
+                assert "Allowed" in cell.comment.text
+        notes = [(row[0], row[1]) for row in book["notes"].iter_rows(values_only=True)]
+        keys = names if name != "settings" else [cell.value for cell in book["settings"]["A"][1:]]
+        assert {(name, key) for key in keys} <= set(notes)
+
+    def choices(name):
+        found = {}
+        for rule in book[name].data_validations.dataValidation:
+            words = rule.formula1.strip('"').split(",") if rule.type == "list" else None
+            found[str(rule.sqref)] = words or (float(rule.formula1), float(rule.formula2 or "inf"))
+            assert len(rule.formula1) <= 257
+        return found
+
+    settings = [cell.value for cell in book["settings"]["A"]]
+    words = choices("settings")
+    assert words[f"B{settings.index('phase') + 1}"] == ["lead", "lag"]
+    assert words[f"B{settings.index('angles') + 1}"] == [
+        "with rotation", "against rotation", "clockwise", "counter-clockwise"
+    ]  # fmt: skip
+    assert {"amplitude_um_pp", "amplitude_mm_s_rms", "amplitude"} <= set(choices("runs")["D1"])
+    assert choices("runs")["B1"] == ["speed_rpm", "speed_Hz", "speed_rad_s"]
+    assert choices("runs")["D2:D1048576"] == (0.0, float("inf"))
+    assert choices("runs")["E2:E1048576"] == (-360.0, 360.0)
+    assert "mass_oz" in choices("weights")["C1"]
+    assert choices("planes")["M2:M1048576"] == ["yes", "no"]
+
+
+def test_every_name_that_the_form_offers_is_known(tmp_path):
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    path = filled(tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS))
+    own = openpyxl.load_workbook(path)
+    tried = 0
+    for name in ("runs", "weights", "planes"):
+        for rule in book[name].data_validations.dataValidation:
+            where = str(rule.sqref)
+            usual = own[name][where].value if ":" not in where else None
+            for word in rule.formula1.strip('"').split(",") if usual else ():
+                own[name][where] = word
+                own.save(path)
+                assert read_job(path).trials.planes == ("1", "2")
+                tried += 1
+            if usual:
+                own[name][where] = usual
+    assert tried > 25
+
+
+def test_the_form_filled_with_the_published_example(tmp_path):
+    runs, weights = bk("runs.csv"), bk("weights.csv")
+    path = filled(tmp_path / "job.xlsx", runs=rows(runs, amplitude="amplitude_um_pp"), weights=rows(weights))
+    expected = solved(read_job(BK / "job.toml"))
+    np.testing.assert_allclose(solved(read_job(path)), expected, rtol=1e-12)
+    assert abs(expected[0]) == pytest.approx(2.951e-3, rel=1e-3)
+    book = openpyxl.load_workbook(path)
+    book["runs"]["D1"] = "amplitude"
+    book.save(path)
+    assert differences(read_job(path), read_job(BK / "job.toml")) == ()
+
+
+def test_the_form_with_settings(tmp_path):
+    path = filled(
+        tmp_path / "job.xlsx", runs=rows(RUNS), weights=rows(WEIGHTS), planes=[{"plane": "1", "use": "no"}]
+    )
+    book = openpyxl.load_workbook(path)
+    keys = [cell.value for cell in book["settings"]["A"]]
+    assert read_job(path).conventions.phase == "lead"
+    for key, value in (("phase", "lag"), ("errors.phase_deg", "1,5")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
+    book.save(path)
+    job = read_job(path)
+    assert (job.conventions.phase, job.left_out) == ("lag", ("1",))
+    assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
+    sheet = tmp_path / "sheet.xlsx"
+    sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))
+    assert differences(job, read_job(sheet)) == ()
+    assert "How to fill in this workbook" in [c.value for c in openpyxl.load_workbook(sheet)["notes"]["A"]]
+
+
+def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
+    plain = read_job(write_book(tmp_path / "plain.xlsx", BOOK))
+    tables = {name: european(table) for name, table in BOOK.items()}
+    tables["planes"][1][1:6] = ["20,5", "20,5-60", "0; 7,5; 90", "2,5; 5", "2: 2,5"]
+    for row in (1, 2):
+        tables["planes"][row][0] = str(row)
+    path = write_book(tmp_path / "job.xlsx", tables)
+    job = read_job(path)
+    assert differences(plain, job) == ()
+    sheet = tmp_path / "sheet.xlsx"
+    sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))
+    assert differences(plain, read_job(sheet)) == ()
+    cells = openpyxl.load_workbook(sheet)["runs"]
+    assert [type(cells.cell(3, place).value) for place in range(1, 6)] == [str, int, str, float, int]
+
+
+@pytest.mark.parametrize(
+    ("sheet", "row", "column", "value", "shown", "words"),
+    [
+        ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("runs", 4, "run", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("runs", 4, "phase_deg", "=A1+1", "=A1+1", "a formula with its stored value"),
+        ("runs", 4, "amplitude_um_pp", "1.234,5", "1.234,5", "without thousands separators"),
+        ("runs", 4, "amplitude_um_pp", "1,234", "1,234", "may separate thousands"),
+        ("weights", 2, "angle_deg", "45°", "45°", "a number alone; write the unit in the header"),
+        ("planes", 2, "plane", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("planes", 2, "forbidden_deg", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("planes", 2, "taken", datetime.time(3, 10), "03:10:00", "turned the cell into a date or time"),
+        ("planes", 2, "max_mass_g", "1,250", "1,250", "may separate thousands"),
+        ("planes", 3, "use", "FALSCH", "FALSCH", "true or false"),
+        ("sensors", 2, "sensor", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("sensors", 2, "limit", "#N/A", "#N/A", "not an error of the spreadsheet"),
+        ("settings", 3, "value", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+        ("settings", 3, "value", "1,500", "1,500", "may separate thousands"),
+        ("settings", 3, "value", "=1/2", "=1/2", "a formula with its stored value"),
+        ("settings", 2, "key", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),
+    ],
+)
+def test_cells_that_cannot_be_used_are_explained(tmp_path, sheet, row, column, value, shown, words):
+    changed = {**BOOK, sheet: replaced(BOOK[sheet], row, column, value)}
+    found = complaints(read_job, write_book(tmp_path / "job.xlsx", changed))
+    problem = the_only(found, "job.xlsx", row, column, shown, words)
+    assert f"sheet {sheet!r}" in problem.file
+
+
+def test_a_number_with_comma_and_three_digits_beside_others(tmp_path):
+    planes = [["plane", "max_mass_g"], ["1", "1,250"], ["2", "7,5"]]
+    job = read_job(write_book(tmp_path / "job.xlsx", {**BOOK, "planes": planes}))
+    np.testing.assert_allclose(job.limits.max_weight, [1.25e-3, 7.5e-3], rtol=1e-12)
+
+
+def with_stored_values(path, values):
+    """The workbook with values stored in its formulas, in order, as Excel stores them."""
+    parts = {}
+    with zipfile.ZipFile(path) as book:
+        for name in book.namelist():
+            data = book.read(name).decode() if name.endswith(".xml") else book.read(name)
+            while (
+                isinstance(data, str)
+                and name.startswith("xl/worksheets")
+                and "</f><v></v>" in data.replace("<v />", "<v></v>")
+            ):
+                data = data.replace("<v />", "<v></v>").replace(
+                    "</f><v></v>", f"</f><v>{values.pop(0)}</v>", 1
+                )
+            parts[name] = data
+    with zipfile.ZipFile(path, "w") as book:
+        for name, data in parts.items():
+            book.writestr(name, data)
+    assert not values
+    return path
+
+
+def test_formulas_with_stored_values_count(tmp_path):
+    runs = replaced(replaced(RUNS, 4, "amplitude_um_pp", "=9.8/2"), 5, "phase_deg", "=E4+1")
+    settings = replaced(SETTINGS, 3, "value", "=1/2")
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "runs": runs, "settings": settings})
+    with_stored_values(path, [4.9, 347, 0.5])
+    job = read_job(path)
+    assert differences(job, read_job(write_book(tmp_path / "plain.xlsx", BOOK))) == ()
+    sheet = tmp_path / "sheet.xlsx"
+    sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))
+    assert openpyxl.load_workbook(sheet)["runs"]["D4"].value == 4.9
+
+
+def test_merged_cells_explain_themselves(tmp_path):
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "runs": [["Pump 3, June", *[None] * 4], *RUNS]})
+    book = openpyxl.load_workbook(path)
+    book["runs"].merge_cells("A1:E1")
+    book.save(path)
+    words = "the header in the first row, and it seems to be row 2"
+    problem = the_only(complaints(read_job, path), "job.xlsx", 1, None, "Pump 3, June", words)
+    assert "sheet 'runs'" in problem.file
+    book = openpyxl.load_workbook(write_book(path, BOOK))
+    book["runs"].merge_cells("D1:E1")  # amplitude and phase under one name
+    book.save(path)
+    found = complaints(read_job, path)
+    assert [(p.row, p.column) for p in found if p.row == 1] == [(1, "phase_deg")]
+    assert all("sheet 'runs'" in p.file for p in found)
+    assert {(p.value, p.expected) for p in found if p.row != 1} == {("5 cells", "4 cells, as in the header")}
+
+
+def test_hidden_sheets_count_and_empty_rows_do_not(tmp_path):
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "Tabelle2": []})
+    plain = read_job(path)
+    book = openpyxl.load_workbook(path)
+    book["settings"].sheet_state = "hidden"
+    book["runs"].row_dimensions[3].hidden = True
+    for name in FORM:
+        book[name].cell(40, 1).value = "\u00a0 "
+        book[name].cell(2, 30).value = " "
+        book[name].cell(60, 12).number_format = "0.00"
+    book.save(path)
+    assert differences(plain, read_job(path)) == ()
+    book["Tabelle2"]["A1"] = "left over"
+    book["Tabelle2"].sheet_state = "hidden"
+    book.save(path)
+    found = complaints(read_job, path)
+    the_only(found, "job.xlsx", None, None, "Tabelle2", "remarks go into 'notes' (hidden sheets count too)")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "first"), [("cp1252", ""), ("utf-8-sig", "sep=;\n"), ("cp1252", "sep=;\n")]
+)
+def test_csv_files_of_a_european_excel_become_a_workbook(tmp_path, encoding, first):
+    runs = [[c.replace("A", "Lüfter") if isinstance(c, str) else c for c in row] for row in RUNS]
+    for name, table in (("runs", runs), ("weights", WEIGHTS)):
+        text = (
+            first
+            + "".join(line + ";;\n" for line in csv_text(table, ";", comma=True).splitlines())
+            + ";;;;;;\n"
+        )
+        (tmp_path / f"{name}.csv").write_bytes(text.encode(encoding))
+    job_file = tmp_path / "job.toml"
+    job_file.write_text(
+        'runs = "runs.csv"\nweights = "weights.csv"\n["sensors"."Lüfter"]\nlimit = 3\n', "utf-8"
+    )
+    sheet = tmp_path / "sheet.xlsx"
+    if encoding == "cp1252":
+        with pytest.warns(UserWarning, match="read as cp1252"):
+            job = read_job(job_file)
+    else:
+        job = read_job(job_file)
+    sheet.write_bytes(job_workbook_bytes(job, JobSource((job_file,)), sheet))
+    assert differences(job, read_job(sheet)) == ()
+    written = [list(row) for row in openpyxl.load_workbook(sheet)["runs"].iter_rows(values_only=True)]
+    assert written == runs
+
+
+def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
+    check = [RUNS[0], ["check", 1000, "A", 0.3, 17], ["check", 1000, "B", 0.7, 301]]
+    settings = [["key", "value"], ["check", "check.csv"]]
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "check": check, "settings": settings})
+    words = "the table in the sheet 'check' of this workbook, not a file"
+    the_only(complaints(read_job, path), "job.xlsx", 2, "value", "check.csv", words)
+    path = write_book(tmp_path / "job.xlsx", {**BOOK, "check_weights": WEIGHTS})
+    words = "the check runs too"
+    the_only(complaints(read_job, path), "job.xlsx", None, "check_weights", None, words)
+    bad = {**BOOK, "check": replaced(check, 3, "phase_deg", 400)}
+    problem = the_only(
+        complaints(read_job, write_book(tmp_path / "job.xlsx", bad)),
+        "job.xlsx", 3, "phase_deg", "400", "a phase from -360 to 360 degrees",
+    )  # fmt: skip
+    assert "sheet 'check'" in problem.file

@@ -1,0 +1,60 @@
+"""Jobs that say, together, everything that a job can say: for the tests of workbooks."""
+
+from __future__ import annotations
+
+from tables_data import RUNS
+
+SAMPLES = (
+    "turbo_job/job",
+    "turbo_job/checked",
+    "turbo_job/holes",
+    "bk_two_plane/job",
+    "left_in/job",
+    "model_job/job",
+)
+CHECK = [RUNS[0], *[["check", 1000, s, a, p] for s, a, p in (("A", 0.3, 17), ("B", 0.7, 301.5))]]
+SLOW = [RUNS[0], *[["slow", 200, s, a, p] for s, a, p in (("A", 0.35, 40), ("B", 0.1, 355))]]
+HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
+PARTS = {
+    "conventions": 'phase = "lag"\nangles = "clockwise"\nrotation = "counter-clockwise"\nview = "free end"\n',
+    "tolerance and errors": (
+        "speed_tolerance_percent = 0.7\n[errors]\namplitude_percent = 1.5\nphase_deg = 0.3\nfloor = 1e-3\n"
+    ),
+    "limits": (
+        'angles = "against rotation"\n'
+        "[planes.1]\nmax_mass_oz = 0.7\nforbidden_deg = [[-30.5, 20], [300, 340]]\n"
+        "[planes.2]\nmax_mass_g = 3\nuse = false\nforbidden_deg = [1e-5, 7]\n"
+        '[sensors.A]\nlimit = { "1000" = 4.5 }\nweight = 2\n[sensors.B]\nlimit = 6\n'
+    ),
+    "weights of speeds": 'speed_weights = { "1000" = 0.5 }\n',
+    "holes": (
+        "[planes.1]\nholes_deg = [-30, 0, 7.25]\nhole_names = ['A', '2', 'C 3']\navailable_g = [5, 2.5]\n"
+        "per_hole = 2\nstock = [4, 1]\ntaken = { A = 2.5, '2' = 5 }\n"
+        "[planes.2]\nholes = 12\nfirst_hole_deg = 15\nstep_g = 0.1\nremove = true\nmax_mass_kg = 0.02\n"
+    ),
+    "one hole, one piece": (
+        "[planes.2]\nholes_deg = [7.5]\nhole_names = ['7']\navailable_g = [5]\nstock = [3]\n"
+    ),
+    "radii": (
+        "[planes.1]\nradius_mm = 120\ntrial_radius_in = 3.3\nmax_unbalance_g_mm = 700\n"
+        "[planes.2]\nradius_m = 0.1\n"
+    ),
+    "slow-roll vectors": (
+        "[slow_roll.A]\namplitude = 0.35\nphase_deg = 40\n"
+        "[slow_roll.B]\namplitude_mil = 0.004\nphase_deg = -5\n"
+    ),
+    "slow-roll file": 'slow_roll = "slow.csv"\n[errors]\namplitude_percent = 2\n',
+    "check run": 'check = "check.csv"\n',
+    "check run with nothing mounted": 'check = "check.csv"\ncheck_weights = "check_weights.csv"\n',
+    "stored coefficients": 'influence = "influence.csv"\nphase = "lag"\n',
+    "model": (
+        'rotor = "rotor.csv"\n[key_phasor]\nangle_deg = 30\n'
+        "[planes.1]\nnode = 2\n[sensors.A]\nnode = 1\nangle_deg = 45\n"
+    ),
+}
+ROTOR = [
+    ["length_m", "diameter_m", "support_stiffness_N_per_m"],
+    [0.3, 0.05, 1e7],
+    [0.3, 0.05, 0],
+    [0, 0.05, 1e7],
+]
