@@ -242,6 +242,25 @@ def test_only_public_names_can_be_documented():
         names.entry("fem", fem, "nonsense")
 
 
+def test_signatures_are_written_as_in_the_source(built):
+    import fem
+    import rotorid
+
+    text, returned = names.signature_of(rotorid.reduce)
+    assert text.startswith(
+        "(rotor: fem.Rotor, nodes: Sequence[int], modes: int = 2, *, speed: float | None = None"
+    )
+    assert returned == "Reduction"
+    assert names.signature_of(fem.Response.at) == ("(sensor: SensorLike)", "ComplexArray")
+    assert "inner_diameter: FloatArray = ..." in names.signature_of(fem.Rotor)[0]
+    shown = text_of(page(built, "api/reduction"))
+    assert "modes: int = 2," in shown
+    for path in (built / "api").glob("*.html"):
+        assert not re.search(
+            r"_NestedSequence|TypeAliasForwardRef|~\w+\.|<factory>", text_of(path.read_text("utf-8"))
+        )
+
+
 def test_formulas_are_mathml(built):
     theory = "".join(path.read_text(encoding="utf-8") for path in (built / "theory").glob("*.html"))
     assert theory.count("<math ") >= 20

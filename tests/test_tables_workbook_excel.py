@@ -330,3 +330,16 @@ def test_a_table_is_a_sheet_or_a_file_not_both(tmp_path):
         "job.xlsx", 3, "phase_deg", "400", "a phase from -360 to 360 degrees",
     )  # fmt: skip
     assert "sheet 'check'" in problem.file
+
+
+def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):
+    """Excel keeps "2%" as 0.02: it must not be read as 0.02 percent."""
+    path = tmp_path / "job.xlsx"
+    write_book(path, BOOK)
+    book = openpyxl.load_workbook(path)
+    cell = book["settings"]["B4"]
+    cell.value, cell.number_format = 0.02, "0%"
+    book.save(path)
+    (complaint,) = complaints(lambda: read_job(path))
+    assert "2%" in str(complaint)
+    assert "formatted as a percentage" in str(complaint)
