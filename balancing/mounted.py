@@ -26,6 +26,10 @@ FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
+AGAINST = 3.0
+"""Pieces that weigh more than this times what they make are said to act against each other."""
+
+
 @dataclass(frozen=True, eq=False)
 class Mounted:
     """Pieces in holes that leave the least vibration.
@@ -52,6 +56,23 @@ class Mounted:
     after: ComplexArray
     after_covariance: FloatArray | None
     on_top_of: str | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
+        labels, said = self.correction.labels, []
+        for plane, chosen in zip(self.correction.planes, self.found.mountings, strict=True):
+            if chosen is None:
+                continue
+            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
+            if total > AGAINST * made:
+                shown = [labels.weight(value)[0] for value in (total + 0j, made + 0j)]
+                said.append(
+                    f"plane {plane}: pieces of {float(shown[0]):.4g} {labels.weight_unit} together make "
+                    f"{float(shown[1]):.4g} {labels.weight_unit}, they act against each other: state a "
+                    "stock, or fewer pieces per hole, if fewer would do"
+                )
+        return tuple(said)
 
     @property
     def weights(self) -> ComplexArray:

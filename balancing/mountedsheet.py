@@ -31,6 +31,7 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
             for p, plane in enumerate(c.planes)
         ],
         "on_top_of": m.on_top_of,
+        "warnings": list(m.warnings),
         "holes": [row for p in range(len(c.planes)) for row in _holes(m, p)],
         "residuals": [
             {
@@ -65,7 +66,7 @@ def summary(m: Mounted) -> str:
     ]
     head = "What to mount, all planes together" if not c.remove else "What to mount or to remove"
     stays = "" if m.on_top_of is None else f", in addition to what is mounted in run {m.on_top_of!r}"
-    lines = [head + stays]
+    lines = [*(f"Warning: {words}" for words in m.warnings), head + stays]
     lines.append(table(rows, left=2) if len(rows) > 1 else "  nothing: every piece would make it worse")
     after = labels.vibration(m.after)[0]
     free = labels.vibration(c.after)[0]

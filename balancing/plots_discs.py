@@ -7,6 +7,7 @@ away stands at the angle of the equivalent added weight + 180°.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -96,7 +97,8 @@ def disc(
     if weight is not None and made is not None and abs(weight - made) <= _NOTHING * abs(weight):
         made = None  # one arrow says it all
     _vectors(ax, weight, made, tolerance, clockwise)
-    ax.set_title(f"{plane}: {'take away' if remove else 'add'}", fontsize="medium", fontweight="bold")
+    words = textwrap.fill(f"{plane}: {'take away' if remove else 'add'}", 34)
+    ax.set_title(words, fontsize="medium", fontweight="bold")
     lines = _words(weight, made, tolerance, labels, remove)
     ax.text(0, -_EDGE + 0.02, "\n".join(lines), ha="center", va="top", fontsize="small")
     return ax

@@ -142,6 +142,12 @@ class Support:
         )
 
     @property
+    def coupled(self) -> bool:
+        """Whether any stiffness or damping couples x and y."""
+        entries = (*self._entries("stiffness"), *self._entries("damping"))
+        return any(isinstance(e, tuple) and (e[0][1] != 0 or e[1][0] != 0) for e in entries)
+
+    @property
     def damped(self) -> bool:
         """Whether it has any damping, that of the pedestal included."""
         own = any(np.any(entry) for entry in self._entries("damping"))

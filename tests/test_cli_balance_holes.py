@@ -152,3 +152,22 @@ def test_pieces_on_top_of_what_a_check_run_had(cli, tmp_path):
     outcome = cli("balance", path, "--refine", "--split")
     assert outcome.code == 2
     assert "not named" in outcome.err
+
+
+def test_pieces_against_each_other_are_said(cli, tmp_path):
+    """Without a stock the least vibration may take many pieces that make little."""
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_bytes((TURBO / name).read_bytes())
+    plane = "holes = 5\navailable_g_mm = [100, 200]\nper_hole = 2\n"
+    text = 'runs = "runs.csv"\nweights = "weights.csv"\n'
+    text += "".join(f"[planes.{name}]\n{plane}" for name in ("left", "middle", "right"))
+    (tmp_path / "job.toml").write_text(text)
+    outcome = cli("balance", tmp_path / "job.toml", "--split", "--json")
+    assert outcome.code == 0, outcome.err
+    mounting = outcome.json["mounting"]
+    for plane in mounting["planes"]:
+        total = sum(row["mass"] for row in mounting["holes"] if row["plane"] == plane["plane"])
+        said = any(f"plane {plane['plane']}: pieces of" in words for words in mounting["warnings"])
+        assert said == (total > 3 * plane["mass"])
+    assert mounting["warnings"]
+    assert cli("balance", HOLES, "--split", "--json").json["mounting"]["warnings"] == []

@@ -561,3 +561,24 @@ def test_examples_in_the_docstrings():
         failed, tried = doctest.testmod(module)
         assert failed == 0
         assert tried > 0
+
+
+def test_after_a_check_run_nothing_is_mounted_twice():
+    text, _, _, _ = sheet_of(DATA / "turbo_job" / "checked.toml")
+    words = re.sub(r"\s+", " ", text)
+    assert "A check run was made with the weights listed under Check run" in words
+    assert "Do not mount these again" in words
+    assert "Remove every trial weight and every weight of the runs" not in words
+    before, _, _, _ = sheet_of(DATA / "turbo_job" / "job.toml")
+    assert "Remove every trial weight and every weight of the runs" in re.sub(r"\s+", " ", before)
+
+
+def test_directions_of_sensors_without_a_model_are_shown(tmp_path):
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_bytes((DATA / "turbo_job" / name).read_bytes())
+    stated = (DATA / "turbo_job" / "job.toml").read_text() + '\n[sensors."probe 1"]\nangle_deg = 45\n'
+    (tmp_path / "job.toml").write_text(stated)
+    text, _, _, job = sheet_of(tmp_path / "job.toml")
+    assert dict(job.sensor_angles) == {"probe 1": 45.0}
+    assert "probe 1 at 45°" in text
+    assert "directions are not stated" not in text

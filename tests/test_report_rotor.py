@@ -258,3 +258,18 @@ def test_a_long_list_is_thinned_evenly():
     picked = evenly(281, 12)
     assert (len(picked), picked[0], picked[-1]) == (12, 0, 280)
     assert set(np.diff(picked)) <= {25, 26}
+
+
+def test_what_the_critical_speeds_leave_out_is_said():
+    """The compressor's bearings are damped and coupled: its critical speeds are those without that."""
+    rotor = read_rotor(sample_data() / "compressor" / "rotor.toml")
+    plain = dict(rotor_sheet(rotor).facts)
+    critical = dict(rotor_sheet(rotor, conservative=True).facts)
+    reduced = dict(rotor_sheet(rotor, at_rest=True).facts)
+    assert plain["Left out"] == "nothing"
+    assert critical["Left out"] == "damping, cross-coupling that does work (kxy − kyx)"
+    assert reduced["Left out by formula (50)"].startswith("gyroscopic moments, damping, coupling of x and y")
+    assert (
+        dict(rotor_sheet(read_rotor(sample_data() / "rotor23.csv"), conservative=True).facts)["Left out"]
+        == "shear, rotary inertia, gyroscopic moments"
+    )

@@ -258,7 +258,8 @@ def test_a_disc_with_too_large_a_bore(file):
 @pytest.mark.parametrize("flag", ['"yes"', "1", "[true]"])
 def test_the_model_takes_true_or_false(file, flag):
     (problem,) = complaints(file, f"[model]\ngyroscopic = {flag}")
-    assert (problem.column, problem.expected) == ("model.gyroscopic", "true or false, without quotes")
+    expected = "true or false, without quotes (in a sheet: yes or no)"
+    assert (problem.column, problem.expected) == ("model.gyroscopic", expected)
 
 
 def test_the_sample_compressor():

@@ -76,7 +76,7 @@ def _rotorid(
 
     Every command has --json (one JSON document on standard output), --plot FILE and --output FILE where they
     make sense, --verbose for the numbers behind a result (on standard error), and --help with an example.
-    Exit status: 0, or 2 for bad input with one message.
+    Exit status: 0, or 2 for bad input with one message; `validate` ends with 1 where a number differs.
     """
 
 

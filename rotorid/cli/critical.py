@@ -43,7 +43,9 @@ def critical(
     output: OutputOption = None,
     report: ReportOption = None,
 ) -> None:
-    """Critical speeds with their whirl directions, and mode shapes.
+    """Critical speeds with their whirl directions, and mode shapes, of the rotor without damping.
+
+    Damping and cross-coupling that does work are left out; `rotorid campbell` has them.
 
     Example: rotorid critical sample_data/rotor23.csv -n 3 --plot modes.png
 

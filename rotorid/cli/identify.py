@@ -93,7 +93,7 @@ def identify(
             from fem.nearest import did_you_mean
 
             raise ValueError(
-                f"{option} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
+                f"{option} {value!r} is not known{did_you_mean(value, known)}: {' or '.join(known)}"
             )
     if loss != LOSSES[0] and method != METHODS[1]:
         raise ValueError(f"--loss belongs to --method {METHODS[1]}: linear regression has none")

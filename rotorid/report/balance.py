@@ -75,7 +75,8 @@ def balance_report(
     labels = result.labels
     sheet = sheet_data(result, influence, job, mounted)
     whole = {**document, "sheet": sheet}
-    places = {s: job.sensor_places[s].angle for s in result.sensors if s in job.sensor_places}
+    known = {s: sensor.angle for s, sensor in job.sensor_places.items()} | dict(job.sensor_angles)
+    places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
     name = title or _name(job)
@@ -132,7 +133,7 @@ def _warnings(document: Mapping[str, Any]) -> list[str]:
     verdict = document.get("verdict")
     if verdict is not None and verdict["verdict"] == "fail":
         found.append(f"the limits are not kept: the verdict ({verdict['source']}) is fail")
-    for part in (document, document.get("check"), verdict):
+    for part in (document, document.get("mounting"), document.get("check"), verdict):
         found += [] if part is None else part["warnings"]
     check = document.get("check")
     if check is not None and check["explained"] is False:

@@ -148,4 +148,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
 
 def _short(name: str) -> str:
     """Beginning and end of a long name: sensors often differ in their last letters."""
-    return plain(name if len(name) <= 24 else f"{name[:14]}…{name[-9:]}")
+    import textwrap
+
+    lines = textwrap.wrap(name, 26)
+    return plain("\n".join([*lines[:2], "…"] if len(lines) > 3 else lines))

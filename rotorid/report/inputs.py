@@ -44,6 +44,8 @@ def rotor_sheet(
     planes: Sequence[str | int] = (),
     sensors: Sequence[SensorLike] = (),
     meaning: str = "",
+    conservative: bool = False,
+    at_rest: bool = False,
 ) -> RotorSheet:
     """Describe a rotor.
 
@@ -55,6 +57,10 @@ def rotor_sheet(
         Nodes or stations to mark in the drawing.
     meaning
         What stands at the planes.
+    conservative
+        Whether the results are those without damping and without coupling that does work.
+    at_rest
+        Whether they are those of the plane x of the rotor that does not turn.
 
     Raises
     ------
@@ -63,7 +69,7 @@ def rotor_sheet(
     """
     tables = [_sections(rotor), _discs(rotor), _supports(rotor), *_coefficients(rotor)]
     return RotorSheet(
-        _facts(rotor),
+        _facts(rotor, conservative=conservative or at_rest, at_rest=at_rest),
         rotor_picture(rotor, planes, sensors, meaning),
         tuple(table for table in tables if table.rows),
     )
@@ -92,20 +98,28 @@ def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Grid:
     return Grid("What is mounted", heads, tuple(rows), (0,))
 
 
-def _facts(rotor: Rotor) -> tuple[tuple[str, str], ...]:
+def _facts(rotor: Rotor, *, conservative: bool, at_rest: bool) -> tuple[tuple[str, str], ...]:
     model = rotor.model
     counted = {
         "shear": model.shear,
         "rotary inertia": model.rotary_inertia,
         "gyroscopic moments": model.gyroscopic,
     }
+    if at_rest:
+        counted["gyroscopic moments"] = False
     used = [word for word, on in counted.items() if on]
     left = [word for word, on in counted.items() if not on]
+    if conservative and (any(s.damped for s in rotor.supports) or rotor.material_damping.any()):
+        left.append("damping")
+    if conservative and any(s.coupled for s in rotor.supports):
+        left.append("coupling of x and y" if at_rest else "cross-coupling that does work (kxy − kyx)")
+    if at_rest and any(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports):
+        left.append("masses of the pedestals (the small model has them)")
     stations = ", ".join(f"{name} at node {node}" for name, node in rotor.stations.items())
     facts = [
         ("Rotor", f"{rotor.n_elements} elements, {rotor.positions[-1]:.6g} m, {rotor.total_mass:.6g} kg"),
         ("Counted", ", ".join(["bending and mass", *used])),
-        ("Left out", ", ".join(left) or "nothing"),
+        ("Left out by formula (50)" if at_rest else "Left out", ", ".join(left) or "nothing"),
         ("Stations", stations),
         *((name, text) for name, _, text in _material(rotor) if text),
     ]

@@ -74,7 +74,9 @@ def reduce_report(
         about=_about(document, provenance),
         rotor=None
         if result.rotor is None
-        else rotor_sheet(result.rotor, planes=list(result.nodes), meaning="places of the masses"),
+        else rotor_sheet(
+            result.rotor, planes=list(result.nodes), meaning="places of the masses", at_rest=True
+        ),
         parts=parts,
     )
 

@@ -70,7 +70,7 @@ def critical_report(
         warnings=[*_inside(document), *every_warning(document)],
         provenance=provenance,
         about=[*_files(provenance), *_operating(operating)],
-        rotor=rotor_sheet(modes.rotor),
+        rotor=rotor_sheet(modes.rotor, conservative=True),
         parts=parts,
     )
 

@@ -89,6 +89,11 @@ def completed(
         rotor=model.rotor,
         plane_nodes=model.plane_nodes,
         sensor_places=model.sensor_places,
+        sensor_angles={
+            name: job.conventions.angle_sign * keys.angle_deg + 0.0
+            for name, keys in sensor_keys.items()
+            if keys.angle_deg is not None
+        },
         radii=radii,
         holes=holes,
         remove=frozenset(name for name in planes if name in plane_keys and plane_keys[name].remove),

@@ -63,6 +63,8 @@ class Job:
         Node of each plane that has one in the model.
     sensor_places
         Node and direction (degrees with the rotation from the model's x) of each sensor that has a node.
+    sensor_angles
+        Direction of each sensor that the job states, degrees with the rotation from the model's x.
     radii
         Radius, m, of each plane that has one: it converts between masses and unbalances.
     holes
@@ -93,6 +95,7 @@ class Job:
     rotor: Rotor | None = None
     plane_nodes: Mapping[str, int] = field(default_factory=dict)
     sensor_places: Mapping[str, Sensor] = field(default_factory=dict)
+    sensor_angles: Mapping[str, float] = field(default_factory=dict)
     radii: Mapping[str, float] = field(default_factory=dict)
     holes: Mapping[str, Holes] = field(default_factory=dict)
     remove: frozenset[str] = frozenset()

@@ -86,7 +86,7 @@ class SensorKeys:
     limits: dict[str, float] = field(default_factory=dict)
     weight: float = 1.0
     place: int | str | None = None
-    angle_deg: float = 0.0
+    angle_deg: float | None = None
 
 
 def read_plane(section: Section) -> PlaneKeys:
@@ -117,10 +117,10 @@ def read_sensor(section: Section) -> SensorKeys:
     """Take all keys of a sensor; problems are noted with the section."""
     limits = by_speed(section, "limit", "an amplitude above 0 in the unit of the readings", above_zero=True)
     weight = section.number("weight", 1.0, low=0.0)
-    angle = section.number("angle_deg", 0.0, low=-360.0, high=360.0)
+    angle = section.number("angle_deg", low=-360.0, high=360.0)
     place = _place(section)
     section.finish()
-    return SensorKeys(section, limits, 1.0 if weight is None else weight, place, angle or 0.0)
+    return SensorKeys(section, limits, 1.0 if weight is None else weight, place, angle)
 
 
 def by_speed(section: Section, key: str, what: str, *, above_zero: bool) -> dict[str, float]:

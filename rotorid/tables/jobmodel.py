@@ -75,7 +75,7 @@ def read_model(
         return Model()
     plane_nodes = {name: node for name, keys in planes.items() if (node := _node(keys, rotor)) is not None}
     places = {
-        name: Sensor(node, angle_sign * keys.angle_deg + 0.0)
+        name: Sensor(node, angle_sign * (keys.angle_deg or 0.0) + 0.0)
         for name, keys in sensors.items()
         if (node := _node(keys, rotor)) is not None
     }

@@ -94,7 +94,12 @@ class Section:
         if value is None:
             return default
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.complain(key, "a number" if not isinstance(value, str) else "a number, without quotes")
+            self.complain(
+                key,
+                "a number"
+                if not isinstance(value, str)
+                else "a number, without quotes (in a sheet: not as text)",
+            )
         elif not _finite(value) or not low <= value <= high:
             self.complain(key, _range(low, high))
         elif abs(value) > LARGEST:
@@ -133,7 +138,7 @@ class Section:
         """True or false; false if not there."""
         value = self.take(key)
         if value is not None and not isinstance(value, bool):
-            self.complain(key, "true or false, without quotes")
+            self.complain(key, "true or false, without quotes (in a sheet: yes or no)")
         return value is True
 
     def section(self, key: str) -> Section | None:

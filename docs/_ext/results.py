@@ -1,0 +1,106 @@
+"""`{validation}` and `{benchmarks}`: tables of what the program computes, made while the pages are built."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from docutils import nodes
+from pieces import paragraph, section, table
+from sphinx.util.docutils import SphinxDirective
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+STORED = Path(__file__).parents[1] / "benchmarks.json"
+
+
+class ValidationTable(SphinxDirective):
+    """Every printed number of the references beside what is computed now, as `rotorid validate` has them."""
+
+    def run(self) -> list[nodes.Node]:
+        """One table per source."""
+        from rotorid.validation import validate
+
+        return validation_nodes(validate().to_dict()["rows"])
+
+
+def validation_nodes(rows: Sequence[Mapping[str, Any]]) -> list[nodes.Node]:
+    """Counts, and a section with a table for every source, in the order of the rows."""
+    sources: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        sources.setdefault(row["source"], []).append(row)
+    wrong = [row for row in rows if row["status"] not in ("agrees", "erratum")]
+    if wrong:
+        raise ValueError(f"validation: {wrong[0]['source']}, {wrong[0]['quantity']}: {wrong[0]['status']}")
+    errata = sum(row["status"] == "erratum" for row in rows)
+    head = paragraph(f"{len(rows)} numbers: {len(rows) - errata} agree, {errata} are errata of the print.")
+    return [head, *(_source(source, group) for source, group in sources.items())]
+
+
+def _source(source: str, rows: Sequence[Mapping[str, Any]]) -> nodes.section:
+    notes = list(dict.fromkeys(row["note"] for row in rows if row["note"]))
+    lines = [
+        (
+            str(row["quantity"]),
+            str(row.get("printed_text", row["printed"])).replace("-", "\N{MINUS SIGN}"),
+            number(row["computed"], 8),
+            number(row["difference"], 2),
+            number(row["tolerance"], 2),
+            row["status"] + (f" ({notes.index(row['note']) + 1})" if row["note"] else ""),
+        )
+        for row in rows
+    ]
+    head = ("quantity", "printed", "computed", "difference", "tolerance", "status")
+    out = section(source, f"validation {source}", table(head, lines))
+    if notes:
+        items = (nodes.list_item("", paragraph(note)) for note in notes)
+        out += nodes.enumerated_list("", *items, enumtype="arabic", prefix="(", suffix=")")
+    return out
+
+
+class BenchmarkTable(SphinxDirective):
+    """What the last `make bench` measured, from docs/benchmarks.json."""
+
+    def run(self) -> list[nodes.Node]:
+        """The machine and the table, or a sentence that nothing is stored."""
+        self.env.note_dependency(str(STORED))
+        if not STORED.exists():
+            return [paragraph("No measurement is stored here; `make bench` makes one on your machine.")]
+        return benchmark_nodes(json.loads(STORED.read_text(encoding="utf-8")))
+
+
+def benchmark_nodes(document: Mapping[str, Any]) -> list[nodes.Node]:
+    """Where it was measured, and one line per comparison; refused if answers differed."""
+    differing = [row["task"] for row in document["rows"] if row["difference"] > row["allowed"]]
+    if differing:
+        raise ValueError(f"benchmarks: the answers differ in {', '.join(differing)}")
+    lines = [
+        (
+            f"{row['task']}, {row['ours']}" + (f" ({row['note']})" if row.get("note") else ""),
+            number(1e3 * row["our_seconds"], 3),
+            row["peer"],
+            number(1e3 * row["peer_seconds"], 3),
+            number(row["peer_seconds"] / row["our_seconds"], 3),
+            number(row["difference"], 2),
+        )
+        for row in document["rows"]
+    ]
+    head = ("task", "ms", "compared with", "its ms", "ratio", "difference of the answers")
+    return [paragraph(f"Measured with {document['machine']}."), table(head, lines)]
+
+
+def number(value: float | None, digits: int) -> str:
+    """A number with so many digits and a real minus; a dash where there is none."""
+    if value is None:
+        return "\N{EN DASH}"
+    return f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register both directives."""
+    app.add_directive("validation", ValidationTable)
+    app.add_directive("benchmarks", BenchmarkTable)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,61 @@
+"""How the documentation is built: `make docs`, from the code itself, readable without a network."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("MPLBACKEND", "Agg")
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS), str(DOCS / "_ext")]
+
+import rotorid  # noqa: E402 - the environment must be set before NumPy loads
+
+project = "rotorid"
+author = "the rotorid developers"
+version = release = rotorid.__version__
+language = "en"
+
+extensions = [
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "myst_parser",
+    "commands",
+    "drawn",
+    "mathml",
+    "names",
+    "results",
+]
+exclude_patterns = ["_build", "_ext"]
+source_suffix = {".md": "markdown"}
+myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
+myst_heading_anchors = 4
+default_role = "literal"
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # docs/_ext/names.py writes them as the source does
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 80
+suppress_warnings = ["ref.python"]  # two results are called TradeOff, one of each package
+autosummary_generate = False
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+# Formulas become MathML while the pages are built: no script, no network, no LaTeX.
+html_math_renderer = "mathml"
+html_theme = "alabaster"
+html_theme_options = {
+    "description": "Balancing, rotor models and identification of oscillating systems",
+    "page_width": "1100px",
+    "sidebar_width": "240px",
+    "fixed_sidebar": False,
+    "show_powered_by": False,
+}
+html_static_path = ["_static"]
+html_css_files = ["rotorid.css"]
+smartquotes = False
+html_show_copyright = False
+html_copy_source = False
+html_show_sourcelink = False
