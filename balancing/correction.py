@@ -171,14 +171,23 @@ class Correction:
         return correction_dict(self)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown)."""
+        """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown).
+
+        Where material is taken away from a plane, `action` says so, `angle_deg` is the place to work at, and
+        `equivalent_added_deg` the angle of the added weight that would do the same.
+        """
         import pandas as pd
 
         left_out = ("covariance", "action", "remove_at_deg")
         rows = [{k: v for k, v in row.items() if k not in left_out} for row in self.to_dict()["corrections"]]
         frame = pd.DataFrame(rows)
         if self.remove:
-            frame["remove_at_deg"] = [row["remove_at_deg"] for row in self.to_dict()["corrections"]]
+            known = self.to_dict()["corrections"]
+            frame.insert(1, "action", [row["action"] for row in known])
+            frame["equivalent_added_deg"] = frame["angle_deg"]
+            frame["angle_deg"] = [
+                row["angle_deg"] if row["remove_at_deg"] is None else row["remove_at_deg"] for row in known
+            ]
         return frame.astype({"mass_std": float, "angle_std_deg": float})
 
     def residuals_frame(self) -> pd.DataFrame:

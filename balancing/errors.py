@@ -113,7 +113,12 @@ def error_model(trials: Trials) -> ErrorModel:
     if max(radial, tangential) < EQUAL:
         words = "all repeated readings are equal to the last digit: they say nothing about the errors"
         return ErrorModel(warnings=(words,))
-    return ErrorModel(ReadingErrors(amplitude=radial, phase=tangential), dof, "repeats")
+    said: tuple[str, ...] = ()
+    if min(radial, tangential) < EQUAL:  # read in whole degrees, say
+        equal, other = ("amplitudes", "phases") if radial < EQUAL else ("phases", "amplitudes")
+        said = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
+        radial = tangential = max(radial, tangential)
+    return ErrorModel(ReadingErrors(amplitude=radial, phase=tangential), dof, "repeats", said)
 
 
 def _groups(trials: Trials) -> tuple[ComplexArray, ComplexArray, NDArray[np.int64]]:

@@ -1,5 +1,7 @@
 """Errors of the readings: where they come from, and how they go through to the weights and to a check run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, synthetic
@@ -8,6 +10,8 @@ from balancing import Labels, ReadingErrors, correct, estimate_influence
 from balancing.errors import error_model, reading_covariance
 from balancing.propagation import correction_jacobian, prediction_covariance
 from rotorid.regression import stretch
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
 
 ERRORS = ReadingErrors(amplitude=0.006, phase=np.deg2rad(0.2), floor=0.001)
 
@@ -238,3 +242,14 @@ def test_covariances_are_written_as_the_job_counts_angles():
     a = np.array(plain.to_dict()["residuals"][1]["after_covariance"])
     b = np.array(turned.to_dict()["residuals"][1]["after_covariance"])
     np.testing.assert_allclose(b, 1e12 * a * [[1, -1], [-1, 1]], rtol=1e-9)
+
+
+def test_repeats_with_equal_phases_do_not_make_the_phase_exact():
+    """An instrument that shows whole degrees: an error of zero would count a reading infinitely."""
+    job = read_job(sample_data() / "bk_two_plane" / "job.toml")
+    once = job.trials.readings[:1]
+    twice = np.concatenate((once * 0.99, once * 1.01))
+    model = error_model(replace(job.trials, readings=twice, errors=None))
+    assert model.errors.phase == pytest.approx(model.errors.amplitude)
+    assert model.errors.amplitude == pytest.approx(0.01 * np.sqrt(2), rel=1e-9)
+    assert "all repeated phases are equal" in model.warnings[0]

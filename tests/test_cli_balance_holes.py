@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from balancing import correct, estimate_influence
@@ -171,3 +172,19 @@ def test_pieces_against_each_other_are_said(cli, tmp_path):
         assert said == (total > 3 * plane["mass"])
     assert mounting["warnings"]
     assert cli("balance", HOLES, "--split", "--json").json["mounting"]["warnings"] == []
+
+
+def test_the_table_says_where_to_take_material_away(cli, tmp_path):
+    """`angle_deg` of a plane with `remove` is the place to drill, not where weight would be added."""
+    for name in ("runs.csv", "weights.csv"):
+        (tmp_path / name).write_bytes((TURBO / name).read_bytes())
+    job, table = tmp_path / "job.toml", tmp_path / "weights_out.csv"
+    job.write_text((TURBO / "job.toml").read_text() + "\n[planes.left]\nremove = true\n")
+    rows = cli("balance", job, "--json", "--output", table).json["corrections"]
+    frame = pd.read_csv(table)
+    assert frame.columns[:2].tolist() == ["plane", "action"]
+    for row, (_, line) in zip(rows, frame.iterrows(), strict=True):
+        assert line["action"] == row["action"]
+        turn = (line["angle_deg"] - line["equivalent_added_deg"]) % 360
+        assert turn == pytest.approx(180.0 if row["action"] == "remove" else 0.0)
+        assert line["equivalent_added_deg"] == pytest.approx(row["angle_deg"])

@@ -50,7 +50,10 @@ def test_the_sheets_of_results(cli, tmp_path):
     sheet = tmp_path / "sheet.xlsx"
     document = cli("balance", TURBO / "holes.toml", "--split", "--output", sheet, "--json").json
     book = openpyxl.load_workbook(sheet)
-    results = ["results", "results summary", "results residuals", "results holes", "results influence"]
+    results = [
+        "results", "results summary", "results residuals", "results add to mounted",
+        "results mounted residuals", "results holes", "results influence",
+    ]  # fmt: skip
     assert book.sheetnames == ["runs", "weights", "planes", "sensors", "settings", *results]
     assert book.active.title == "results"
     corrections = pd.read_excel(sheet, sheet_name="results", comment="#")
@@ -60,6 +63,8 @@ def test_the_sheets_of_results(cli, tmp_path):
     residuals = pd.read_excel(sheet, sheet_name="results residuals", comment="#")
     for key in ("speed_rpm", "sensor", "before", "before_phase_deg", "after", "after_phase_deg"):
         assert residuals[key].tolist() == [row[key] for row in document["residuals"]]
+    mounted = pd.read_excel(sheet, sheet_name="results mounted residuals", comment="#")
+    assert mounted["after"].tolist() == [row["after"] for row in document["mounting"]["residuals"]]
     holes = pd.read_excel(sheet, sheet_name="results holes", comment="#")
     assert len(holes) == len(document["mounting"]["holes"])
     summary = dict(book["results summary"].iter_rows(min_row=3, max_col=2, values_only=True))

@@ -288,9 +288,10 @@ def test_warnings_come_before_results(made):
     assert order[-2:] == ["provenance", "result"]
     head = text[: text.index('id="in-short"')]
     first = re.sub(r"<[^>]*>", "", head).replace("&#39;", "'").replace("&#34;", '"').replace("&gt;", ">")
-    for warning in report.result.warnings + (report.verdict.warnings if report.verdict else ()):
+    mounting = report.mounted.warnings if report.mounted else ()
+    for warning in report.result.warnings + mounting + (report.verdict.warnings if report.verdict else ()):
         assert balance.sentence(warning) in first
-    if not report.result.warnings and report.verdict is None:
+    if not report.result.warnings and not mounting and report.verdict is None:
         assert "No warnings." in first
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.tables import units
-from rotorid.tables.number import NotANumber, parse_number
+from rotorid.tables import read_trials, units
+from rotorid.tables.number import NotANumber, parse_number, thousands_or_decimals
 from rotorid.tables.problems import InputError, Problem, Problems, did_you_mean, suggest
 
 
@@ -173,3 +173,32 @@ def test_suggestions():
     assert suggest("SPEED_RPM", ["speed_rad_s", "speed_rpm"]) == "speed_rpm"
     assert suggest("xyz", ["speed_rpm"]) is None
     assert did_you_mean("sensr", ["sensor", "run"]) == " (did you mean 'sensor'?)"
+
+
+@pytest.mark.parametrize(
+    ("cells", "name", "doubtful"),
+    [
+        (["720", "1.350", "490"], "amplitude_um", {"1.350"}),
+        (["1.350", "2.125"], "amplitude_um", set()),
+        (["720", "1.350", "0.5"], "amplitude_um", set()),
+        (["3.000", "3.000"], "speed_rpm", {"3.000"}),
+        (["3.000", "2.5"], "speed_rpm", set()),
+        (["0", "1.350"], "phase_deg", set()),
+        (["1.234.567", "3"], "amplitude", {"1.234.567"}),
+        (["0.350", "720"], "amplitude", set()),
+    ],
+)
+def test_points_that_may_separate_thousands(cells, name, doubtful):
+    assert thousands_or_decimals(cells, name) == doubtful
+
+
+def test_a_european_file_without_decimals_is_not_misread(tmp_path):
+    """Excel writes 1350 as 1.350 where a German format asks for it: it must not be read as 1.35."""
+    path = tmp_path / "runs.csv"
+    path.write_text(
+        "run;speed_rpm;sensor;amplitude_um;phase_deg\na;3000;A;720;10\na;3000;B;1.350;20\n", encoding="utf-8"
+    )
+    weights = tmp_path / "weights.csv"
+    weights.write_text("run;plane;mass_g;angle_deg\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"row 3, column amplitude_um: found '1\.350'.*thousands separator"):
+        read_trials(path, weights)

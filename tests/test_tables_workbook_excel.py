@@ -27,7 +27,7 @@ PLANES = [
     ["1", 20.5, "20.5-60", "0; 7.5; 90", "2.5; 5", "2: 2.5", None],
     ["2", None, None, 7.5, 2.5, None, False],
 ]
-SENSORS = [["sensor", "limit", "weight"], ["A", 6.5, 1], ["B", "1000: 6", 0.5]]
+SENSORS = [["sensor", "limit", "weight"], ["A", 6.5, 1], ["B", "1000: 6,5", 0.5]]
 BOOK = {"runs": RUNS, "weights": WEIGHTS, "planes": PLANES, "sensors": SENSORS, "settings": SETTINGS}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import sys
 import warnings
@@ -84,6 +85,9 @@ def main() -> None:
     """Run the command line; the exit status is 2 for bad input or usage, with one message, no traceback."""
     if sys.stdout is None:  # the caller closed it: a result that nobody can read is no success
         sys.exit(_complain(OSError("standard output is closed: there is nowhere to print the result")))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # an old code page has no arrows or signs of degrees
+            stream.reconfigure(errors="replace")
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn  # type: ignore[assignment]

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -147,13 +148,17 @@ def emit(
         written[report[0]] = report[1](dict(document), record)
     write_files(written)
     if as_json:
-        typer.echo(
-            json.dumps({**document, "provenance": record}, ensure_ascii=False, allow_nan=False, indent=1)
-        )
+        typer.echo(json_text({**document, "provenance": record}))
         return
     typer.echo(text())
     for path in written:
         typer.echo(f"written: {path}")
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """A document as JSON; in plain ASCII where standard output cannot write more."""
+    plain = "utf" not in (getattr(sys.stdout, "encoding", None) or "utf-8").casefold()
+    return json.dumps(document, ensure_ascii=plain, allow_nan=False, indent=1)
 
 
 def figure_bytes(figure: Figure, path: Path) -> bytes:

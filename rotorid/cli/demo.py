@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption, provenance
+from rotorid.cli.common import JsonOption, json_text, provenance
 from rotorid.cli.demo_samples import SAMPLES, Sample
 
 COPIED = (".csv", ".toml", ".md")
@@ -52,7 +52,7 @@ def demo(
             **_documents(folder, chosen),
             "provenance": provenance(copies, {"folder": folder, "sample": sample}),
         }
-        _print_json(document)
+        typer.echo(json_text(document))
         return
     for number, (step, command) in enumerate(
         zip(chosen.steps, _commands(folder, chosen), strict=True), start=1
@@ -67,7 +67,7 @@ def _list(*, as_json: bool) -> None:
     """The samples, one line each."""
     if as_json:
         about = [{"name": name, "about": sample.about} for name, sample in SAMPLES.items()]
-        _print_json({"samples": about, "provenance": provenance([], {"list": True})})
+        typer.echo(json_text({"samples": about, "provenance": provenance([], {"list": True})}))
         return
     width = max(map(len, SAMPLES))
     for name, sample in SAMPLES.items():
@@ -100,12 +100,6 @@ def _documents(folder: Path, sample: Sample) -> dict[str, Any]:
     return found
 
 
-def _print_json(document: Mapping[str, Any]) -> None:
-    import json
-
-    typer.echo(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1))
-
-
 def _copy(folder: Path, sample: Sample) -> list[Path]:
     """Write the files of a sample; refuse before anything is written."""
     from rotorid.samples import sample_data
@@ -135,6 +129,10 @@ def _check_folder(folder: Path, samples: Path, copies: Mapping[Path, bytes], sam
         (folder / name).resolve() == (samples / name).resolve() for name in sample.sources
     ):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
+    own = all(path.exists() for path in copies)  # a demo of this sample ran here before
+    pictures = [] if own else [str(folder / p) for p in sample.pictures if (folder / p).exists()]
+    if pictures:
+        raise ValueError(f"{', '.join(pictures)}: would be overwritten; delete it, or {remedy}")
     changed = [str(p) for p, data in copies.items() if p.exists() and (p.is_dir() or p.read_bytes() != data)]
     if changed:
         raise ValueError(

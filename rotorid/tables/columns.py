@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotorid.tables.grid import BadCell, Cell, Grid, make_grid, show
-from rotorid.tables.number import NotANumber, check_size, decimal_comma, parse_number
+from rotorid.tables.number import NotANumber, check_size, decimal_comma, parse_number, thousands_or_decimals
 from rotorid.tables.problems import Problems, listing, suggest
 from rotorid.tables.sheet import is_workbook, pick_sheet, read_workbook
 from rotorid.tables.textfile import decode, parse_text, read_bytes
@@ -313,11 +313,19 @@ def _field(
     texts = [""] * len(cells)
     # most cells of a long table say what another one has said
     known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    doubtful: set[str] = set()
+    if unit is not None and not comma and grid.separator in (";", "\t"):
+        doubtful = thousands_or_decimals((cell for cell in cells if isinstance(cell, str)), name)
     for place, cell in enumerate(cells):
         if cell not in known:
             try:
                 if isinstance(cell, BadCell):
                     raise NotANumber(cell.expected)
+                if cell in doubtful:
+                    raise NotANumber(
+                        "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
+                        "in the whole file, 1,350"
+                    )
                 known[cell] = (
                     _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
                 )

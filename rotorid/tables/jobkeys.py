@@ -170,7 +170,7 @@ def by_speed(section: Section, key: str, what: str, *, above_zero: bool) -> dict
 
 def _plain(value: object, *, above_zero: bool) -> float | None:
     """A number ≥ 0 (or > 0) from a number or its text; else None."""
-    read = number(value)
+    read = number(value, comma=True)
     return None if read is None or read < 0 or (above_zero and read == 0) else read
 
 

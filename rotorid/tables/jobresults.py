@@ -62,6 +62,17 @@ def result_sheets(results: Results, provenance: Mapping[str, Any] | None) -> dic
     rows = [*_summary(document, ()), *(() if provenance is None else _summary(provenance, ("provenance",)))]
     sheets[f"{RESULTS} summary"] = [*head, ("result", "value"), *rows]
     sheets[f"{RESULTS} residuals"] = [*head, *_records(document.get("residuals", ()))]
+    for name, keys in {
+        "add to mounted": ("add_to_mounted",),
+        "mounted residuals": ("mounting", "residuals"),
+        "check": ("check", "readings"),
+        "verdict": ("verdict", "rows"),
+    }.items():
+        found: Any = document
+        for key in keys:
+            found = None if found is None else found.get(key)
+        if found:
+            sheets[f"{RESULTS} {name}"] = [*head, *_records(found)]
     if results.mounted is not None:
         sheets[f"{RESULTS} holes"] = [*head, *_frame(results.mounted.to_frame())]
     labels = labels_of(results.influence)

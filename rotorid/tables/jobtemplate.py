@@ -231,6 +231,16 @@ def _listed(words: tuple[str, ...]) -> str:
     return f"{', '.join(words[:-1])} or {words[-1]}"
 
 
+_MORE = (
+    "Further sheets that may be added: check (readings of the check run, the columns of runs) and "
+    "check_weights (what was mounted then, the columns of weights; without it the proposed weights);",
+    "slow_roll (columns sensor, amplitude, phase_deg, optional speed_rpm: subtracted from all readings); "
+    "influence (coefficients, as --save-influence writes them).",
+    "Repeated readings: a column repeat in runs (1, 2, ...). Holes with names or at any angle: holes_deg and "
+    "hole_names in planes. Where the key phasor stands: key_phasor.angle_deg in settings.",
+)
+
+
 def _notes() -> Page:
     """All explanations in one place, and the example of Brüel & Kjær's application note 17-227."""
     columns: list[Line] = [
@@ -247,6 +257,8 @@ def _notes() -> Page:
             ("sheet", "column or key", "meaning", "allowed values", "other names of the column"),
             *columns,
             *keys,
+            (),
+            *((words,) for words in _MORE),
             (),
             ("Example, sheet runs: corrections are 2.95 g at 50.2° in plane 1 and 2.84 g at 278.1° in 2",),
             *_EXAMPLE_RUNS,

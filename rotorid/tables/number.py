@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 _POINT = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_POINT_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:\.[0-9]{3})+")
 _MAYBE_THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(?:[ ,.'’][0-9]{3})+(?:[.,][0-9]*)?")
 _WITH_UNIT = re.compile(r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]|[°%µμ]).*")
@@ -39,6 +40,20 @@ def decimal_comma(cells: Iterable[str], separator: str) -> bool:
         has_decimal_comma(cell) and (separator == ";" or _MAYBE_THOUSANDS.fullmatch(cell) is None)
         for cell in cells
     )
+
+
+def thousands_or_decimals(cells: Iterable[str], name: str) -> set[str]:
+    """Cells of a column without decimal commas whose points may separate thousands, as in 1.350 beside 720.
+
+    A European spreadsheet writes 1350 so where no number of the column has decimals. The column is doubtful
+    if it has whole numbers without a point too, or holds revolutions per minute, and no other decimals.
+    """
+    found = {cell for cell in cells if cell}
+    doubtful = {cell for cell in found if _POINT_THOUSANDS.fullmatch(cell)}
+    others = found - doubtful
+    whole = any(cell.lstrip("+-").isdecimal() and cell.strip("+-0") for cell in others)
+    decimals = any("." in cell for cell in others)
+    return doubtful if not decimals and (whole or name.casefold().endswith("_rpm")) else set()
 
 
 def check_size(value: float) -> None:
