@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.sheet import figures, table
+from balancing.sheet import figures, small, table
 
 if TYPE_CHECKING:
     from balancing.holes import Holes, Mounting
@@ -70,12 +70,12 @@ def summary(m: Mounted) -> str:
     lines.append(table(rows, left=2) if len(rows) > 1 else "  nothing: every piece would make it worse")
     after = labels.vibration(m.after)[0]
     free = labels.vibration(c.after)[0]
-    lines.append(
-        f"{labels.vibration_unit} left: rms {figures(float(np.sqrt(np.mean(after**2))), 3)}, largest "
-        f"{figures(float(after.max()), 3)}".strip()
-        + f"; with any weights rms {figures(float(np.sqrt(np.mean(free**2))), 3)}, largest "
-        + figures(float(free.max()), 3)
-    )
+    scale = float(labels.vibration(c.before)[0].max())
+    shown = [
+        f"rms {small(float(np.sqrt(np.mean(size**2))), scale)}, largest {small(float(size.max()), scale)}"
+        for size in (after, free)
+    ]
+    lines.append(f"{labels.vibration_unit} left: {shown[0]}; with any weights {shown[1]}".strip())
     for p, plane in enumerate(c.planes):
         if not _holes(m, p):
             lines.append(f"Plane {plane}: nothing; no pieces that it can take make it better.")

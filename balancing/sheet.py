@@ -169,7 +169,7 @@ def _vibration(c: Correction) -> str:
     for s, speed in enumerate(c.speeds):
         for k, sensor in enumerate(c.sensors):
             row = [f"{_rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
-            shown = _small(new[s, k], old.max())
+            shown = small(new[s, k], old.max())
             row += [shown, "" if shown == "0" else _degrees(new_phase[s, k], 0)]
             if bound is not None:
                 row.append(f"± {figures(bound[s, k], 2)}")
@@ -177,8 +177,8 @@ def _vibration(c: Correction) -> str:
     unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
     last = [
         f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)} → "
-        f"{_small(float(np.sqrt(np.mean(new**2))), old.max())}, "
-        f"largest {figures(old.max(), 3)} → {_small(new.max(), old.max())}"
+        f"{small(float(np.sqrt(np.mean(new**2))), old.max())}, "
+        f"largest {figures(old.max(), 3)} → {small(new.max(), old.max())}"
     ]
     return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), *last])
 
@@ -301,7 +301,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _small(value: float, scale: float) -> str:
+def small(value: float, scale: float) -> str:
     """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
     return "0" if value <= 1e-9 * scale else figures(value, 3)
 

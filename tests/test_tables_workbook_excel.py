@@ -343,3 +343,11 @@ def test_a_cell_formatted_as_a_percentage_is_no_plain_number(tmp_path):
     (complaint,) = complaints(lambda: read_job(path))
     assert "2%" in str(complaint)
     assert "formatted as a percentage" in str(complaint)
+
+
+def test_a_plane_that_does_not_exist_is_named_with_its_sheet_and_row(tmp_path):
+    path = tmp_path / "job.xlsx"
+    write_book(path, {**BOOK, "planes": [*PLANES, ["9", 5, None, None, None, None, None]]})
+    (complaint,) = complaints(lambda: read_job(path))
+    assert (complaint.row, complaint.column, complaint.value) == (4, "plane", "9")
+    assert "planes" in complaint.file

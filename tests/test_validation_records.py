@@ -49,7 +49,7 @@ def test_rows_of_time_records(records):
         "[F] record": 164,
         "[F] from the intact printed values": 3,
     }
-    assert statuses(records) == {"agrees": 659}
+    assert statuses(records) == {"agrees": 653}
 
 
 def test_rows_of_published_balancing(examples):

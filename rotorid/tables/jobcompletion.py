@@ -56,8 +56,8 @@ def completed(
         complain_about_places(trials.sensors, model, top, plane_keys)
         trials = weight_unit_without_weights(trials, planes, radii)
     if planes:
-        _complain_about_names(top.source, "planes", tuple(plane_keys), planes, problems)
-    _complain_about_names(top.source, "sensors", tuple(sensor_keys), trials.sensors, problems)
+        _complain_about_names(top, "planes", tuple(plane_keys), planes, problems)
+    _complain_about_names(top, "sensors", tuple(sensor_keys), trials.sensors, problems)
     trials = at_correction_radius(trials, plane_keys)
     left_out = tuple(name for name in planes if name in plane_keys and not plane_keys[name].use)
     if planes and len(left_out) == len(planes):
@@ -108,12 +108,13 @@ def completed(
 
 
 def _complain_about_names(
-    source: str, key: str, named: Sequence[str], known: Sequence[str], problems: Problems
+    top: Section, key: str, named: Sequence[str], known: Sequence[str], problems: Problems
 ) -> None:
     for name in named:
         if name not in known:
             expected = f"one of the job's {key}, {listing(known, 'and')}{did_you_mean(name, known)}"
-            problems.add(source, None, f"{key}.{name}", name, expected)
+            source, row, column = top.place(f"{key}.{name}")
+            problems.add(source, row, column, name, expected)
 
 
 def at_correction_radius(trials: Trials, planes: Mapping[str, PlaneKeys]) -> Trials:

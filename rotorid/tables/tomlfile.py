@@ -74,11 +74,15 @@ class Section:
         """All keys, taken or not."""
         return tuple(self._data)
 
+    def place(self, name: str) -> tuple[str, int | None, str]:
+        """File or sheet, row and column of a setting given by its whole dotted name."""
+        return self._where.get(name, (self.source, None, name))
+
     def complain(self, key: str, expected: str, *, value: bool = True) -> None:
         """Note a problem with a key."""
         found = _shown(self._data[key]) if value and key in self._data else None
         name = f"{self._prefix}{key}"
-        source, row, column = self._where.get(name, (self.source, None, name))
+        source, row, column = self.place(name)
         self._problems.add(source, row, column, found, expected)
 
     def take(self, key: str) -> Any:  # noqa: ANN401  whatever the file holds
