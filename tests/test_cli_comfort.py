@@ -317,3 +317,27 @@ def test_a_failing_command_says_only_what_is_wrong(cli):
     outcome = cli("critical", "nowhere.csv", "--verbose")
     assert outcome.code == 2
     assert len(outcome.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "number"),
+    [
+        (("critical", ROTOR), "unknowns_per_plane = 48"),
+        (("campbell", ROTOR, "--speeds", "0:200:100"), "estimated_relative_error = "),
+        (
+            ("influence", ROTOR, "--planes", 7, "--sensors", 2, "--speeds", "100"),
+            "elements = 23",
+        ),
+        (("tolerance", "--mass", "500kg", "--speed", "3000rpm", "--grade", "G2.5"), "specific_um = 7.95775"),
+        (
+            ("trial-weight", "--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "200mm"),
+            "load_N = 49",
+        ),
+        (("validate",), "counts.differs = 0"),
+    ],
+)
+def test_verbose_has_a_number_for_every_command(cli, arguments, number):
+    outcome = cli(*arguments, "--verbose")
+    assert outcome.code == 0, outcome.err
+    assert number in outcome.err
+    assert number not in outcome.out

@@ -20,6 +20,7 @@ from rotorid.cli.common import (
     separation_text,
 )
 from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note_rotor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,6 +63,7 @@ def campbell(
     inside = None if service is None else separation([float(c[0]) for c in result.criticals], service)
     if inside is not None:
         document["operating"] = inside
+    note_rotor(model, speeds=len(omega), estimated_relative_error=result.error)
     emit(
         document,
         lambda: "\n".join([result.summary(), *([] if inside is None else [separation_text(inside)])]),

@@ -22,6 +22,7 @@ from rotorid.cli.common import (
     separation_text,
 )
 from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note_rotor
 
 if TYPE_CHECKING:
     from fem import Rotor, SpeedMap
@@ -84,6 +85,7 @@ def critical(
 
         return critical_report(document, modes, provenance=record, chart=chart, operating=service)
 
+    note_rotor(model)
     emit(
         document,
         lambda: "\n\n".join(

@@ -18,6 +18,7 @@ from rotorid.cli.common import (
 )
 from rotorid.cli.common import sensors as parse_sensors
 from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note_rotor
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +57,7 @@ def influence(
     at, read, omega = nodes(planes, "--planes"), parse_sensors(sensors), rising_speeds(speed)
     with busy(f"influence coefficients at {len(omega)} speeds"):
         result = fem.influence(model, at, read, omega)
+    note_rotor(model, speeds=len(omega))
     emit(
         result.to_dict(),
         result.summary,

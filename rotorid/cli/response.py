@@ -27,6 +27,7 @@ from rotorid.cli.common import (
 from rotorid.cli.common import sensors as parse_sensors
 from rotorid.cli.progress import busy
 from rotorid.cli.refine import refine, response_from_rest, settle
+from rotorid.cli.verbose import note_rotor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,6 +124,7 @@ def response(
 
         return response_report(document, finer, places, peaks, provenance=record, operating=service)
 
+    note_rotor(model, speeds=len(omega))
     emit(
         _document(result, finer, places, labels, peaks),
         lambda: _summary(result, finer, Z, labels, peaks),

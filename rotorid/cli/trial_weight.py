@@ -10,6 +10,7 @@ import typer
 
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names
 from rotorid.cli.tolerance import quantity, speed_with_unit
+from rotorid.cli.verbose import note
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -156,6 +157,8 @@ def trial_weight(
         found, files = _from_job(job, asked, rotor, load)
     if plot is not None and any(t.angle is None for t in found):
         raise ValueError("--plot needs an angle: give --reading-phase and --lag, or a job")
+    first = found[0].to_dict()
+    note({key: first[key] for key in ("force_N", "load_N")})
     emit(
         {"trial_weights": [t.to_dict() for t in found], "conventions": found[0].labels.conventions()},
         lambda: "\n\n".join(t.summary() for t in found),

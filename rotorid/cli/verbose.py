@@ -9,9 +9,12 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
+
+if TYPE_CHECKING:
+    from fem import Rotor
 
 VerboseOption = Annotated[
     bool,
@@ -45,6 +48,19 @@ SHOWN = (
     "relative_error",
     "masses_std_kg",
     "mac",
+    "elements",
+    "unknowns_per_plane",
+    "supports",
+    "discs",
+    "speeds",
+    "estimated_relative_error",
+    "permissible_kg_m",
+    "specific_um",
+    "force_N",
+    "load_N",
+    "agrees",
+    "erratum",
+    "differs",
 )
 """Keys of the JSON documents that say how a result came about, at any depth."""
 MOST = 12
@@ -105,6 +121,22 @@ def note(document: Mapping[str, Any]) -> None:
     notes = _NOTES.get()
     if notes is not None:
         notes.numbers |= dict(_numbers(document))
+
+
+def note_rotor(rotor: Rotor, **more: object) -> None:
+    """Keep how large the model of a rotor is, and `more` numbers under names of `SHOWN`."""
+    if _NOTES.get() is None:
+        return
+    stride = 4 if rotor.model.shear else 2
+    note(
+        {
+            "elements": rotor.n_elements,
+            "unknowns_per_plane": 2 * rotor.n_nodes + (stride - 2) * rotor.n_elements,
+            "discs": len(rotor.discs),
+            "supports": len(rotor.supports),
+            **more,
+        }
+    )
 
 
 def span(what: str, seconds: float) -> None:
