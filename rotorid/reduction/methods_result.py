@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from rotorid.reduction.jsonable import floats
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -75,10 +76,10 @@ class Method:
             "stiffness_matrix_N_per_m": None if self.K is None else self.K.tolist(),
             "masses_kg": None if masses is None else masses.tolist(),
             "diagonal": self.diagonal,
-            "natural_frequencies_rad_s": _floats(self.frequencies),
-            "relative_error": _floats(self.relative_error),
-            "mac": _floats(self.mac),
-            "mode_shapes": [_floats(shape) for shape in self.shapes.T],
+            "natural_frequencies_rad_s": floats(self.frequencies),
+            "relative_error": floats(self.relative_error),
+            "mac": floats(self.mac),
+            "mode_shapes": [floats(shape) for shape in self.shapes.T],
             "reason": self.reason or None,
         }
 
@@ -220,7 +221,3 @@ def _list(nodes: Sequence[int]) -> str:
 
 def _words(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

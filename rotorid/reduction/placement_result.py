@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from rotorid.reduction.jsonable import floats
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -217,8 +218,8 @@ class Placement:
         return {
             "rank": i + 1 if i < self.ranked else None,
             "nodes": self.nodes[i].tolist(),
-            "masses_kg": _floats(self.masses[i]),
-            "natural_frequencies_rad_s": _floats(self.frequencies[i]),
+            "masses_kg": floats(self.masses[i]),
+            "natural_frequencies_rad_s": floats(self.frequencies[i]),
             "largest_error": _float(self.error[i]),
             "smallest_mac": _float(self.mac[i]),
             "worst_mode": int(self.worst_mode[i]) or None,
@@ -292,7 +293,3 @@ class Placement:
 
 def _float(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [_float(v) for v in values]

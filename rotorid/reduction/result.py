@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import fem
 from rotorid.estimate import Estimate
+from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
 from rotorid.reduction.separated import Separated
 from rotorid.reduction.shift import Shift
@@ -206,14 +207,14 @@ class Reduction:
             "modes": self.modes,
             **self.choices.to_dict(),
             "masses_kg": self.masses.solution.tolist(),
-            "masses_std_kg": None if self.masses.std is None else _floats(self.masses.std),
-            "mass_sensitivity": _floats(self.sensitivity),
+            "masses_std_kg": None if self.masses.std is None else floats(self.masses.std),
+            "mass_sensitivity": floats(self.sensitivity),
             "compliance_m_per_N": self.compliance.tolist(),
             "seal_stiffness_N_per_m": self.seal_stiffness.tolist(),
-            "natural_frequencies_rad_s": _floats(self.frequencies),
-            "rotor_frequencies_rad_s": _floats(self._padded(self.rotor_frequencies)),
-            "relative_error": _floats(self.relative_error),
-            "mac": _floats(self.mac),
+            "natural_frequencies_rad_s": floats(self.frequencies),
+            "rotor_frequencies_rad_s": floats(self._padded(self.rotor_frequencies)),
+            "relative_error": floats(self.relative_error),
+            "mac": floats(self.mac),
             "condition_number": self.masses.condition_number,
             "warnings": list(self.warnings),
         }
@@ -314,7 +315,3 @@ def _plain(value: float) -> str:
         return f"{value:g}"
     places = 1 - int(np.floor(np.log10(abs(value))))
     return f"{round(value, places):.{max(places, 0)}f}"
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

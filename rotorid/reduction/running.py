@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from fem.eigen import finite_modes
 from fem.matrices import assemble
 from fem.sensors import SensorLike, label
 from fem.whirl import checked_speeds
+from rotorid.reduction.jsonable import floats
 from rotorid.reduction.threshold import stability_threshold
 from rotorid.reduction.turning import equations
 
@@ -144,7 +144,7 @@ class ResponseCost:
             "criticals_rad_s": self.criticals.tolist(),
             "bands": self.bands,
             "excluded": self.excluded.tolist(),
-            "relative_difference": _plain(self.worst),
+            "relative_difference": floats(self.worst),
             "largest": self.largest,
             "median": self.median,
             "largest_to_highest": self.largest_to_highest,
@@ -329,7 +329,3 @@ def _percent(part: float) -> str:
 
 def _phase(W: ComplexArray) -> FloatArray:
     return np.asarray(np.mod(np.degrees(np.angle(W)), 360.0))
-
-
-def _plain(values: Sequence[float] | FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotorid.reduction.jsonable import floats
+
 FloatArray = NDArray[np.float64]
 
 
@@ -39,12 +41,12 @@ class Shift:
         """As JSON types."""
         return {
             "first_order": {
-                "masses_kg": _floats(self.masses),
-                "frequencies_rad_s": _floats(self.frequencies),
+                "masses_kg": floats(self.masses),
+                "frequencies_rad_s": floats(self.frequencies),
             },
             "exact": {
-                "masses_kg": _floats(self.exact_masses),
-                "frequencies_rad_s": _floats(self.exact_frequencies),
+                "masses_kg": floats(self.exact_masses),
+                "frequencies_rad_s": floats(self.exact_frequencies),
             },
             "warnings": list(self.warnings),
         }
@@ -74,7 +76,3 @@ def labels(n: int) -> list[str]:
 def units(n: int) -> list[str]:
     """Their units."""
     return ["kg"] * n + ["rad/s"] * n
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

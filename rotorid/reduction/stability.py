@@ -14,6 +14,7 @@ from fem.planes import both_planes
 from fem.rotor import RPM
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number
 from fem.whirlsolve import Whirl, solve_whirl
+from rotorid.reduction.jsonable import floats
 from rotorid.reduction.running import without_modal_damping
 from rotorid.reduction.threshold import STEPS, grid, searched, stability_threshold
 from rotorid.reduction.turning import whirl_of
@@ -158,10 +159,10 @@ class StabilityCost:
         return {
             "nodes": list(self.nodes),
             "speeds_rad_s": self.speeds.tolist(),
-            "full_log_decrement": _plain(self.full_decrement),
-            "small_log_decrement": _plain(self.small_decrement),
-            "full_frequency_rad_s": _plain(self.full_frequency),
-            "small_frequency_rad_s": _plain(self.small_frequency),
+            "full_log_decrement": floats(self.full_decrement),
+            "small_log_decrement": floats(self.small_decrement),
+            "full_frequency_rad_s": floats(self.full_frequency),
+            "small_frequency_rad_s": floats(self.small_frequency),
             "full": self.full.to_dict(),
             "small": self.small.to_dict(),
             "relative_difference_of_threshold": self.relative_difference,
@@ -305,7 +306,3 @@ def _way(direction: float | None) -> str:
 
 def _text(value: float | None, digits: int) -> str:
     return "-" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
-
-
-def _plain(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, equivalent_masses
 from rotorid.reduction.matching import match
 from rotorid.reduction.placement_result import ALIKE
@@ -97,10 +98,10 @@ class TradeOff:
                     "model": name,
                     "matching": bool(self.matching[r]),
                     "masses_kg": self.masses[r].tolist(),
-                    "natural_frequencies_rad_s": _floats(self.frequencies[r]),
-                    "relative_error": _floats(self.relative_error[r]),
-                    "mac": _floats(self.mac[r]),
-                    "condition_number": _floats(self.condition[r : r + 1])[0],
+                    "natural_frequencies_rad_s": floats(self.frequencies[r]),
+                    "relative_error": floats(self.relative_error[r]),
+                    "mac": floats(self.mac[r]),
+                    "condition_number": floats(self.condition[r : r + 1])[0],
                 }
                 for r, name in enumerate(self.names)
             ],
@@ -257,7 +258,3 @@ def _unphysical(names: list[str], masses: FloatArray) -> list[str]:
 
 def _cell(value: float, form: str) -> str:
     return f"{value:{form}}" if np.isfinite(value) else f"{'none':>10}"
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]

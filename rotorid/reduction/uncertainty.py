@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
 from rotorid.reduction.sensitivity import InputErrors, Inputs, input_index, inputs, standard_deviations
 from rotorid.reduction.shift import Shift, labels, units
@@ -146,22 +147,22 @@ class MassUncertainty:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
         return {
-            "masses_kg": _floats(self.masses),
-            "masses_std_kg": _floats(self.masses_std),
-            "natural_frequencies_rad_s": _floats(self.frequencies),
-            "natural_frequencies_std_rad_s": _floats(self.frequencies_std),
+            "masses_kg": floats(self.masses),
+            "masses_std_kg": floats(self.masses_std),
+            "natural_frequencies_rad_s": floats(self.frequencies),
+            "natural_frequencies_std_rad_s": floats(self.frequencies_std),
             "drawn": None
             if self.drawn is None
             else {
-                "masses_std_kg": _floats(self.drawn[0]),
-                "natural_frequencies_std_rad_s": _floats(self.drawn[1]),
+                "masses_std_kg": floats(self.drawn[0]),
+                "natural_frequencies_std_rad_s": floats(self.drawn[1]),
             },
             "nonlinearity": {
-                "masses": _floats(self.nonlinearity[0]),
-                "natural_frequencies": _floats(self.nonlinearity[1]),
+                "masses": floats(self.nonlinearity[0]),
+                "natural_frequencies": floats(self.nonlinearity[1]),
             },
             "contributions": {
-                name: {"masses_kg2": _floats(part[0]), "natural_frequencies_rad2_s2": _floats(part[1])}
+                name: {"masses_kg2": floats(part[0]), "natural_frequencies_rad2_s2": floats(part[1])}
                 for name, part in self.contributions.items()
                 if part.any()
             },
@@ -328,7 +329,3 @@ def _warnings(base: FloatArray, std: FloatArray, bent: FloatArray, condition: fl
     if (np.diff(omega) <= 1e-6 * omega[1:]).any():
         said.append("two frequencies of the model coincide: their standard deviations mean nothing")
     return said
-
-
-def _floats(values: FloatArray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]
