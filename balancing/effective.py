@@ -254,13 +254,14 @@ def _minimise(problem: Problem, d: FloatArray) -> _Minimum:
     at = evaluate(problem, d)
     for k in range(1, _STEPS + 1):
         step, decrease, convex = _step(problem, at)
+        small = decrease <= _DONE * (1 + at.objective)
         t = 1.0
         for _ in range(_HALVINGS):
             new = evaluate(problem, d + t * step)
-            if new.objective <= at.objective - 1e-4 * t * decrease:
+            # rounding of Q says nothing of so small a step: it is taken whole
+            if small or new.objective <= at.objective - 1e-4 * t * decrease:
                 break
             t /= 2
-        small = decrease <= _DONE * (1 + at.objective)
         if new.objective >= at.objective and not small:
             rounding = decrease <= _STUCK * (1 + at.objective)
             return _Minimum(d, problem, at, k, rounding and convex)

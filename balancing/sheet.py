@@ -275,7 +275,8 @@ def figures(value: float, digits: int = 4) -> str:
     """A number with so many significant digits, written out where that is short."""
     if not 1e-4 <= abs(value) < 1e6:
         return "0" if value == 0 else f"{value:.{digits - 1}e}"
-    places = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
+    exponent = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number: 0.9999 is 1.00
+    places = max(digits - 1 - exponent, 0)
     return f"{value:.{places}f}"
 
 

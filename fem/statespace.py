@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.massless import ZERO, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
+from fem.massless import ZERO, Sorted, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
 from fem.motion import Motion
 from fem.rotor import FloatArray
 from fem.supports import ComplexArray
@@ -159,11 +159,7 @@ def state_space(
 
     order = sorted_by_mass(M, names)
     n1 = len(order.mass)
-    damping, stiffness, F = (
-        order.left.T @ C @ order.right,
-        order.left.T @ K @ order.right,
-        order.left.T[:, forces],
-    )
+    damping, stiffness, F = _combined(order, C), _combined(order, K), order.left.T[:, forces]
     mass = np.zeros_like(damping)
     mass[:n1, :n1] = order.mass
     scale, omega = scales(mass, damping, stiffness)
@@ -212,6 +208,13 @@ def state_space(
     return StateSpace(
         S[:, :n], S[:, n:], Y[:, :n], Y[:, n:], states, chosen_inputs, tuple(chosen_outputs), motion.speed
     )
+
+
+def _combined(order: Sorted, X: FloatArray) -> FloatArray:
+    """leftᵀ X right, without entries that are only what rounding leaves of terms that cancel."""
+    out = order.left.T @ X @ order.right
+    size = np.abs(order.left.T) @ np.abs(X) @ np.abs(order.right)
+    return np.where(np.abs(out) > ZERO * size, out, 0.0)
 
 
 def _blocks(matrix: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
