@@ -29,9 +29,8 @@ they are together at the bearings (`Tolerance.at_bearings`).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 INBOARD = (0.3, 0.7)
 """Least and largest share of U_per at a bearing, centre of mass between the bearings."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.determined import UndeterminedError
 from balancing.errors import ErrorModel, error_model, mean_covariance, reading_covariance
@@ -13,10 +13,8 @@ from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
 from balancing.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.regression import stretch
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SPEED_TOLERANCE = 0.005
 """Speeds that differ by less, relatively, count as one."""
@@ -130,7 +128,7 @@ def _disagreement(
     influence: Influence,
     trials: Trials,
     mounted: ComplexArray,
-    pick: tuple[NDArray[np.intp], ...],
+    pick: tuple[IndexArray, ...],
     model: ErrorModel,
 ) -> tuple[str, ...]:
     """Runs that imply different vibrations of the bare rotor cannot be averaged without a word.

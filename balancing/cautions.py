@@ -5,19 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.determined import acting_alike
 from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.limits import Limits
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
     from balancing.methods import Fitted, Stack
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ILL_CONDITIONED = 30.0
 """Above this condition number (columns scaled) measured coefficients hardly tell the planes apart."""

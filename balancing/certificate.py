@@ -17,12 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.limits import Arc
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 _ROUNDING = 1e-11
 _SPREAD = 1e-6

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.baseline import match_speeds, starting_point
 from balancing.correction import Correction
@@ -30,12 +30,11 @@ from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.repeatability import both_directions, tail
 from balancing.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LEVEL = 0.95
 """A difference whose χ² would be exceeded by errors alone in less than 5 % of all jobs is not explained."""

@@ -6,14 +6,12 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.sheet import DUST, WIDTH, figures, table
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from balancing.check import CheckComparison
-
-ComplexArray = NDArray[np.complex128]
 
 
 def verdict(c: CheckComparison) -> str:
@@ -173,7 +171,7 @@ def _percent(probability: float) -> str:
     return "below 0.01 %" if probability < 1e-4 else f"{100 * probability:.3g} %"
 
 
-def _rms(amplitudes: NDArray[np.float64]) -> float:
+def _rms(amplitudes: FloatArray) -> float:
     return float(np.sqrt(np.mean(amplitudes**2)))
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.influence import Influence
 from fem.nearest import did_you_mean
-
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 
 def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:

@@ -19,15 +19,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.baseline import SPEED_TOLERANCE
 from balancing.errors import symmetric
 from balancing.influence import Influence
 from balancing.repeatability import tail
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 LEVEL = 0.99
 """Of the test whether both agree, for all coefficients together."""

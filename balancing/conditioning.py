@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ALIKE = 0.1
 """Planes are named that do the same but for this share of their effect (two such: condition number 20)."""

@@ -12,15 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.certificate import Bound, Problem, lower_bound
 from balancing.coneprogram import TIGHTER, InfeasibleError, Program, SolverError, within_limits
 from balancing.limits import Arc
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 __all__ = [
     "Cone",

@@ -13,16 +13,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.certificate import Problem, project
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, stretch, unstretch
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 _DEPENDENT = 1e-10

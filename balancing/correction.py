@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.baseline import match_speeds, starting_point
 from balancing.cautions import (
@@ -31,15 +31,13 @@ from balancing.methods import Stack, fit_weights
 from balancing.optimism import optimism
 from balancing.propagation import prediction_covariance
 from balancing.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

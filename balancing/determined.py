@@ -6,17 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.resolution import HOPELESS, resolution
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import Estimate, least_squares
 
 if TYPE_CHECKING:
     from balancing.influence import Influence
-
-FloatArray = NDArray[np.float64]
-
-ComplexArray = NDArray[np.complex128]
 
 
 class UndeterminedError(ValueError):

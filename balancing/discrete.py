@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
 from balancing.discrete_relax import best_form, form, project_out, relax
@@ -26,11 +26,7 @@ from balancing.discrete_sets import LONGEST, Attainable
 from balancing.discrete_steps import StepSums, attainable
 from balancing.holes import Holes, Mounting
 from balancing.limits import Limits
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["Discrete", "solve_discrete"]
 

@@ -17,13 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.discrete_sets import Attainable
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 __all__ = ["Form", "best_form", "form", "project_out", "relax"]
 

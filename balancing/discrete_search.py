@@ -14,14 +14,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.discrete_relax import Form
 from balancing.discrete_sets import Attainable
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 __all__ = ["Found", "Leaves", "nearest", "polish", "search"]
 

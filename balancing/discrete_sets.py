@@ -15,11 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from balancing.holes import Holes, Mounting, mounting
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["DIRECTIONS", "LONGEST", "SAME", "Attainable", "PieceSums", "disc_lowest", "distinct"]
 

@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.discrete_sets import DIRECTIONS, LONGEST, SAME, Attainable, PieceSums, disc_lowest, distinct
 from balancing.holes import WIDEST, Holes, Mounting, mounting
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["StepSums", "attainable"]
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.determined import check_planes
 from balancing.likelihood import (
@@ -39,10 +39,8 @@ from balancing.likelihood import (
     jacobian,
     problem_of,
 )
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain, stretch, unstretch
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 FLOOR = 1e-4
 """Every residual gets a further error of this share of the root mean square error of all residuals."""

@@ -26,12 +26,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.trials import ReadingErrors, Trials
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 Source = Literal["stated", "repeats", "stated, enlarged by repeats", "residuals", "unknown"]
 
@@ -121,7 +119,7 @@ def error_model(trials: Trials) -> ErrorModel:
     return ErrorModel(ReadingErrors(amplitude=radial, phase=tangential), dof, "repeats", said)
 
 
-def _groups(trials: Trials) -> tuple[ComplexArray, ComplexArray, NDArray[np.int64]]:
+def _groups(trials: Trials) -> tuple[ComplexArray, ComplexArray, IntArray]:
     """Deviations (K, G) of repeated readings from their means (NaN where none), means (G,), counts (G,)."""
     many = trials.repeats > 1
     mean = trials.mean[many]

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.baseline import match_speeds
 from balancing.labels import Labels
@@ -16,14 +15,12 @@ from balancing.limits import Limits
 from balancing.refine import different, mounted_in
 from balancing.sheet import WIDTH, figures, table
 from balancing.trials import Trials
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from balancing.correction import Correction
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +77,7 @@ class History:
         return np.asarray(np.where(share >= 0, share, np.nan))
 
     @property
-    def _read(self) -> NDArray[np.bool_]:
+    def _read(self) -> BoolArray:
         return ~np.isnan(self.readings)
 
     def to_dict(self) -> dict[str, Any]:

@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["Holes", "Mounting", "equal_holes", "from_list", "mounting"]
 

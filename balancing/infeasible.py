@@ -12,14 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.certificate import Problem
 from balancing.coneprogram import InfeasibleError, SolverError
 from balancing.limits import Arc
 from balancing.sectors import solve_sectors
-
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""

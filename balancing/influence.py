@@ -21,10 +21,8 @@ from balancing.trials import ReadingErrors, Trials, check_names, check_speeds
 
 if TYPE_CHECKING:
     import pandas as pd
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,13 +16,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.correction import region_radius
 from balancing.tolerance import Tolerance
+from rotorid.base.arrays import ComplexArray, FloatArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Kind = Literal["plane", "bearing", "sensor"]
 Word = Literal["pass", "fail", "not decidable"]
 

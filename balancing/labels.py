@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
+
 Phase = Literal["lead", "lag"]
 Angles = Literal["with rotation", "against rotation"]
 Rotation = Literal["clockwise", "counter-clockwise"]

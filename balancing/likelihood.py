@@ -28,13 +28,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.errors import symmetric
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LEAST_INFORMATION = 0.1
 """Share of M that is left to A in any direction; smaller ones count as this much."""

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.determined import UndeterminedError
 from balancing.effective import FLOOR, effective_variance
@@ -22,10 +21,7 @@ from balancing.sectors import allowed_sectors, stands_in
 from balancing.solve import Method, Solution, solve
 from balancing.weighted_limits import STEPS, limited_fit
 from fem.nearest import did_you_mean
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""

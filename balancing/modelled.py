@@ -20,18 +20,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.influence import Influence
 from balancing.labels import Labels
 from fem.nearest import did_you_mean
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from fem.rotor import Rotor
     from fem.sensors import SensorLike
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Quantity = Literal["displacement", "velocity", "acceleration"]
 
 _DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}

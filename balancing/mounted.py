@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.baseline import match_speeds, starting_point
 from balancing.correction import Correction
@@ -18,12 +18,10 @@ from balancing.influence import Influence
 from balancing.propagation import prediction_covariance
 from balancing.split import split
 from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 AGAINST = 3.0

@@ -10,9 +10,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 _EDGE = 1e-12
 """Relative; a target this close to the limit of its range is on it."""
@@ -38,7 +37,7 @@ class TwoPositions:
     angles: FloatArray
     target: complex
 
-    def vectors(self) -> NDArray[np.complex128]:
+    def vectors(self) -> ComplexArray:
         """The sum of both weights in each solution, shape (2,)."""
         return np.asarray(np.exp(1j * self.angles) @ self.masses)
 

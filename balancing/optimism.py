@@ -19,13 +19,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.determined import acting_alike
 from balancing.resolution import resolution
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 WEIGHTED_LEVELS = ((3.0, "25 to 90 %"),)
 """Clearness t of the weakest combination below which regions of the fit by errors hold so many truths.

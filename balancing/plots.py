@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.sheet import figures
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from balancing.correction import Correction
 
-ComplexArray = NDArray[np.complex128]
 
 # Okabe and Ito: told apart with every kind of colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -139,7 +138,7 @@ def _legend_words(c: Correction, regions: ComplexArray | None) -> str:
     return "\n".join(words)
 
 
-def _amplitude_limits(ax: Axes, c: Correction, x: NDArray[np.float64]) -> None:
+def _amplitude_limits(ax: Axes, c: Correction, x: FloatArray) -> None:
     """A short line over each bar whose amplitude is limited."""
     if c.limits is None:
         return
@@ -212,7 +211,7 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _name_bars(ax: Axes, c: Correction, x: NDArray[np.float64]) -> None:
+def _name_bars(ax: Axes, c: Correction, x: FloatArray) -> None:
     """Sensors under their bars (where they fit) and speeds under each group."""
     S, C = c.before.shape
     if S * C <= 40:
@@ -249,7 +248,7 @@ def _arrow(ax: PolarAxes, theta: float, radius: float, colour: str, marker: str)
     ax.plot(theta, radius, marker, color=colour, ms=8, zorder=4)
 
 
-def _quiet_radii(ax: PolarAxes, angle: NDArray[np.float64], size: NDArray[np.float64]) -> None:
+def _quiet_radii(ax: PolarAxes, angle: FloatArray, size: FloatArray) -> None:
     """Put the numbers of the radii where no vector of note points."""
     from matplotlib.ticker import MaxNLocator
 

@@ -16,13 +16,10 @@ both, dY₀ + dW D, and by its own.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.errors import symmetric
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 def correction_jacobian(W: ComplexArray, D: ComplexArray, r: ComplexArray) -> FloatArray:

@@ -19,18 +19,16 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.baseline import match_speeds
 from balancing.determined import UndeterminedError
 from balancing.influence import Influence, estimate_influence
 from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 MOVED_AMPLITUDE = 0.5
 """Relative change of the size of a coefficient above which it is named."""

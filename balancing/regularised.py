@@ -25,15 +25,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.conditioning import check_stack, scaled_columns
 from balancing.determined import UndeterminedError
 from balancing.errors import symmetric
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 ROBUST = 0.3
 """γ of the robust cross-validation."""

@@ -31,9 +31,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
+
 Way = Literal["radial", "axial"]
 
 TIP_ANGLE = np.radians(118.0)

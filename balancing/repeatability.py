@@ -8,13 +8,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.errors import ErrorModel, reading_covariance
 from balancing.trials import ReadingErrors, Trials
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 LEVEL = 0.99
 NOTICEABLE_AMPLITUDE, NOTICEABLE_PHASE = 0.10, np.deg2rad(10)

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.repeatability import tail
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 LEVEL, SINGLE_LEVEL = 0.95, 0.99
 HOPELESS = 1e3

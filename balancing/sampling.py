@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.errors import symmetric
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Solver = Callable[[ComplexArray, ComplexArray], ComplexArray]
 
 MOST_SKIPPED = 0.2

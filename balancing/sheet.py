@@ -6,15 +6,13 @@ import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.baseline import describe_errors
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 WIDTH = 80
 HELD = 1e-5

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.determined import UndeterminedError
 from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 LEVEL = 0.95
 ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.certificate import Problem
 from balancing.cone import Cone, InfeasibleError, problem
@@ -15,11 +15,9 @@ from balancing.determined import UndeterminedError, check_planes
 from balancing.infeasible import explain
 from balancing.limits import Limits
 from balancing.sectors import allowed_sectors, solve_sectors, stands_in
+from rotorid.base.arrays import BoolArray, ComplexArray
 from rotorid.regression import RCOND
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
 Method = Literal["least-squares", "minmax"]
 
 _ROUNDING = 1e-12

@@ -9,11 +9,9 @@ within d.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.holes import WIDEST, Holes
-
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray, IndexArray
 
 _SLACK = 1e-12
 _MOST = 1_000_000
@@ -76,7 +74,7 @@ def nearest_allowed(target: complex, holes: Holes) -> complex:
     return total / abs(total) * holes.max_weight - holes.mounted
 
 
-def _neighbours(target: complex, holes: Holes, free: NDArray[np.intp]) -> list[tuple[int, int]]:
+def _neighbours(target: complex, holes: Holes, free: IndexArray) -> list[tuple[int, int]]:
     """Pairs of neighbouring free holes at most `WIDEST` apart, the first one behind."""
     toward = np.cos(holes.angles - np.angle(target))
     turned = np.mod(holes.angles[free], 2 * np.pi)

@@ -22,14 +22,11 @@ from numpy.typing import NDArray
 
 from balancing.holes import Holes
 from balancing.split_amounts import nearest_allowed
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, IntArray
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 
 MOST_SUMS = 600_000
 """Of one half."""
@@ -55,9 +52,9 @@ class Half:
 class _Group:
     """Sums of one half, as points of the plane, and the tree of those of the other that fit them."""
 
-    ours: NDArray[np.intp]
+    ours: IndexArray
     points: FloatArray
-    theirs: NDArray[np.intp]
+    theirs: IndexArray
     tree: KDTree
 
 
@@ -134,7 +131,7 @@ def _shortest(options: IntArray, pieces: FloatArray) -> IntArray:
     return np.asarray(options[np.sort(np.unique(weight, return_index=True)[1])])
 
 
-def _listed(task: _Task, where: NDArray[np.intp], most: int, base: IntArray | None = None) -> Half | None:
+def _listed(task: _Task, where: IndexArray, most: int, base: IntArray | None = None) -> Half | None:
     """All sums of the holes `where`, on top of counts `base` (H, K); None: more than `most`."""
     H, K = len(task.holes.angles), len(task.holes.pieces)
     m = len(task.options)
@@ -173,7 +170,7 @@ def _use(task: _Task, counts: NDArray[np.int16]) -> IntArray:
     return total
 
 
-def _different(sums: ComplexArray, pieces: IntArray, used: IntArray, step: float) -> NDArray[np.intp]:
+def _different(sums: ComplexArray, pieces: IntArray, used: IntArray, step: float) -> IndexArray:
     """Indices of sums that differ or use something else, each with the fewest pieces."""
     keys = [np.round(z / step).astype(np.int64) for z in (sums.real, sums.imag)] + [*used.T]
     # a hash makes equal sums neighbours, which is quicker than to sort by all keys; it decides nothing else
@@ -229,7 +226,7 @@ def _groups(task: _Task, a: Half, b: Half) -> Iterator[_Group]:
     """Parts of both halves that may be joined."""
     from scipy.spatial import KDTree
 
-    trees: dict[tuple[int, ...], tuple[NDArray[np.intp], KDTree]] = {}
+    trees: dict[tuple[int, ...], tuple[IndexArray, KDTree]] = {}
     kinds, which = np.unique(a.used, axis=0, return_inverse=True)
     most = b.used.max(axis=0, initial=0)
     for g, kind in enumerate(kinds):
@@ -243,7 +240,7 @@ def _groups(task: _Task, a: Half, b: Half) -> Iterator[_Group]:
 
 def _pairs(
     groups: list[_Group], near: list[FloatArray], there: FloatArray, radius: float
-) -> tuple[NDArray[np.intp], NDArray[np.intp], bool]:
+) -> tuple[IndexArray, IndexArray, bool]:
     """Indices (n,) of sums of both halves that meet within a radius of a point; whether these are all."""
     ours, theirs, count, whole = [], [], 0, True
     for group, distance in zip(groups, near, strict=True):
@@ -277,13 +274,13 @@ def _lens(task: _Task, d: float) -> float:
     return float(np.hypot(R - x, np.sqrt(R * R - x * x)))
 
 
-def _bound(task: _Task, free: NDArray[np.intp]) -> float:
+def _bound(task: _Task, free: IndexArray) -> float:
     """No allowed vector is nearer: neither do free amounts come nearer, nor does the disc reach nearer."""
     aside = abs(nearest_allowed(task.target, task.holes) - task.target)
     return max(_relaxed(task, free, task.target)[0] - 1e-9 * task.scale, aside, 0.0)
 
 
-def _relaxed(task: _Task, free: NDArray[np.intp], point: complex) -> tuple[float, FloatArray]:
+def _relaxed(task: _Task, free: IndexArray, point: complex) -> tuple[float, FloatArray]:
     """Distance of a point from free amounts up to each hole's largest content, and these (F,)."""
     from scipy.optimize import lsq_linear
 
@@ -294,7 +291,7 @@ def _relaxed(task: _Task, free: NDArray[np.intp], point: complex) -> tuple[float
     return float(abs(found.x @ ways * most - point)), found.x * most
 
 
-def _restricted(task: _Task, free: NDArray[np.intp]) -> tuple[IntArray, float]:
+def _restricted(task: _Task, free: IndexArray) -> tuple[IntArray, float]:
     """The best where only so many holes as can be listed vary about the rounded continuous answer."""
     amounts = _relaxed(task, free, nearest_allowed(task.target, task.holes))[1]
     weights = task.options @ task.holes.pieces

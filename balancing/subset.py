@@ -9,19 +9,17 @@ from math import comb
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.conditioning import check_stack, scaled_columns
 from balancing.determined import UndeterminedError
 from balancing.labels import Labels
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import RCOND, gain
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-ComplexArray = NDArray[np.complex128]
 Criterion = Literal["rms", "max"]
 
 MOST = 20_000

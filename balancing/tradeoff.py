@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.conditioning import check_stack
 from balancing.determined import check_planes
 from balancing.labels import Labels
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Criterion = Literal["rms", "max"]
 
 KNEE = 3.0

@@ -17,7 +17,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.errors import reading_covariance
 from balancing.labels import Labels
@@ -25,12 +24,12 @@ from balancing.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
 from balancing.trial_result import TrialWeight
 from fem.nearest import did_you_mean
+from rotorid.base.arrays import ComplexArray
 
 if TYPE_CHECKING:
     from balancing.influence import Influence
     from balancing.trials import ReadingErrors
 
-ComplexArray = NDArray[np.complex128]
 
 GRAVITY = 9.80665
 FRACTION = 0.10

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.labels import Labels
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -131,7 +128,7 @@ class Trials:
             )
 
     @property
-    def repeats(self) -> NDArray[np.int64]:
+    def repeats(self) -> IntArray:
         """How many times each reading was taken, shape (R, S, C)."""
         return np.asarray(np.sum(~np.isnan(self.readings), axis=0), dtype=np.int64)
 

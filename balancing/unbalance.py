@@ -28,7 +28,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.baseline import starting_point
 from balancing.determined import UndeterminedError
@@ -39,10 +39,9 @@ from balancing.repeatability import tail
 from balancing.resolution import HOPELESS
 from balancing.trials import Trials, check_names
 from balancing.unbalance_result import Unbalance
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, stretch
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Method = Literal["minimum-norm", "ridge", "modal"]
 
 LEVEL = 0.99

@@ -6,17 +6,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.labels import Labels
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
 
 DETERMINED = 0.05
 """Largest distance of a station's row of the resolution matrix from that of the unit matrix."""

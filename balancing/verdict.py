@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.baseline import match_speeds, starting_point
 from balancing.cautions import POOR
@@ -30,14 +30,13 @@ from balancing.propagation import correction_covariance, prediction_covariance
 from balancing.repeatability import tail
 from balancing.tolerance import Tolerance
 from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _GRAM_MM = 1e6
 

@@ -16,15 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing import likelihood
 from balancing.limits import Limits
 from balancing.solve import Solution
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Search = Callable[[ComplexArray, ComplexArray, FloatArray, Limits], Solution]
 """Least squares with limits of W, Y, row weights and limits."""
 

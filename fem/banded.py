@@ -10,20 +10,19 @@ material damping takes no part in forward whirl, which does not strain the turni
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.dynamic import Supported
 from fem.eigen import rigid_scale
 from fem.matrices import Matrices, general, multiply
 from fem.pencil import whirling_mass
-from fem.rotor import FloatArray, Rotor
-from fem.supports import ComplexArray
+from fem.rotor import Rotor
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
 AT_CRITICAL = 1e-8  # relative distance of λ from ω² at which an undamped rotor stands at its critical speed
 
 
 def solve_banded(
-    rotor: Rotor, A: Matrices, at: Supported, rows: NDArray[np.intp], loads: FloatArray, speeds: FloatArray
+    rotor: Rotor, A: Matrices, at: Supported, rows: IndexArray, loads: FloatArray, speeds: FloatArray
 ) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...]]:
     """Amplitudes F and b, each of shape (S, a, b), at unknowns `rows` under forward loads.
 
@@ -109,7 +108,7 @@ def _check_limited(
     rotor: Rotor,
     A: Matrices,
     at: Supported,
-    feet: NDArray[np.intp],
+    feet: IndexArray,
     probe: FloatArray,
     X: ComplexArray,
     speeds: FloatArray,

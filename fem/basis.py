@@ -12,9 +12,10 @@ import numpy as np
 
 from fem.eigen import finite_modes, lowest_modes
 from fem.matrices import assemble, multiply
-from fem.planes import AnyArray, Planes
-from fem.rotor import FloatArray, Rotor
+from fem.planes import Planes
+from fem.rotor import Rotor
 from fem.supports import Support
+from rotorid.base.arrays import AnyArray, FloatArray
 
 _NEW = 1e-7  # part of a vector that must be new for it to join the basis
 

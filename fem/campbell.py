@@ -6,16 +6,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fem.crossing import synchronous
 from fem.growth import GROWTH, Growing, growing
 from fem.orbits import whirl_direction
-from fem.planes import ComplexArray, both_planes
-from fem.rotor import RPM, FloatArray, Rotor
+from fem.planes import both_planes
+from fem.rotor import RPM, Rotor
 from fem.tracking import Followed, follow
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl, solve_whirl
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,7 +63,7 @@ class Campbell:
     log_decrements: FloatArray
     direction: FloatArray
     critical_speeds: FloatArray
-    critical_modes: NDArray[np.intp]
+    critical_modes: IndexArray
     critical_log_decrements: FloatArray
     critical_direction: FloatArray
     error: float
@@ -237,7 +238,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     )
 
 
-def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, NDArray[np.intp]]:
+def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
     """Modes over speed, and which n (or fewer) of them were asked for."""
     P = both_planes(rotor)
     available = available_modes(rotor)
@@ -258,13 +259,13 @@ def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed,
         m = min(m + max(4, n), available)
 
 
-def went_above(whirl: Whirl, paths: Followed, columns: NDArray[np.intp]) -> NDArray[np.bool_]:
+def went_above(whirl: Whirl, paths: Followed, columns: IndexArray) -> BoolArray:
     """Where a mode is missing that may lie above those that were computed, shape (S, n).
 
     Elsewhere a missing mode does not oscillate: all that do are known, or all of its frequencies.
     """
     size = np.abs(paths.values[:, columns].imag)
-    gone: NDArray[np.bool_] = np.isnan(size)
+    gone: BoolArray = np.isnan(size)
     full = np.asarray(np.isfinite(whirl.found.values).all(axis=1))
     top = np.abs(np.nan_to_num(whirl.found.values).imag).max(axis=1)
     near = np.zeros(size.shape)
@@ -276,7 +277,7 @@ def went_above(whirl: Whirl, paths: Followed, columns: NDArray[np.intp]) -> NDAr
     return np.asarray(gone & full[:, None] & (near > _REACH * top[:, None]))
 
 
-def asked_for(paths: Followed, speeds: FloatArray, n: int) -> NDArray[np.intp]:
+def asked_for(paths: Followed, speeds: FloatArray, n: int) -> IndexArray:
     """The n lowest modes, by frequency at the first speed, backward first where a pair starts as one.
 
     Lowest are those that meet the 1× line first (or are below it from the start), so that no damped critical
@@ -288,7 +289,7 @@ def asked_for(paths: Followed, speeds: FloatArray, n: int) -> NDArray[np.intp]:
     size = np.where(there, np.abs(values.imag), np.inf)
     S, count = size.shape
     lowest = np.argsort(size, axis=1, kind="stable")[:, :n]
-    low: NDArray[np.bool_] = np.zeros(size.shape, dtype=bool)
+    low: BoolArray = np.zeros(size.shape, dtype=bool)
     np.put_along_axis(low, lowest, True, axis=1)
     low &= there
     begins = np.asarray(there.argmax(axis=0))
@@ -314,7 +315,7 @@ def _meets(size: FloatArray, speeds: FloatArray) -> float:
     return float(speeds[k - 1] + (speeds[k] - speeds[k - 1]) * before / (before + after))
 
 
-def _paired(start: ComplexArray, begins: NDArray[np.intp]) -> NDArray[np.intp]:
+def _paired(start: ComplexArray, begins: IndexArray) -> IndexArray:
     """Rank by where a mode begins and its frequency there; of two that coincide the backward one first.
 
     In a complex coordinate Im λ < 0 is backward whirl.
@@ -349,7 +350,7 @@ def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
     return out
 
 
-def _warnings(whirl: Whirl, paths: Followed, columns: NDArray[np.intp], n: int) -> tuple[str, ...]:
+def _warnings(whirl: Whirl, paths: Followed, columns: IndexArray, n: int) -> tuple[str, ...]:
     texts = []
     values = paths.values[:, columns]
     gone = ~np.isfinite(values)

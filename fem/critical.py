@@ -11,8 +11,9 @@ import numpy as np
 from fem.eigen import fine_mesh_warning, finite_modes, lowest_modes
 from fem.matrices import Matrices, assemble, ignored_inertia
 from fem.modes import Modes
-from fem.pencil import TO_XY, Array, Pencil, whole_rotor
-from fem.rotor import FloatArray, Rotor, whole
+from fem.pencil import TO_XY, Pencil, whole_rotor
+from fem.rotor import Rotor, whole
+from rotorid.base.arrays import AnyArray, FloatArray
 
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line
 _SHAPES = 1e-8  # tolerance of mode shapes; that of frequencies is its square
@@ -24,7 +25,7 @@ class _Found:
     """Critical speeds squared, and vectors of the pencil they belong to."""
 
     squares: FloatArray
-    vectors: Array
+    vectors: AnyArray
     pencil: Pencil
     rounding: FloatArray
 
@@ -203,7 +204,7 @@ def _modes(rotor: Rotor, found: list[_Found], said: tuple[str, ...]) -> Modes:
     return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings)
 
 
-def _shapes(part: _Found) -> tuple[FloatArray, FloatArray, Array, Array, list[str]]:
+def _shapes(part: _Found) -> tuple[FloatArray, FloatArray, AnyArray, AnyArray, list[str]]:
     """Shapes, slopes, amplitudes in x and y, each (N, n), and directions."""
     w, tilt = part.vectors[part.pencil.waves], part.vectors[part.pencil.tilts]
     if len(w) == 1:
@@ -219,14 +220,14 @@ def _shapes(part: _Found) -> tuple[FloatArray, FloatArray, Array, Array, list[st
     return shapes, slopes, x * scale, y * scale, [_direction(w[:, :, k]) for k in range(part.squares.size)]
 
 
-def _scale(shapes: Array) -> Array:
+def _scale(shapes: AnyArray) -> AnyArray:
     """First entry of each column, or its largest where the first is zero, shape (n,)."""
     size = np.abs(shapes)
     largest = shapes[np.argmax(size, axis=0), np.arange(shapes.shape[1])]
     return np.asarray(np.where(size[0] > 1e-6 * np.abs(largest), shapes[0], largest))
 
 
-def _direction(waves: Array) -> str:
+def _direction(waves: AnyArray) -> str:
     """How the orbits of forward and backward amplitudes, shape (2, N), run."""
     forward, backward = np.abs(waves)
     moving = np.maximum(forward, backward) > 1e-6 * max(forward.max(), backward.max())

@@ -13,13 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem.planes import ComplexArray, Quadratic
+from fem.planes import Quadratic
 from fem.quadratic import polish, solve
-from fem.rotor import FloatArray
 from fem.tracking import likeness, mass_weight, plain
 from fem.whirlsolve import Whirl, enriched
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 _CONVERGED = 1e-13
 _STEPS = 60
@@ -48,7 +47,7 @@ class Crossings:
     """
 
     speeds: FloatArray
-    modes: NDArray[np.intp]
+    modes: IndexArray
     values: ComplexArray
     shapes: ComplexArray
 
@@ -98,12 +97,12 @@ def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, functio
 
 def _verified(
     whirl: Whirl,
-    k: NDArray[np.intp],
-    modes: tuple[ComplexArray, ComplexArray, NDArray[np.intp]],
+    k: IndexArray,
+    modes: tuple[ComplexArray, ComplexArray, IndexArray],
     roots: tuple[FloatArray, ComplexArray, ComplexArray],
     function: Function,
     size: FloatArray,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Which roots in the intervals k surely are those of the modes they were sought for, shape (c,)."""
     values, vectors, mode = modes
     found, lam, X = roots
@@ -123,13 +122,13 @@ def _verified(
 
 def _by_rank(
     whirl: Whirl,
-    k: NDArray[np.intp],
-    mode: NDArray[np.intp],
+    k: IndexArray,
+    mode: IndexArray,
     modes: tuple[ComplexArray, ComplexArray],
     roots: tuple[FloatArray, ComplexArray, ComplexArray],
-    doubtful: NDArray[np.bool_],
+    doubtful: BoolArray,
     function: Function,
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Put the roots of ranks in place of doubtful ones, and tell which roots there are, shape (c,).
 
     Two modes that were exchanged between two speeds seem to cross in opposite directions: there is no root.

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.pencil import FROM_XY, TO_XY
-from fem.rotor import FloatArray, Rotor
-from fem.supports import ComplexArray
+from fem.rotor import Rotor
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.matrices import Matrices, dense, multiply, rounding_error
 from fem.pencil import NO_MASS, Pencil, one_plane, orthonormal_rigid
-from fem.rotor import FloatArray, Rotor
-
-Array = NDArray[Any]
+from fem.rotor import Rotor
+from rotorid.base.arrays import AnyArray, FloatArray
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest
 _BLOCK = 4
@@ -47,10 +44,10 @@ class Spectrum:
     """
 
     squares: FloatArray
-    vectors: Array
+    vectors: AnyArray
     signs: FloatArray
     shift: float
-    factor: Array
+    factor: AnyArray
     rounding: FloatArray
 
 
@@ -59,7 +56,7 @@ def finite_modes(A: Matrices | Pencil) -> int:
     return int(np.count_nonzero(A.mass[-1]))
 
 
-def factor(pencil: Pencil) -> tuple[float, Array]:
+def factor(pencil: Pencil) -> tuple[float, AnyArray]:
     """Shift σ and Cholesky factor of K + σ M; σ = 0 if the supports hold the rotor firmly.
 
     Raises
@@ -90,7 +87,7 @@ def factor(pencil: Pencil) -> tuple[float, Array]:
     )
 
 
-def _cholesky(band: Array) -> tuple[Array, int]:
+def _cholesky(band: AnyArray) -> tuple[AnyArray, int]:
     from scipy.linalg import lapack
 
     pbtrf = lapack.zpbtrf if np.iscomplexobj(band) else lapack.dpbtrf
@@ -195,7 +192,7 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
     )
 
 
-def _dense(pencil: Pencil, shift: float, m: int) -> Array:
+def _dense(pencil: Pencil, shift: float, m: int) -> AnyArray:
     from scipy.linalg import eigh
 
     K = dense(pencil.stiffness + shift * pencil.mass if shift else pencil.stiffness)
@@ -210,7 +207,7 @@ def _dense(pencil: Pencil, shift: float, m: int) -> Array:
     return np.asarray(X[:, ::-1])
 
 
-def _krylov(pencil: Pencil, U: Array, m: int, tolerance: float) -> Array | None:
+def _krylov(pencil: Pencil, U: AnyArray, m: int, tolerance: float) -> AnyArray | None:
     """Ritz vectors of U⁻ᴴ M U⁻¹ in a block Krylov space; None if it does not converge."""
     from scipy.linalg import lapack
 
@@ -254,7 +251,7 @@ def _krylov(pencil: Pencil, U: Array, m: int, tolerance: float) -> Array | None:
     return None
 
 
-def _orthonormal(Z: Array) -> tuple[Array, Array]:
+def _orthonormal(Z: AnyArray) -> tuple[AnyArray, AnyArray]:
     """QR factors, the vectors in LAPACK's order of memory."""
     from scipy.linalg import lapack
 

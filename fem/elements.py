@@ -23,9 +23,9 @@ all of them multiples of 1/420.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray, IndexArray
 
 # Hermite polynomials on 0 … 1 in (w₁, s₁, w₂, s₂): ∫w''², 30 ∫w'², 420 ∫w², ∫w'(1 − ξ) and ∫w'ξ times 12.
 _CURVATURE = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
@@ -90,7 +90,7 @@ class Layout:
         return self.stride * (node - 1)
 
     @property
-    def deflections(self) -> NDArray[np.intp]:
+    def deflections(self) -> IndexArray:
         """Unknowns of all deflections, shape (N,)."""
         return np.arange(0, self.size, self.stride)
 

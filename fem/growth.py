@@ -9,11 +9,11 @@ import numpy as np
 
 from fem.crossing import crossings
 from fem.orbits import whirl_direction
-from fem.planes import ComplexArray
 from fem.quadratic import NONE
-from fem.rotor import RPM, FloatArray
+from fem.rotor import RPM
 from fem.whirl import DIRECTION_NAMES, in_both_planes
 from fem.whirlsolve import Whirl
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 GROWTH = 1e-7  # Re λ / |λ| above which a mode is said to grow: an undamped one has rounding there
 

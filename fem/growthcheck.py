@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import RPM, FloatArray, Rotor
+from fem.rotor import RPM, Rotor
 from fem.supports import Support
+from rotorid.base.arrays import FloatArray
 
 _MODES = 6  # of lowest frequency that are looked at
 _PEAKS = 3

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.rotor import FloatArray
-from fem.supports import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 ZERO = 1e-13  # share of the dynamic stiffness below which the damping of a massless coordinate is rounding
 _SINGULAR = 1e-12

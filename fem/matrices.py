@@ -14,10 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.elements import Layout, bending_terms, gyroscopic_terms, mass_terms
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray, IndexArray
 
 _FEW = 12  # columns that are multiplied one by one
 
@@ -54,7 +54,7 @@ class Matrices:
     mass: FloatArray
     gyroscopic: FloatArray
     material: FloatArray
-    damped: NDArray[np.intp]
+    damped: IndexArray
     damping: FloatArray
     rigid: int
     stride: int
@@ -70,7 +70,7 @@ class Matrices:
         return self.stride * (node - 1)
 
     @property
-    def deflections(self) -> NDArray[np.intp]:
+    def deflections(self) -> IndexArray:
         """Unknowns of the deflections of all nodes, shape (N,)."""
         return np.arange(0, self.size, self.stride)
 

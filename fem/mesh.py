@@ -9,7 +9,8 @@ import numpy as np
 
 from fem.checks import whole
 from fem.critical import critical_speeds
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import RPM, FloatArray, Rotor
-from fem.supports import ComplexArray
+from fem.rotor import RPM, Rotor
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

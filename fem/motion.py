@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.planes import both_planes, project
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

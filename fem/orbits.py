@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from fem.supports import FloatArray
-
-ComplexArray = NDArray[np.complex128]
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 STRAIGHT = 1e-9  # minor by major axis below which an orbit is a line: rounding, not whirl
 _SMALL = 1e-2  # area by the largest area of a mode below which a node has no say in its direction

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.rotor import RPM
-from fem.supports import FloatArray
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.matrices import Matrices, multiply, shaft_energy
-from fem.rotor import FloatArray, Rotor, Support
+from fem.rotor import Rotor, Support
+from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
-Array = NDArray[Any]  # real, or complex where supports are cross-coupled
 Whirl = Literal[-1, 0, 1]  # backward, without gyroscopic effect, forward
 
 NO_MASS = (
@@ -55,13 +54,13 @@ class Pencil:
 
     rotor: Rotor
     matrices: Matrices
-    stiffness: Array
-    mass: Array
-    energy: Callable[[Array], FloatArray]
-    rigid: Array
+    stiffness: AnyArray
+    mass: AnyArray
+    energy: Callable[[AnyArray], FloatArray]
+    rigid: AnyArray
     springs: float
-    waves: NDArray[np.intp]
-    tilts: NDArray[np.intp]
+    waves: IndexArray
+    tilts: IndexArray
     definite: bool
 
     @property
@@ -89,7 +88,7 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, fl
             K[A.width, A.deflection(node)] += k
     held = {A.deflection(node): k for node, k in springs.items() if k}
 
-    def energy(X: Array) -> FloatArray:
+    def energy(X: AnyArray) -> FloatArray:
         total = shaft_energy(rotor, X)
         for unknown, k in held.items():
             total = total + k * X[unknown] ** 2
@@ -164,10 +163,10 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
                 rows, columns = where[: A.size - above], where[above:]
                 band[width + rows - columns, columns] += source[A.width - above, above:]
 
-    springs_at: list[tuple[NDArray[np.intp], Array]] = []  # unknowns and Hermitian form of each spring
+    springs_at: list[tuple[IndexArray, AnyArray]] = []  # unknowns and Hermitian form of each spring
     offsets = np.arange(planes)
 
-    def turned(k: FloatArray) -> Array:
+    def turned(k: FloatArray) -> AnyArray:
         """Form on (F, b), or on F alone."""
         form = np.asarray(FROM_XY @ k @ TO_XY)[:planes, :planes]
         return form.real if dtype is float else form
@@ -191,7 +190,7 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
                 if i <= j:
                     K[width + i - j, j] += form[a, b]
 
-    def energy(X: Array) -> FloatArray:
+    def energy(X: AnyArray) -> FloatArray:
         total = np.zeros(X.shape[1])
         for plane in range(planes):
             Y = X[planes * place + plane]
@@ -254,7 +253,7 @@ def _rigid(
     return x, (x, motions @ basis[2:])
 
 
-def orthonormal_rigid(pencil: Pencil) -> tuple[Array, FloatArray]:
+def orthonormal_rigid(pencil: Pencil) -> tuple[AnyArray, FloatArray]:
     """Rigid motions that are orthogonal in the mass, scaled to |rᵀ M r| = 1 kg, and the sign of each."""
     R = np.array(pencil.rigid)
     signs = np.ones(R.shape[1])

@@ -16,14 +16,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.matrices import Matrices, assemble, multiply
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
 from fem.strain import strains
-
-ComplexArray = NDArray[np.complex128]
-AnyArray = NDArray[Any]  # real where two planes are kept, complex where one complex coordinate is
+from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +46,8 @@ class Planes:
     rotor: Rotor
     A: Matrices
     planes: int
-    rows: NDArray[np.intp]
-    feet: NDArray[np.intp]
+    rows: IndexArray
+    feet: IndexArray
     foot_mass: FloatArray
     foot_stiffness: FloatArray
     foot_damping: FloatArray

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from fem.plots_style import COLORS, QUIET, hertz_beside, new_axes, plain, rpm_above
-from fem.rotor import RPM, FloatArray
+from fem.rotor import RPM
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

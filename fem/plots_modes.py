@@ -8,7 +8,8 @@ import numpy as np
 
 from fem.plots_rotor import EDGE, draw_rotor
 from fem.plots_style import COLORS, STYLES, legend_above, new_axes
-from fem.rotor import RPM, FloatArray
+from fem.rotor import RPM
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem.planes import AnyArray, ComplexArray, Quadratic
-from fem.rotor import FloatArray
+from fem.planes import Quadratic
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 NONE = complex(np.nan, np.nan)  # no mode: neither part of it may pass for a number
 _SHIFT = 0.3  # σ in units of the reference frequency
@@ -49,7 +48,7 @@ class Solutions:
     vectors: ComplexArray
     left: ComplexArray | None
     real: tuple[FloatArray, ...]
-    still: NDArray[np.intp]
+    still: IndexArray
 
 
 def solve(Q: Quadratic, speeds: FloatArray, m: int, scale: float, *, left: bool = False) -> Solutions:
@@ -87,7 +86,7 @@ def solve(Q: Quadratic, speeds: FloatArray, m: int, scale: float, *, left: bool 
 def polish(
     Q: Quadratic,
     speeds: FloatArray,
-    at: NDArray[np.intp],
+    at: IndexArray,
     values: ComplexArray,
     vectors: ComplexArray,
     steps: int,
@@ -134,9 +133,7 @@ def polish(
     return values, vectors, np.abs(step) / np.abs(values)
 
 
-def _dynamic(
-    M: FloatArray, D: AnyArray, K: AnyArray, at: NDArray[np.intp], values: ComplexArray
-) -> ComplexArray:
+def _dynamic(M: FloatArray, D: AnyArray, K: AnyArray, at: IndexArray, values: ComplexArray) -> ComplexArray:
     """λ² M + λ D + K for each pair, shape (B, R, R)."""
     R = len(M)
     P = np.empty((values.size, R, R), dtype=complex)
@@ -157,7 +154,7 @@ def _dynamic(
     return P
 
 
-def _rows(D: AnyArray, at: NDArray[np.intp], vectors: ComplexArray) -> ComplexArray:
+def _rows(D: AnyArray, at: IndexArray, vectors: ComplexArray) -> ComplexArray:
     """D x for each pair."""
     out = np.empty_like(vectors)
     for k in range(len(D)):
@@ -181,7 +178,7 @@ def _companion(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> AnyArra
 
 def _sorted(
     mu: ComplexArray, scale: float, m: int, planes: int
-) -> tuple[ComplexArray, tuple[FloatArray, ...], NDArray[np.intp]]:
+) -> tuple[ComplexArray, tuple[FloatArray, ...], IndexArray]:
     """Values of the m lowest oscillating modes, and what does not oscillate."""
     # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
     finite = np.abs(mu) > _INFINITE * np.abs(mu).max(axis=1)[:, None]

@@ -12,15 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.banded import solve_banded
 from fem.dynamic import Supported, supported
 from fem.eigen import DENSE, Spectrum, finite_modes, lowest_modes, rigid_scale
 from fem.matrices import Matrices, multiply
-from fem.pencil import Array, Pencil, one_plane
-from fem.rotor import FloatArray, Rotor
-from fem.supports import ComplexArray
+from fem.pencil import Pencil, one_plane
+from fem.rotor import Rotor
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 TOLERANCE = 1e-10  # of the series, relative to the response
 NEAR = 1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits
@@ -38,7 +37,7 @@ class _Series:
     shift: float
     shape: tuple[int, int]
 
-    def at(self, squared: Array, skip: NDArray[np.bool_]) -> Array:
+    def at(self, squared: AnyArray, skip: BoolArray) -> AnyArray:
         """Receptance where ω² is given, shape (rows, columns, S); finite nonsense where `skip` is true."""
         m, n = self.squares.size, self.factors.shape[1]
         terms = np.empty((n, squared.size), dtype=squared.dtype)
@@ -53,7 +52,7 @@ class _Series:
 
 
 def receptance(
-    rotor: Rotor, A: Matrices, rows: NDArray[np.intp], loads: FloatArray, speeds: FloatArray, exact: bool
+    rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray, exact: bool
 ) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...], FloatArray]:
     """Deflections at unknowns `rows` under real load vectors rotating at each speed.
 
@@ -164,11 +163,11 @@ def _change(at: Supported, reference: dict[int, float]) -> ComplexArray:
     return change
 
 
-def _spring(reference: dict[int, float], moving: NDArray[np.intp]) -> FloatArray:
+def _spring(reference: dict[int, float], moving: IndexArray) -> FloatArray:
     return np.array(list(reference.values()))[moving]
 
 
-def _units(A: Matrices, unknowns: NDArray[np.intp]) -> FloatArray:
+def _units(A: Matrices, unknowns: IndexArray) -> FloatArray:
     unit = np.zeros((A.size, unknowns.size))
     unit[unknowns, np.arange(unknowns.size)] = 1.0
     return unit
@@ -200,7 +199,7 @@ def _modes_for(pencil: Pencil, top: float) -> Spectrum:
         m = min(available, 2 * m)
 
 
-def _near(spectrum: Spectrum, speeds: FloatArray) -> NDArray[np.bool_]:
+def _near(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
     squared = speeds * speeds
     margin = NEAR * (np.abs(spectrum.squares) + spectrum.shift)
     within = (spectrum.squares + margin >= squared.min()) & (spectrum.squares - margin <= squared.max())
@@ -209,7 +208,7 @@ def _near(spectrum: Spectrum, speeds: FloatArray) -> NDArray[np.bool_]:
 
 
 def _series(
-    pencil: Pencil, spectrum: Spectrum, rows: NDArray[np.intp], columns: FloatArray, top: float
+    pencil: Pencil, spectrum: Spectrum, rows: IndexArray, columns: FloatArray, top: float
 ) -> _Series | None:
     """Modes and static corrections; None where the series does not reach its tolerance."""
     from scipy.linalg.lapack import dpbtrs
@@ -257,11 +256,11 @@ def _series(
 
 
 def _one_plane(
-    series: _Series, a: int, s: int, change: ComplexArray, speeds: FloatArray, skip: NDArray[np.bool_]
-) -> tuple[ComplexArray, NDArray[np.bool_]]:
+    series: _Series, a: int, s: int, change: ComplexArray, speeds: FloatArray, skip: BoolArray
+) -> tuple[ComplexArray, BoolArray]:
     """Forward amplitudes, shape (S, a, b), and speeds where digits are lost: Sherman–Morrison per support."""
     b = series.shape[1] - s
-    H: Array = series.at(speeds * speeds, skip)
+    H: AnyArray = series.at(speeds * speeds, skip)
     lost = np.zeros(speeds.size, dtype=bool)
     for k in reversed(range(s)):  # the last row and column are not needed again
         D = change[:, k]
@@ -282,8 +281,8 @@ def _two_planes(
     beta: float,
     springs: FloatArray,
     speeds: FloatArray,
-    skip: NDArray[np.bool_],
-) -> tuple[ComplexArray, ComplexArray, NDArray[np.bool_]]:
+    skip: BoolArray,
+) -> tuple[ComplexArray, ComplexArray, BoolArray]:
     """Forward and backward amplitudes, shape (S, a, b), and speeds where digits are lost.
 
     The amplitudes q at the supports obey (1 + H D) q = H f with D coupling forward and backward; the

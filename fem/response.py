@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fem.eigen import fine_mesh_warning
 from fem.growthcheck import growing_warning, surely_stable
 from fem.matrices import Matrices, assemble, ignored_inertia
 from fem.receptance import receptance
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
 from fem.sensors import SensorLike, as_sensors
-from fem.supports import ComplexArray
 from fem.vibration import BearingForces, InfluenceCoefficients, Response, phase_degrees
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "phase_degrees"]
 __all__ += ["unbalance_response"]
@@ -128,7 +128,7 @@ def influence(
 def _solve(
     rotor: Rotor,
     A: Matrices,
-    rows: NDArray[np.intp],
+    rows: IndexArray,
     loads: FloatArray,
     speeds: FloatArray,
     method: str,

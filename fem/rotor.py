@@ -13,7 +13,8 @@ import numpy as np
 from fem.checks import whole
 from fem.disc import STEEL_DENSITY, Disc
 from fem.nearest import did_you_mean
-from fem.supports import FloatArray, Pedestal, Support
+from fem.supports import Pedestal, Support
+from rotorid.base.arrays import FloatArray
 
 __all__ = ["RPM", "STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
 __all__ += ["Disc", "FloatArray", "Model", "Pedestal", "Rotor", "Support", "whole"]

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.critical import critical_speeds
-from fem.rotor import RPM, FloatArray, Rotor, whole
+from fem.rotor import RPM, Rotor, whole
 from fem.supports import Support
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

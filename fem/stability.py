@@ -18,12 +18,13 @@ import numpy as np
 
 from fem.campbell import followed, runs_away
 from fem.orbits import whirl_direction
-from fem.planes import AnyArray, ComplexArray, Quadratic
+from fem.planes import Quadratic
 from fem.quadratic import Solutions, polish, solve
-from fem.rotor import RPM, FloatArray, Rotor
+from fem.rotor import RPM, Rotor
 from fem.tracking import likeness, mass_weight
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl, enriched
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _GROWTH = 1e-9  # Re λ / |λ| above which a mode grows: an undamped one has rounding there
 _PARTS = 8  # into how many parts the interval with the threshold is divided

@@ -33,8 +33,7 @@ from numpy.typing import ArrayLike
 
 from fem.massless import ZERO, Sorted, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
 from fem.motion import Motion
-from fem.rotor import FloatArray
-from fem.supports import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 _CHUNK = 2_000_000  # complex numbers at a time
 

@@ -11,7 +11,8 @@ import numpy as np
 from fem.checks import number
 from fem.matrices import Matrices, assemble, general, multiply, rounding_error
 from fem.pencil import whole_rotor
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

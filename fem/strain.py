@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import FloatArray, Rotor
+from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray
 
 
 def strains(rotor: Rotor, X: FloatArray) -> FloatArray:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fem.checks import attachment, number
+from rotorid.base.arrays import ComplexArray, FloatArray
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Matrix2 = tuple[tuple[float, float], tuple[float, float]]
 Coefficient = float | Matrix2  # isotropic, or ((xx, xy), (yx, yy))
 Pair = float | tuple[float, float]  # in both directions, or in x and in y

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fem.planes import ComplexArray
 from fem.quadratic import NONE, solve
-from fem.rotor import FloatArray
 from fem.whirlsolve import Whirl
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 _ALIKE = 0.8  # MAC of a mode with itself a step further
 _OTHER = 0.5  # largest MAC with another mode, relative to it
@@ -40,7 +38,7 @@ class Followed:
 
     values: ComplexArray
     vectors: ComplexArray
-    lost: NDArray[np.bool_]
+    lost: BoolArray
     doubtful: tuple[tuple[int, int], ...]
 
 
@@ -89,7 +87,7 @@ def mass_weight(whirl: Whirl) -> FloatArray:
     return np.asarray(weight + 1e-3 * np.trace(weight) / len(weight) * np.eye(len(weight)))
 
 
-def plain(best: FloatArray, rivals: FloatArray) -> NDArray[np.bool_]:
+def plain(best: FloatArray, rivals: FloatArray) -> BoolArray:
     """Whether a MAC tells a mode beyond doubt from the one most like it among the others."""
     apart = (rivals <= _OTHER * best) | (1 - best <= _NEARER * (1 - rivals))
     return np.asarray((best >= _ALIKE) & apart)
@@ -124,7 +122,7 @@ def likeness(
     return np.asarray(np.where(there, mac, 0.0))
 
 
-def _obvious(mac: FloatArray, partner: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _obvious(mac: FloatArray, partner: IndexArray) -> BoolArray:
     """At which steps every mode has a partner beyond doubt, shape (S − 1,)."""
     best = np.take_along_axis(mac, partner[:, :, None], axis=2)[:, :, 0]
     others = mac.copy()

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import RPM, FloatArray, Rotor, Support
+from fem.rotor import RPM, Rotor, Support
 from fem.sensors import SensorLike, as_sensor, label
-from fem.supports import ComplexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

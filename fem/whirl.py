@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from fem.eigen import finite_modes
 from fem.matrices import assemble
 from fem.orbits import whirl_direction
-from fem.planes import ComplexArray, both_planes
-from fem.rotor import RPM, FloatArray, Rotor, whole
+from fem.planes import both_planes
+from fem.rotor import RPM, Rotor, whole
 from fem.whirlexact import exact_modes
 from fem.whirlsolve import solve_whirl
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fem.planes import AnyArray, ComplexArray, Planes, project
+from fem.planes import Planes, project
 from fem.quadratic import solve
-from fem.rotor import FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed
 _SHIFT = 0.3

@@ -13,13 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.basis import Reference, enlarge, reference, starting_vectors, vectors
-from fem.planes import AnyArray, ComplexArray, Planes, Quadratic, project
+from fem.planes import Planes, Quadratic, project
 from fem.quadratic import Solutions, polish, solve
-from fem.rotor import FloatArray
 from fem.wholeband import WholeBand
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 TOLERANCE = 3e-8  # of eigenvalues, relative to their size
 _FEW = 4  # speeds for which the coarse basis is not worth while
@@ -172,7 +171,7 @@ def _refined(Q: Quadratic, speeds: FloatArray, coarse: Solutions, scale: float) 
     return replace(coarse, values=values, vectors=X, left=left)
 
 
-def _differ(all_found: ComplexArray, improved: ComplexArray) -> NDArray[np.bool_]:
+def _differ(all_found: ComplexArray, improved: ComplexArray) -> BoolArray:
     """At which speeds the lowest modes are not those that were improved."""
     all_found, improved = (np.nan_to_num(v, nan=0.0) for v in (all_found, improved))
     distance = np.abs(all_found[:, :, None] - improved[:, None, :]).min(axis=2)
@@ -199,7 +198,7 @@ def _judge(
     Y: FloatArray,
     speeds: FloatArray,
     found: Solutions,
-    where: NDArray[np.intp],
+    where: IndexArray,
 ) -> tuple[float, FloatArray]:
     """Error of one pair of each mode, and vectors to append where it is too large."""
     modes = [j for j in range(len(where)) if np.isfinite(found.values[where[j], j])]

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.planes import AnyArray, ComplexArray, Planes
-from fem.rotor import FloatArray
+from fem.planes import Planes
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 
 class WholeBand:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.robust import LOSSES
 from rotorid.search import Function, Search, drive, inside, polish
@@ -22,7 +23,6 @@ from rotorid.search import Function, Search, drive, inside, polish
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
 

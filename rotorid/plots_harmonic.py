@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -13,8 +14,6 @@ if TYPE_CHECKING:
 
     from rotorid.harmonic.result import Identification
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Curve = tuple[FloatArray, dict[str, ComplexArray]]
 
 CURVE_POINTS = 400
@@ -189,7 +188,7 @@ def _table(result: Identification) -> ComplexArray:
     return np.stack([np.asarray(signals.get(name, unknown)) for name in result.model.outputs], axis=1)
 
 
-def _outputs(result: Identification) -> list[tuple[str, str, ComplexArray, NDArray[np.bool_]]]:
+def _outputs(result: Identification) -> list[tuple[str, str, ComplexArray, BoolArray]]:
     """Color, name, measured amplitudes and which experiments, forced ones only, of every output."""
     from fem.plots import COLORS
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.plots_reduction import LINE, SAME_SHAPE, SMALLEST_ERROR
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rotorid.reduction.placement_result import Placement
-
-FloatArray = NDArray[np.float64]
 
 
 def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:

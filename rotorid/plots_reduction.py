@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from rotorid.reduction.methods_result import Methods
     from rotorid.reduction.result import Reduction
 
-FloatArray = NDArray[np.float64]
 
 MOST_MODES = 6
 """Modes that one picture still tells apart."""

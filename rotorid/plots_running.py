@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from rotorid.reduction.running import ResponseCost
     from rotorid.reduction.stability import StabilityCost
 
-FloatArray = NDArray[np.float64]
 
 CLOSE = 8.0
 """Difference, %, up to which the small model follows the rotor well."""

@@ -10,7 +10,8 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from rotorid.timedomain.result import Fit
     from rotorid.timedomain.simulate import Trajectory
 
-FloatArray = NDArray[np.float64]
 
 CURVE_POINTS = 600
 MANY = 8
@@ -256,7 +256,7 @@ def _effect_words(result: Fit, largest: FloatArray, logarithmic: bool) -> list[s
     return words
 
 
-def _determined(result: Fit) -> NDArray[np.bool_]:
+def _determined(result: Fit) -> BoolArray:
     return ~np.isnan(result.values)
 
 
@@ -339,7 +339,7 @@ def _plain_numbers(axes: Axes) -> None:
 
 
 def _colored(
-    words: Sequence[str], line: str = "-", mark: str = "", shown: NDArray[np.bool_] | None = None
+    words: Sequence[str], line: str = "-", mark: str = "", shown: BoolArray | None = None
 ) -> list[Artist]:
     """Keys of colors, one for each word; at most `MANY`, without line and mark where nothing is `shown`."""
     from matplotlib.lines import Line2D

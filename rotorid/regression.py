@@ -16,12 +16,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 __all__ = [
     "Combination",

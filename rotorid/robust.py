@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 LOSSES = ("linear", "huber", "soft_l1", "cauchy")
 # Scale at which each loses 5 % of efficiency on normal errors (Huber 1981; Holland & Welsch 1977);

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.estimate import Estimate
 from rotorid.regression import least_squares
 from rotorid.robust import cost, pseudo_residuals, spread, tuning
 
-FloatArray = NDArray[np.float64]
 Function = Callable[[FloatArray], FloatArray]
 
 TOLERANCE = 1e-9
@@ -168,7 +168,7 @@ def _judge(
     return step, judged
 
 
-def _embed(covariance: FloatArray | None, free: NDArray[np.bool_]) -> FloatArray | None:
+def _embed(covariance: FloatArray | None, free: BoolArray) -> FloatArray | None:
     if covariance is None or free.all():
         return covariance
     full = np.full((len(free), len(free)), np.nan)

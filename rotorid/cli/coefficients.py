@@ -5,19 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from rotorid.base.arrays import FloatArray
 from rotorid.cli.balance import MODEL_ERROR
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from balancing import Influence, Trials
     from balancing.subset import Subsets
     from rotorid.tables import Job
-
-    FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import AnyArray, BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from fem import Peaks, Response, Rotor
     from fem.sensors import SensorLike
 
-FloatArray = NDArray[np.float64]
 
 _INSIDE = 2  # speeds within the half-power band on either side of a summit: five with the summit
 _FINEST = 2e-7  # relative step; finer ones would show rounding
@@ -136,7 +136,7 @@ def _with(result: Response, extra: FloatArray) -> Response | None:
         return None
     order = np.argsort(np.concatenate((omega, extra)), kind="stable")
 
-    def both(name: str) -> NDArray[Any]:
+    def both(name: str) -> AnyArray:
         return np.asarray(np.concatenate((getattr(result, name), getattr(more, name)))[order])
 
     return dataclasses.replace(
@@ -157,7 +157,7 @@ def _closer(omega: FloatArray, A: FloatArray) -> list[float]:
     return wanted
 
 
-def _at(result: Response, keep: NDArray[np.bool_]) -> Response:
+def _at(result: Response, keep: BoolArray) -> Response:
     return dataclasses.replace(
         result,
         speeds=result.speeds[keep],

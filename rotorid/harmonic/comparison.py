@@ -6,15 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.natural import mode_slopes, natural_modes, nearest_mode
 from rotorid.harmonic.operator import Operator
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
 
 THIN = 0.01
 """An error ellipse is at least this share as thin as long: no direction of a reading is exact."""
@@ -54,12 +50,12 @@ class Comparison:
     experiments: Experiments
     measured: ComplexArray
     inputs: ComplexArray
-    forced: NDArray[np.int_]
+    forced: IntArray
     seen: BoolArray
-    free: NDArray[np.int_]
+    free: IntArray
     whiten: FloatArray
     rows: tuple[tuple[str, str, str], ...]
-    experiment: NDArray[np.int64]
+    experiment: IntArray
     left_out: tuple[str, ...]
     warnings: tuple[str, ...]
     _last: dict[bytes, tuple[FloatArray, FloatArray]] = field(default_factory=dict)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
+
 Powers = tuple[tuple[int, int], ...]
 """Sorted (unknown, exponent) pairs."""
 Poly = dict[Powers, float]

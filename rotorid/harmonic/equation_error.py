@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.estimate import Estimate, echelon
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words
@@ -19,9 +20,6 @@ from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
 METHODS = ("equation-error", "output-error")
@@ -203,7 +201,7 @@ def _determined(estimate: Estimate) -> FloatArray:
     return np.array(rows) if rows else np.zeros((0, len(estimate.names)))
 
 
-def _scalable(rows: Rows) -> NDArray[np.bool_]:
+def _scalable(rows: Rows) -> BoolArray:
     """Regression unknowns (u,) that may all be multiplied by one factor: their equations have right side 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
@@ -242,7 +240,7 @@ def _reasons(
     recovery: Recovery,
     words: tuple[str, ...],
     estimate: Estimate,
-    scalable: NDArray[np.bool_],
+    scalable: BoolArray,
 ) -> tuple[str, ...]:
     reasons = []
     if recovery.undetermined.any():

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from rotorid.harmonic.model import HarmonicModel
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, degree, times
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 P = "p"
 CONSTANT = ""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rotorid.base.arrays import FloatArray, IntArray
 
 
 def leave_one_out(K: FloatArray, Y: FloatArray, experiment: IntArray, count: int) -> FloatArray:

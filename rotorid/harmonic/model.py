@@ -10,14 +10,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.features import CONSTANT, Combinations, Feature, P, Terms, flatten, lifted, merge
 from rotorid.harmonic.features import split_features as _split
 from rotorid.harmonic.polynomial import Monomial, add, from_expression
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

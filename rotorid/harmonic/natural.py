@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 MAC_SLACK = 0.02
 """Modes whose MAC is this near to the best count as equally like; the nearest frequency decides."""

@@ -12,13 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.features import CONSTANT, Feature
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class Operator:
     exponents: IntArray
 
     @cached_property
-    def _is_output(self) -> NDArray[np.bool_]:
+    def _is_output(self) -> BoolArray:
         return (self.signal >= 0) & (self.signal < len(self.outputs))
 
     @cached_property

@@ -19,8 +19,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.estimate import Estimate
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
@@ -30,9 +31,6 @@ from rotorid.harmonic.operator import Operator, compile_operator
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
 from rotorid.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
@@ -75,7 +73,7 @@ class OutputError:
     natural_frequencies: FloatArray
     rows: tuple[tuple[str, str, str], ...]
     jacobian: FloatArray
-    experiment: NDArray[np.int64]
+    experiment: IntArray
     relative: Mapping[str, ComplexArray]
     left_out: tuple[str, ...]
     warnings: tuple[str, ...]

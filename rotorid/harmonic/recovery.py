@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.estimate import WORD_TOLERANCE
 from rotorid.harmonic.elimination import real_solutions
 
-FloatArray = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]
 
 GAUGE = 0.7318
@@ -77,7 +76,7 @@ class Recovery:
     """
 
     solutions: tuple[FloatArray, ...]
-    undetermined: NDArray[np.bool_]
+    undetermined: BoolArray
     gain: FloatArray | None
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -93,7 +92,7 @@ class Recovery:
         return np.where(spread | self.undetermined, np.nan, table[0])
 
 
-def undetermined_parameters(system: System) -> tuple[NDArray[np.bool_], list[int]]:
+def undetermined_parameters(system: System) -> tuple[BoolArray, list[int]]:
     """Which parameters the combinations leave open at a general point, and which of them to fix to solve."""
     rng = np.random.default_rng(5)
     n = len(system.names)
@@ -234,7 +233,7 @@ def _same(a: FloatArray, b: FloatArray) -> bool:
     return bool(np.all(np.abs(a - b) <= SAME * np.maximum(np.abs(a), np.abs(b))))
 
 
-def _inside(theta: FloatArray, names: Sequence[str], bounds: Bounds, open_: NDArray[np.bool_]) -> bool:
+def _inside(theta: FloatArray, names: Sequence[str], bounds: Bounds, open_: BoolArray) -> bool:
     return all(
         bounds[name][0] <= theta[j] <= bounds[name][1]
         for j, name in enumerate(names)
@@ -242,7 +241,7 @@ def _inside(theta: FloatArray, names: Sequence[str], bounds: Bounds, open_: NDAr
     )
 
 
-def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: NDArray[np.bool_]) -> list[str]:
+def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: BoolArray) -> list[str]:
     """Say in words how several solutions differ; empty for one."""
     if len(solutions) < 2:
         return []

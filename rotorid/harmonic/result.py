@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.estimate import coverage_factor
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 METHODS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
 

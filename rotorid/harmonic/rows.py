@@ -5,16 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.polynomial import ONE
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 COVARIANCE_FLOOR = 1e-10
 """Smallest variance relative to the mean of an experiment: exact rows must not get infinite weight."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.comparison import Comparison
 from rotorid.nonlinear import Bounds, nonlinear_least_squares
-
-FloatArray = NDArray[np.float64]
 
 
 def starting_values(

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
 from fem.matrices import ignored_inertia
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.reduction.vibration import mac
-
-FloatArray = NDArray[np.float64]
 
 SENSITIVE = 0.1
 """A report warns where input errors of 1 % move a mass by more than this share."""

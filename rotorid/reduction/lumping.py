@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
 from fem.matrices import assemble, free_motions, ignored_inertia, multiply, rounding_error
 from fem.planes import Quadratic
-
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
 
 _LOST = 1e-3  # relative rounding error of a static shape
 _NONE = 1e-12  # share of the largest entry below which damping is none

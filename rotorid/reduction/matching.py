@@ -17,11 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import BoolArray, FloatArray, IntArray
 from rotorid.reduction.vibration import natural_frequencies
-
-FloatArray = NDArray[np.float64]
 
 EXACT = 1e-9
 """Largest relative difference of frequencies of a set that counts as matching."""
@@ -67,7 +66,7 @@ class Matching:
     masses: FloatArray
     frequencies: FloatArray
     complete: bool
-    found: NDArray[np.int64]
+    found: IntArray
     starts: int
     warnings: tuple[str, ...]
 
@@ -155,7 +154,7 @@ def match(compliance: ArrayLike, frequencies: ArrayLike, *, starts: int = STARTS
     )
 
 
-def _incomplete(n: int, starts: int, found: NDArray[np.int64]) -> str:
+def _incomplete(n: int, starts: int, found: IntArray) -> str:
     rare = f", the rarest reached by {found.min()} of them" if found.size else ""
     odd = "; their number should be even: one is missing or two coincide" if len(found) % 2 else ""
     return (
@@ -293,12 +292,12 @@ def _refined(shape: FloatArray, z: FloatArray, starts: FloatArray) -> FloatArray
     return np.asarray(np.exp(x))
 
 
-def _confirmed(shape: FloatArray, z: FloatArray, u: FloatArray) -> NDArray[np.bool_]:
+def _confirmed(shape: FloatArray, z: FloatArray, u: FloatArray) -> BoolArray:
     logs, _ = _spectra(shape, np.log(u))
     return np.asarray(np.abs(logs - np.log(z)).max(axis=1) < EXACT)
 
 
-def _distinct(u: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
+def _distinct(u: FloatArray) -> tuple[FloatArray, IntArray]:
     """Each set once, by ascending first share, and how often it was found."""
     sets: list[FloatArray] = []
     count: list[int] = []

@@ -25,19 +25,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
 from fem.checks import whole
 from fem.eigen import Spectrum, lowest_modes
 from fem.matrices import assemble, ignored_inertia, multiply
 from fem.pencil import Pencil, whole_rotor
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.reduction.masses import Normalisation, RowWeights, equivalent_masses, normalised, row_factors
 from rotorid.reduction.methods_result import Method, Methods
 from rotorid.reduction.plane import plane_at_rest
 from rotorid.reduction.vibration import like, mac, natural_frequencies
-
-FloatArray = NDArray[np.float64]
 
 DEPENDENT = 1e-6
 """Shapes whose smallest combination at the masters is below this share of their largest entries are one."""
@@ -59,7 +57,7 @@ class _Condensed:
     said: tuple[str, ...]
     plane: fem.Rotor
     pencil: Pencil
-    masters: NDArray[np.intp]
+    masters: IndexArray
     modes: fem.Modes
     spectrum: Spectrum
     compliance: FloatArray

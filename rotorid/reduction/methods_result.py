@@ -8,16 +8,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.jsonable import floats
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 
 _ACROSS = 3
 """Modes beside one another in a table that fits a page."""

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 import fem
 from fem.checks import whole
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.reduction.masses import Normalisation, RowWeights, design
-from rotorid.reduction.placement_result import ALIKE, BADLY, FloatArray, IntArray, Placement
+from rotorid.reduction.placement_result import ALIKE, BADLY, Placement
 from rotorid.reduction.plane import plane_at_rest
 from rotorid.regression import RCOND
 
@@ -194,7 +195,7 @@ def _antinodes(plane: fem.Rotor, n: int) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def _book(nodes: IntArray, plane: fem.Rotor, n: int) -> tuple[int | None, str]:
+def _book(nodes: NDArray[np.int32], plane: fem.Rotor, n: int) -> tuple[int | None, str]:
     """Row of the book's rule among the choices, or why there is none."""
     try:
         wanted = _antinodes(plane, n)
@@ -222,7 +223,7 @@ def _number(value: int, most: int, name: str, words: str) -> int:
     return number
 
 
-def _chunks(count: int, n: int, size: int) -> Iterator[NDArray[np.intp]]:
+def _chunks(count: int, n: int, size: int) -> Iterator[IndexArray]:
     """All n of `count` places, from 0, ascending, shape (≤ size, n) at a time."""
     every = combinations(range(count), n)
     while True:
@@ -260,7 +261,7 @@ def _masses(
 
 def _compared(
     A: FloatArray, masses: FloatArray, omega: FloatArray, U: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, NDArray[np.int32]]:
     """Frequencies (t, check), largest error, smallest MAC and its mode (t,) of the n-mass models.
 
     NaN, and mode 0, where the masses are not all positive or the model does not vibrate in n modes.

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.reduction.jsonable import floats
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 ALIKE = 0.9
 """Below this MAC two shapes are not those of one mode."""
@@ -82,12 +81,12 @@ class Placement:
         What a user should know before choosing.
     """
 
-    nodes: IntArray
+    nodes: NDArray[np.int32]
     masses: FloatArray
     frequencies: FloatArray
     error: FloatArray
     mac: FloatArray
-    worst_mode: IntArray
+    worst_mode: NDArray[np.int32]
     condition: FloatArray
     ranked: int
     unphysical: int
@@ -110,7 +109,7 @@ class Placement:
         return len(self.nodes)
 
     @cached_property
-    def pareto(self) -> NDArray[np.intp]:
+    def pareto(self) -> IndexArray:
         """Rows that no other beats in both error and MAC: the trade-off, by ascending error."""
         mac = self.mac[: self.ranked]
         if not self.ranked:
@@ -162,7 +161,7 @@ class Placement:
             )
         return int(found[0])
 
-    def traps(self) -> NDArray[np.intp]:
+    def traps(self) -> IndexArray:
         """Rows with all checked frequencies within 2 % but a shape unlike the rotor's (MAC below 0.9)."""
         r = self.ranked
         return np.flatnonzero((self.error[:r] <= CLOSE) & (self.mac[:r] < ALIKE))

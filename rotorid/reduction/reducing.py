@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.judging import (
     far_off,
     of_regression,
@@ -25,8 +26,6 @@ from rotorid.reduction.sensitivity import mass_sensitivity
 from rotorid.reduction.separated import separate
 from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
 from rotorid.reduction.vibration import like, mac, natural_frequencies
-
-FloatArray = NDArray[np.float64]
 
 
 def reduce(

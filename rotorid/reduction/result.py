@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from rotorid.reduction.small import SmallRotor
 
-FloatArray = NDArray[np.float64]
 
 RAD_S_TO_RPM = 30.0 / np.pi
 

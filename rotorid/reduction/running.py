@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
 from fem.eigen import finite_modes
 from fem.matrices import assemble
 from fem.sensors import SensorLike, label
 from fem.whirl import checked_speeds
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.reduction.jsonable import floats
 from rotorid.reduction.threshold import stability_threshold
 from rotorid.reduction.turning import equations
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
     from rotorid.reduction.small import SmallRotor
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 CLOSE = 0.08
 """Largest difference, relative to the largest entry, up to which the small model follows the rotor well."""
@@ -73,7 +72,7 @@ class ResponseCost:
     sensors: tuple[SensorLike, ...]
     criticals: FloatArray
     bands: float
-    excluded: NDArray[np.bool_]
+    excluded: BoolArray
     relative_difference: FloatArray
     largest: float
     median: float

@@ -17,9 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fem.nearest import did_you_mean
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,
@@ -30,8 +31,6 @@ from rotorid.reduction.masses import (
 )
 from rotorid.reduction.vibration import natural_frequencies
 from rotorid.regression import Estimate
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,15 +17,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
 from fem.matrices import assemble, rounding_error
+from rotorid.base.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +208,7 @@ def _two_supports(rotor: fem.Rotor) -> tuple[int, int]:
     return found[0], found[1]
 
 
-def _hold(band: FloatArray, held: NDArray[np.intp], width: int) -> FloatArray:
+def _hold(band: FloatArray, held: IndexArray, width: int) -> FloatArray:
     """Upper band with some unknowns fixed: their rows and columns hold their own diagonal alone."""
     K = band.copy(order="F")
     size = K.shape[1]
@@ -220,7 +219,7 @@ def _hold(band: FloatArray, held: NDArray[np.intp], width: int) -> FloatArray:
     return K
 
 
-def _flexibility(band: FloatArray, unknowns: NDArray[np.intp]) -> FloatArray:
+def _flexibility(band: FloatArray, unknowns: IndexArray) -> FloatArray:
     """Entries of the inverse at some unknowns."""
     from scipy.linalg.lapack import dpbtrf, dpbtrs
 

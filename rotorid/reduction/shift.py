@@ -6,12 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.jsonable import floats
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

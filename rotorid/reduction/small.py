@@ -19,11 +19,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 import fem
 from fem.planes import Quadratic, both_planes, project
 from fem.statespace import StateSpace, state_space
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.reduction.lumping import (
     checked_speeds,
     condensed,
@@ -36,8 +37,6 @@ from rotorid.reduction.lumping import (
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 Plane = Literal["both", "x"]
 Supports = Literal["kept", "condensed"]
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
 from fem.campbell import runs_away
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.small import SmallRotor
 
 __all__ = ["StabilityCost", "compare_stability", "stability_threshold"]
 
-FloatArray = NDArray[np.float64]
 
 CONFIRMED = 1e-5
 """Largest |Re λ| / |λ| at a threshold of the full rotor, where it should be 0."""

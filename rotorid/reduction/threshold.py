@@ -7,22 +7,20 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
 from fem.campbell import asked_for, runs_away
 from fem.orbits import whirl_direction
-from fem.planes import AnyArray, ComplexArray
 from fem.quadratic import solve
 from fem.tracking import follow
 from fem.whirl import checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.reduction.turning import whirl_of
 
 if TYPE_CHECKING:
     from rotorid.reduction.small import SmallRotor
 
-FloatArray = NDArray[np.float64]
 
 GROWTH = 1e-9
 """Re λ / |λ| above which a mode grows: an undamped one has rounding there."""

@@ -8,9 +8,9 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
 from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, equivalent_masses
 from rotorid.reduction.matching import match
@@ -20,8 +20,6 @@ from rotorid.reduction.vibration import mac, natural_frequencies
 
 if TYPE_CHECKING:
     import pandas as pd
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ class TradeOff:
 
     nodes: tuple[int, ...]
     names: tuple[str, ...]
-    matching: NDArray[np.bool_]
+    matching: BoolArray
     masses: FloatArray
     frequencies: FloatArray
     relative_error: FloatArray
@@ -71,7 +69,7 @@ class TradeOff:
     warnings: tuple[str, ...]
 
     @property
-    def traps(self) -> NDArray[np.intp]:
+    def traps(self) -> IndexArray:
         """Matching rows whose smallest MAC is below 0.9: the frequencies are right, the shapes are not."""
         return np.flatnonzero(self.matching & (self.mac.min(axis=1) < ALIKE))
 

@@ -6,17 +6,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.basis import reference
 from fem.planes import Quadratic, both_planes, project
 from fem.quadratic import solve
 from fem.whirlsolve import Whirl
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from rotorid.reduction.small import SmallRotor
-
-FloatArray = NDArray[np.float64]
 
 
 def equations(small: SmallRotor) -> Quadratic:

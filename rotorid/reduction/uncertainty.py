@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
 from rotorid.reduction.sensitivity import InputErrors, Inputs, input_index, inputs, standard_deviations
@@ -22,7 +23,6 @@ from rotorid.reduction.vibration import natural_frequencies
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = NDArray[np.float64]
 
 __all__ = ["InputErrors", "MassUncertainty", "Shift", "mass_uncertainty"]
 

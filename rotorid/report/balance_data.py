@@ -8,12 +8,11 @@ import numpy as np
 
 from balancing.correction import region_radius
 from balancing.sheet import HELD
+from rotorid.base.arrays import FloatArray
 from rotorid.regression import coverage_factor
 from rotorid.tables import units
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from balancing import Correction, Influence
     from balancing.mounted import Mounted
     from balancing.trials import Trials
@@ -165,7 +164,7 @@ def _percent(width: float, value: complex) -> float | None:
     return float(100 * width / abs(value)) if value != 0 else None
 
 
-def _widths(f: Influence) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+def _widths(f: Influence) -> tuple[FloatArray | None, FloatArray | None]:
     """Half widths (S, C, P) of 95 % intervals: of sizes, and of phases in degrees (NaN: not determined)."""
     if f.covariance is None:
         return None, None

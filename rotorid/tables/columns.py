@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.tables.grid import BadCell, Cell, Grid, make_grid, show
 from rotorid.tables.number import NotANumber, check_size, decimal_comma, parse_number, thousands_or_decimals
 from rotorid.tables.problems import Problems, listing, suggest
@@ -18,7 +18,6 @@ from rotorid.tables.sheet import is_workbook, pick_sheet, read_workbook
 from rotorid.tables.textfile import decode, parse_text, read_bytes
 from rotorid.tables.units import Unit, UnitError, UnitReader
 
-FloatArray = NDArray[np.float64]
 REMARKS = ("note", "comment")
 _UNCLEAR = Unit("?", "unclear")
 

@@ -7,12 +7,12 @@ from math import isfinite, radians
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.labels import Angles as Angles
 from balancing.labels import Labels, Rotation, View, check_turning
 from balancing.labels import Phase as Phase
 from balancing.trials import ReadingErrors
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.problems import did_you_mean, listing
 from rotorid.tables.tomlfile import Section
 
@@ -220,7 +220,7 @@ def as_angles(word: str) -> Angles:
     return cast("Angles", word)
 
 
-def polar(size: NDArray[np.float64], angle: NDArray[np.float64], sign: int) -> NDArray[np.complex128]:
+def polar(size: FloatArray, angle: FloatArray, sign: int) -> ComplexArray:
     """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
     turns = angle / (np.pi / 2)
     quarter = np.round(turns)

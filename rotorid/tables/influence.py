@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.trials import Trials
 from fem.sensors import label
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables import units
 from rotorid.tables.columns import Column, make_table, must_be, read_grid
 from rotorid.tables.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
@@ -55,7 +55,7 @@ class Coefficients(Protocol):
     """What can be written as an influence table: results of `balancing` and of `fem`."""
 
     @property
-    def speeds(self) -> NDArray[np.float64]:
+    def speeds(self) -> FloatArray:
         """rad/s, shape (S,)."""
 
     @property
@@ -67,7 +67,7 @@ class Coefficients(Protocol):
         """Names or nodes, length P."""
 
     @property
-    def W(self) -> NDArray[np.complex128]:
+    def W(self) -> ComplexArray:
         """Shape (S, C, P), SI."""
 
 

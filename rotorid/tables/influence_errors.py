@@ -12,17 +12,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.influence import Influence
 from balancing.labels import Labels
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.tables.columns import Column, Table, must_be
 from rotorid.tables.grid import Grid, show
 from rotorid.tables.number import SMALLEST
 from rotorid.tables.problems import Problems
 from rotorid.tables.units import Unit, UnitError, UnitReader, ratio, spelt
-
-FloatArray = NDArray[np.float64]
 
 PARTS = ("re", "im")
 _ROUNDING = 1e-9
@@ -58,7 +56,7 @@ def _correlation(a: str, b: str, plane: object) -> str:
 
 
 def read_covariance(
-    table: Table, places: NDArray[np.intp], planes: Sequence[str], sign: int, problems: Problems
+    table: Table, places: IndexArray, planes: Sequence[str], sign: int, problems: Problems
 ) -> FloatArray | None:
     """Covariance of the coefficients in SI and phase lead, or None without such columns or with problems.
 
@@ -110,7 +108,7 @@ def read_covariance(
 
 
 def _check_correlations(
-    table: Table, places: NDArray[np.intp], planes: Sequence[str], R: FloatArray, problems: Problems
+    table: Table, places: IndexArray, planes: Sequence[str], R: FloatArray, problems: Problems
 ) -> None:
     """Complain about correlations with itself that are not 1, unequal halves, and impossible sets."""
     S, C, n, _ = R.shape

@@ -7,13 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from balancing.holes import Holes
 from balancing.influence import Influence
 from balancing.limits import Limits
 from balancing.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.conventions import Conventions
 from rotorid.tables.grid import Grid
 
@@ -88,7 +86,7 @@ class Job:
     files: tuple[Path, ...]
     planes: tuple[str, ...] = ()
     limits: Limits | None = None
-    row_weights: NDArray[np.float64] | None = None
+    row_weights: FloatArray | None = None
     left_out: tuple[str, ...] = ()
     check: Trials | None = None
     check_mounted: bool = False
@@ -100,7 +98,7 @@ class Job:
     holes: Mapping[str, Holes] = field(default_factory=dict)
     remove: frozenset[str] = frozenset()
     trial_radii: Mapping[str, float] = field(default_factory=dict)
-    slow_roll: NDArray[np.complex128] | None = None
+    slow_roll: ComplexArray | None = None
     key_phasor: float = 0.0
 
     @property

@@ -9,10 +9,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.limits import Arc, Limits
 from balancing.trials import Trials
+from rotorid.base.arrays import FloatArray
 from rotorid.tables import units
 from rotorid.tables.jobkeys import Pair, PlaneKeys, SensorKeys
 from rotorid.tables.jobquantity import Quantity, to_job_weight
@@ -25,7 +25,6 @@ from rotorid.tables.units import Unit, UnitError
 if TYPE_CHECKING:
     from rotorid.tables.job import Job
 
-FloatArray = NDArray[np.float64]
 
 _WORD = re.compile(r"([+-]?[0-9.,]+(?:[eE][+-]?[0-9]+)?)\s*(\D.*)?")
 _OPTION_MASS = "--max-mass"

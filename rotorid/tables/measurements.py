@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, read_table
 from rotorid.tables.conventions import FULL_TURN, polar
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from rotorid.harmonic.experiments import Experiments
     from rotorid.harmonic.model import HarmonicModel
 
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _SPEED = one_of(units.SPEED)
 _FREE = "a free vibration has real amplitudes"
@@ -236,7 +234,7 @@ def _experiments(table: Table, problems: Problems) -> tuple[str, ...]:
 
 def _free(
     table: Table, model: HarmonicModel, signals: dict[str, ComplexArray], problems: Problems
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Which rows are free vibrations; complaints about rows without a force that are none."""
     unforced = np.ones(len(table), dtype=bool)
     if model.has_constant_terms:

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import BoolArray
 
 if TYPE_CHECKING:
     from fem.motion import Motion
-
-FloatArray = NDArray[np.float64]
 
 
 def ode_model_bytes(
@@ -107,7 +106,7 @@ def _matrices(
 
 def _states(
     motion: Motion,
-    massless: NDArray[np.bool_],
+    massless: BoolArray,
     dampers: Mapping[str, float],
     initial: Mapping[str, float],
     inputs: Sequence[str],

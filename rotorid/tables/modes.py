@@ -8,15 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.rotor import Rotor
+from rotorid.base.arrays import FloatArray
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, nearest, read_table
 from rotorid.tables.problems import Problems, did_you_mean, listing
 from rotorid.tables.units import Unit, one_of, ratio
 
-FloatArray = NDArray[np.float64]
 Node = int | str
 """The number of a node; without a rotor also any label."""
 

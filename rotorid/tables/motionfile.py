@@ -8,17 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotorid import expressions
+from rotorid.base.arrays import FloatArray
 from rotorid.tables.odefile import TimeForm, read_time_form
 from rotorid.tables.problems import Problems, did_you_mean
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:
     from fem.motion import Motion
-
-FloatArray = NDArray[np.float64]
 
 
 def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> Motion:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.tables.columns import Column, FloatArray, Table, make_table, read_grid
+from rotorid.base.arrays import FloatArray
+from rotorid.tables.columns import Column, Table, make_table, read_grid
 from rotorid.tables.grid import Cell, Grid
 from rotorid.tables.problems import Problems, TableWarning, did_you_mean, listing
 from rotorid.tables.units import Unit, UnitError, one_of

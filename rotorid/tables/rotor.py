@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.tables import units
-from rotorid.tables.columns import Column, FloatArray, Table, must_be, read_table
+from rotorid.tables.columns import Column, Table, must_be, read_table
 from rotorid.tables.problems import Problems, TableWarning
 from rotorid.tables.units import one_of
 
@@ -161,7 +161,7 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     )
 
 
-def _warn_of_sizes(table: Table, elements: NDArray[np.bool_]) -> None:
+def _warn_of_sizes(table: Table, elements: BoolArray) -> None:
     """A millimetre taken for a metre gives a rotor that can be computed all the same."""
     for stem, low, high, unit, question in USUAL:
         if stem not in table:
@@ -200,7 +200,7 @@ def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problem
         raise
 
 
-def _complain_about_blanks(table: Table, stem: str, elements: NDArray[np.bool_], problems: Problems) -> None:
+def _complain_about_blanks(table: Table, stem: str, elements: BoolArray, problems: Problems) -> None:
     """Optional only in a last row without an element."""
     if stem not in table:
         return

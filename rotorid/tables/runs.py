@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, make_table, must_be, read_table
 from rotorid.tables.conventions import FULL_TURN, Conventions, polar
@@ -16,9 +16,6 @@ from rotorid.tables.grid import Grid
 from rotorid.tables.problems import Problems
 from rotorid.tables.speeds import merge_speeds, same_speed, show_speed
 from rotorid.tables.units import Unit, one_of
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))

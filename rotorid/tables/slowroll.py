@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing.labels import Labels
 from balancing.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables import units
 from rotorid.tables.conventions import Conventions, polar
 from rotorid.tables.grid import Grid
@@ -31,9 +31,6 @@ from rotorid.tables.runs import Runs, read_runs
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.tomlfile import Section
 from rotorid.tables.units import Unit, UnitError
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""

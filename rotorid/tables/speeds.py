@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.tables.columns import Table
 from rotorid.tables.problems import Problems
 from rotorid.tables.units import Unit
 
-FloatArray = NDArray[np.float64]
 ROUNDING = 1e-12
 _NAMED = 3
 

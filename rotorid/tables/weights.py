@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import ComplexArray
 from rotorid.tables import units
 from rotorid.tables.columns import Column, make_table, must_be, nearest, read_table
 from rotorid.tables.conventions import FULL_TURN, Conventions, polar
@@ -31,7 +31,7 @@ class Weights:
     """Complex weights of each run and plane, kg or kg·m, shape (R, P)."""
 
     planes: tuple[str, ...]
-    weights: NDArray[np.complex128]
+    weights: ComplexArray
     unit: Unit
 
 

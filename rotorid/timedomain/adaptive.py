@@ -6,12 +6,10 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.errors import LARGEST, SimulationError, diverged
 from rotorid.timedomain.system import Augmented
-
-FloatArray = NDArray[np.float64]
 
 MAX_STEPS = {"dop853": 10_000, "lsoda": 30_000}
 """Steps between the first and the last time (more samples than a tenth of this allow ten each)."""

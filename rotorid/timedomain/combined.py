@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Combination, Estimate, echelon
 from rotorid.timedomain.problem import Problem
-
-FloatArray = NDArray[np.float64]
 
 REACH = 0.2
 """How far to go, relative to the parameters."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from rotorid.timedomain.model import OdeModel
 
-FloatArray = NDArray[np.float64]
 
 LARGEST = 1e100
 """States beyond this size (in the units of the model) have diverged."""

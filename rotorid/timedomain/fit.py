@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.nonlinear import nonlinear_least_squares
 from rotorid.search import inside
 from rotorid.timedomain.gauss_newton import gauss_newton
@@ -24,7 +25,6 @@ from rotorid.timedomain.simulate import SimulationError
 from rotorid.timedomain.starts import merge, spread_starts
 from rotorid.timedomain.trajectory import Curve, given_trajectory, measured_trajectory, own_trajectory
 
-FloatArray = NDArray[np.float64]
 METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""

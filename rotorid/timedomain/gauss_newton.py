@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.regression import least_squares
 from rotorid.search import RCOND
 from rotorid.timedomain.path import Path, at, half_square, negligible
 from rotorid.timedomain.problem import Problem
 from rotorid.timedomain.simulate import SimulationError
-
-FloatArray = NDArray[np.float64]
 
 
 def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, tolerance: float) -> Path:

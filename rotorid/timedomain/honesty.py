@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.regression import least_squares
 from rotorid.search import RCOND
@@ -16,8 +16,6 @@ from rotorid.timedomain.path import Path
 from rotorid.timedomain.problem import RTOL, Problem
 from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
 from rotorid.timedomain.simulate import SimulationError, inputs_of
-
-FloatArray = NDArray[np.float64]
 
 PROBES = 100_001
 """Times at which pulses are looked for."""

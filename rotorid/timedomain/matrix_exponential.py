@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rotorid.base.arrays import FloatArray
+
 Pair = tuple[FloatArray, FloatArray]
 """A matrix and its derivatives."""
 

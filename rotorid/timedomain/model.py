@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotorid import expressions
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.compiled import Compiled, signs
 from rotorid.timedomain.reading import Reader, bound_table, check_names, finite_numbers
 
-FloatArray = NDArray[np.float64]
 Expression = Any
 """Of sympy, which has no types."""
 

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.record import Record
 from rotorid.timedomain.several import models_of
 from rotorid.timedomain.simulate import SimulationError, Trajectory, simulate
-
-FloatArray = NDArray[np.float64]
 
 RTOL = 1e-10
 """Of the integration during a fit."""

@@ -5,11 +5,9 @@ from __future__ import annotations
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.timedomain.matrix_exponential import expm_and_derivatives, squared
-
-FloatArray = NDArray[np.float64]
 
 SAME_STEP = 4e-15
 """Steps that differ by less than this share of the largest time are one step (rounded times)."""
@@ -112,7 +110,7 @@ def propagate_driven(
     return x, s
 
 
-def _distinct(steps: FloatArray, largest: float) -> tuple[FloatArray, NDArray[np.intp]]:
+def _distinct(steps: FloatArray, largest: float) -> tuple[FloatArray, IndexArray]:
     """Distinct steps in order of appearance, and which one each step is."""
     if steps.size == 0:
         return steps, np.zeros(0, dtype=np.intp)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.regression import least_squares
 from rotorid.search import RCOND
@@ -22,8 +22,6 @@ from rotorid.timedomain.problem import Problem
 from rotorid.timedomain.record import Record
 from rotorid.timedomain.simulate import SimulationError, inputs_of
 from rotorid.timedomain.trajectory import Curve
-
-FloatArray = NDArray[np.float64]
 
 
 def quasilinearization(

@@ -8,12 +8,10 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotorid import expressions
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.compiled import real
-
-FloatArray = NDArray[np.float64]
 
 
 class Reader:

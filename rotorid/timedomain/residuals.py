@@ -9,11 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.problem import Problem
-
-FloatArray = NDArray[np.float64]
 
 UNEXPLAINED = 0.05
 """Share of a series' variance in residuals that are not white above which it is not described."""

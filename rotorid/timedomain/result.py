@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.record import Record
@@ -16,8 +16,6 @@ from rotorid.timedomain.simulate import Trajectory
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

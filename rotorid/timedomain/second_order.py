@@ -9,14 +9,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.compiled import Compiled
 from rotorid.timedomain.errors import SimulationError
 from rotorid.timedomain.model import OdeModel, ode_model
 from rotorid.timedomain.reading import Reader
 
-FloatArray = NDArray[np.float64]
 Matrix = Sequence[Sequence[float | str]] | FloatArray
 """Numbers or expressions of parameters, (n, n)."""
 

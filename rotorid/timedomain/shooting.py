@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.problem import Problem
 from rotorid.timedomain.record import Record
 from rotorid.timedomain.simulate import SimulationError, simulate
 from rotorid.timedomain.trajectory import Curve
-
-FloatArray = NDArray[np.float64]
 
 PIECES = 12
 """Of a record, at most, by default."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain import adaptive, propagation
 from rotorid.timedomain.errors import SimulationError, check_finite
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.record import Record
 from rotorid.timedomain.system import Augmented
 
-FloatArray = NDArray[np.float64]
 METHODS = ("auto", "expm", "dop853", "lsoda", "heun", "rk4")
 
 __all__ = ["METHODS", "SimulationError", "Trajectory", "inputs_of", "simulate"]

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.path import Path
 from rotorid.timedomain.result import Minimum
-
-FloatArray = NDArray[np.float64]
 
 SAME = 1e-3
 """Relative difference of parameters below which two minima are one."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotorid import expressions
 from rotorid.timedomain.compiled import signs
@@ -13,8 +13,6 @@ from rotorid.timedomain.model import OdeModel
 
 if TYPE_CHECKING:
     from fem.statespace import StateSpace
-
-FloatArray = NDArray[np.float64]
 
 
 def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float = 0.0) -> StateSpace:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.model import OdeModel
-
-FloatArray = NDArray[np.float64]
 
 
 class Augmented:

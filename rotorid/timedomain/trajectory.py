@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.model import OdeModel, ode_model
 from rotorid.timedomain.problem import Problem
 from rotorid.timedomain.record import Record
 from rotorid.timedomain.simulate import SimulationError, inputs_of, simulate
 
-FloatArray = NDArray[np.float64]
 Curve = Callable[[FloatArray], FloatArray]
 """States (*B, n_x) at times (*B,)."""
 

@@ -13,14 +13,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from balancing import Correction, Influence, Labels, Limits, Trials, correct, estimate_influence
+from rotorid.base.arrays import ComplexArray
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 from rotorid.validation.row import Row, number, printed_table, row
-
-ComplexArray = NDArray[np.complex128]
 
 NOTE = "Brüel & Kjær, application note 17-227"
 SIX = f"{NOTE}, example 6"

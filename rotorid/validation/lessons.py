@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic import Experiments, HarmonicModel, Identification, harmonic_model, identify
 from rotorid.harmonic.natural import natural_modes
 from rotorid.harmonic.output_error import operator_of
@@ -21,9 +21,6 @@ from rotorid.harmonic.rows import build_rows
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements
 from rotorid.validation.row import Row, number, row
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 SECTION = "[S] section 1.8"
 TASKS = ("5_1", "5_2", "6_1", "6_2", "7_1", "7_2", "8_1", "8_2")

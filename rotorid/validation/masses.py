@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import fem
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction import equivalent_masses, natural_frequencies
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 from rotorid.validation.row import Row, number, printed_table, row
-
-FloatArray = NDArray[np.float64]
 
 NODES = (7, 12, 18)
 SUPPORTS = (2, 22)

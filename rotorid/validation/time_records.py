@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rotorid.base.arrays import FloatArray
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model
 from rotorid.timedomain import OdeModel, Record, Trajectory, ode_model, simulate
 from rotorid.timedomain.fit import fit
 from rotorid.validation.row import Row, half_unit, number, printed_table, row
-
-FloatArray = NDArray[np.float64]
 
 TRUTH_Q = (1.0, -1.0, -1.0)
 TRUTH_F = (0.14, 12.0, 28.0)
