@@ -14,6 +14,7 @@ from balancing.labels import Labels
 from balancing.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.base.units import RPM, rpm_text
 from rotorid.regression import stretch
 
 SPEED_TOLERANCE = 0.005
@@ -47,10 +48,8 @@ def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients
     for speed in np.atleast_1d(np.asarray(wanted, dtype=np.float64)):
         i = int(np.argmin(np.abs(known - speed)))
         if not abs(known[i] - speed) <= SPEED_TOLERANCE * known[i]:
-            rpm = ", ".join(f"{v * 30 / np.pi:.6g}" for v in known)
-            raise ValueError(
-                f"there are no {what} at {speed * 30 / np.pi:.6g} rpm; there are some at {rpm} rpm"
-            )
+            rpm = ", ".join(f"{v * RPM:.6g}" for v in known)
+            raise ValueError(f"there are no {what} at {rpm_text(speed)}; there are some at {rpm} rpm")
         found.append(i)
     if len(set(found)) < len(found):
         raise ValueError("a speed is given twice")

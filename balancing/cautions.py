@@ -11,6 +11,7 @@ from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.limits import Limits
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
@@ -30,7 +31,7 @@ POOR = 1e-3
 
 def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
     """What to call each reading, speed by speed."""
-    return tuple(f"sensor {c!r} at {s * 30 / np.pi:.6g} rpm" for s in speeds for c in sensors)
+    return tuple(f"sensor {c!r} at {rpm_text(s)}" for s in speeds for c in sensors)
 
 
 def amplitude_words(labels: Labels, size: float) -> str:
@@ -148,7 +149,7 @@ def _rises(
     places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
     places.sort(key=lambda place: old[place] - new[place])
     words = [
-        f"the vibration of sensor {sensors[c]!r} at {speeds[s] * 30 / np.pi:.6g} rpm{where} is predicted "
+        f"the vibration of sensor {sensors[c]!r} at {rpm_text(speeds[s])}{where} is predicted "
         f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_unit}".rstrip()
         for s, c in places[:_RISES_NAMED]
     ]

@@ -9,6 +9,7 @@ import numpy as np
 
 from balancing.sheet import DUST, WIDTH, figures, table
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     from balancing.check import CheckComparison
@@ -173,11 +174,6 @@ def _percent(probability: float) -> str:
 
 def _rms(amplitudes: FloatArray) -> float:
     return float(np.sqrt(np.mean(amplitudes**2)))
-
-
-def rpm(speed: float) -> float:
-    """Speed in rpm; 3000 rpm come back as 3000, not as 3000.0000000000005."""
-    return float(f"{speed * 30 / np.pi:.12g}")
 
 
 def _wrap(text: str, indent: str) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.influence import Influence
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
 
 
 def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) -> FloatArray | None:

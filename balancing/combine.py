@@ -25,6 +25,7 @@ from balancing.errors import symmetric
 from balancing.influence import Influence
 from balancing.repeatability import tail
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import rpm_text
 
 LEVEL = 0.99
 """Of the test whether both agree, for all coefficients together."""
@@ -77,7 +78,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         if lacking:
             raise ValueError(
                 f"there is neither a measured nor a computed coefficient of plane {lacking!r} at sensor "
-                f"{sensors[c]!r}, {_rpm(float(speeds[s]))}: compute it, or leave out one of them"
+                f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
             )
         z, own, found = _reading(measured, a, computed, b, planes)
         Y[s, c], W[s, c], covariance[s, c] = z[0], z[1:], own
@@ -130,9 +131,10 @@ def _speeds(
         i = int(np.argmin(np.abs(measured.speeds - speed)))
         if abs(measured.speeds[i] - speed) <= SPEED_TOLERANCE * measured.speeds[i]:
             if i in pairs:
-                two = f"{_rpm(computed.speeds[pairs[i]])} and {_rpm(speed)}"
+                two = f"{rpm_text(computed.speeds[pairs[i]])} and {rpm_text(speed)}"
                 raise ValueError(
-                    f"two computed speeds, {two}, fit the measured {_rpm(measured.speeds[i])}: leave one out"
+                    f"two computed speeds, {two}, fit the measured {rpm_text(measured.speeds[i])}: "
+                    "leave one out"
                 )
             pairs[i] = j
     rows: list[tuple[float, int | None, int | None]] = [
@@ -211,7 +213,7 @@ def _contradictions(
     found.sort(key=lambda d: -d[0])
     words = [
         f"measured and computed coefficient of plane {planes[p]!r} at sensor {sensors[c]!r}, "
-        f"{_rpm(speeds[s])}, differ by {np.sqrt(chi / 2):.2g} times their errors"
+        f"{rpm_text(speeds[s])}, differ by {np.sqrt(chi / 2):.2g} times their errors"
         for chi, p, c, s in found[:_NAMED]
     ]
     if len(found) > _NAMED:
@@ -219,7 +221,3 @@ def _contradictions(
     if words:
         words[-1] += ": the model, the trial runs or the stated errors are wrong"
     return tuple(words)
-
-
-def _rpm(speed: float) -> str:
-    return f"{float(speed) * 30 / np.pi:.6g} rpm"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import finite
 from rotorid.regression import RCOND
 
 ALIKE = 0.1
@@ -110,7 +111,7 @@ class Conditioning:
             "planes": list(self.planes),
             "readings": self.readings,
             "singular_values": self.singular_values.tolist(),
-            "condition_number": self.condition_number if np.isfinite(self.condition_number) else None,
+            "condition_number": finite(self.condition_number),
             "rank": self.rank,
             "without_effect": list(self.without_effect),
             "alike": [

@@ -16,6 +16,7 @@ from balancing.refine import different, mounted_in
 from balancing.sheet import WIDTH, figures, table
 from balancing.trials import Trials
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -110,7 +111,7 @@ class History:
         size = np.where(self._read[r], np.abs(self.readings[r]), -1.0)
         return [
             {
-                "speed_rpm": float(f"{speed * 30 / np.pi:.12g}"),
+                "speed_rpm": rpm(speed),
                 "largest": float(self.largest[r, s] * scale),
                 "sensor": self.sensors[int(np.argmax(size[s]))],
                 "rms": float(self.rms[r, s] * scale),

@@ -22,6 +22,7 @@ from balancing.trials import ReadingErrors, Trials, check_names, check_speeds
 if TYPE_CHECKING:
     import pandas as pd
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM
 from rotorid.regression import gain
 
 
@@ -112,7 +113,7 @@ class Influence:
 
         scale = self.labels.vibration_scale / self.labels.weight_scale
         S, C, P = self.W.shape
-        rpm = np.round(self.speeds * 30 / np.pi, 9)
+        rpm = np.round(self.speeds * RPM, 9)
         return pd.DataFrame(
             {
                 "speed_rpm": np.repeat(rpm, C * P),

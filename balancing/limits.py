@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
 
 Arc = tuple[float, float]
 """First angle and width, rad, with the rotation; 0 < width ≤ 2π."""

@@ -20,8 +20,8 @@ from balancing.sampling import sampled_covariance
 from balancing.sectors import allowed_sectors, stands_in
 from balancing.solve import Method, Solution, solve
 from balancing.weighted_limits import STEPS, limited_fit
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
 
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""

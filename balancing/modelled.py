@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike
 
 from balancing.influence import Influence
 from balancing.labels import Labels
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from fem.rotor import Rotor

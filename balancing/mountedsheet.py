@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.sheet import figures, small, table
+from rotorid.base.json import finite
+from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     from balancing.holes import Holes, Mounting
@@ -35,7 +37,7 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
         "holes": [row for p in range(len(c.planes)) for row in _holes(m, p)],
         "residuals": [
             {
-                "speed_rpm": float(f"{speed * 30 / np.pi:.12g}"),
+                "speed_rpm": rpm(speed),
                 "sensor": sensor,
                 "after": float(after[s, k]),
                 "after_phase_deg": float(phase[s, k]),
@@ -48,7 +50,7 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
         "max_after": float(after.max()),
         "proven": m.found.proven,
         "gap": float(m.found.gap),
-        "plane_by_plane": _number(m.found.rounded_objective / m.found.objective)
+        "plane_by_plane": finite(m.found.rounded_objective / m.found.objective)
         if m.found.objective > 0 and all(h is not None for h in m.holes)
         else None,
     }
@@ -138,7 +140,3 @@ def _pieces(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
         for piece, count in zip(holes.pieces, mounting.counts[h], strict=True)
         if count
     )
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -13,6 +13,7 @@ import numpy as np
 
 from balancing.sheet import figures
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,7 +164,7 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
         polar.plot([], [], marker=marker, color=colour, ls="none", label=sensor)
     polar.set_rlim(0, 1.15 * max(float(max(old.max(), new.max())), np.finfo(float).tiny))
     _quiet_radii(polar, old_phase, old)
-    polar.set_title(f"{c.speeds[speed] * 30 / np.pi:.6g} rpm", fontsize="medium")
+    polar.set_title(f"{rpm_text(c.speeds[speed])}", fontsize="medium")
     if legend:
         polar.legend(loc="upper right", bbox_to_anchor=(0.08, 1.12), fontsize="x-small", frameon=True)
     return polar
@@ -222,7 +223,7 @@ def _name_bars(ax: Axes, c: Correction, x: FloatArray) -> None:
     middle = x.reshape(S, C).mean(axis=1)
     every = -(-S // 12)
     upper = ax.secondary_xaxis("top")
-    upper.set_xticks(middle[::every], [f"{v * 30 / np.pi:.5g}" for v in c.speeds[::every]], fontsize="small")
+    upper.set_xticks(middle[::every], [f"{v * RPM:.5g}" for v in c.speeds[::every]], fontsize="small")
     upper.tick_params(length=0)
     upper.set_xlabel("speed, rpm", fontsize="small")
     upper.spines["top"].set_visible(False)

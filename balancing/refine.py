@@ -25,6 +25,7 @@ from balancing.determined import UndeterminedError
 from balancing.influence import Influence, estimate_influence
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
@@ -269,7 +270,7 @@ def _partly(
             covariance = known.copy()
             covariance[at] = part.covariance
     lacking = [
-        f"{name!r} at {speed * 30 / np.pi:.6g} rpm"
+        f"{name!r} at {rpm_text(speed)}"
         for s, speed in enumerate(trials.speeds)
         for c, name in enumerate(trials.sensors)
         if s not in rows or c not in columns
@@ -317,7 +318,7 @@ def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
             within = " (which the trial runs alone do not tell from zero)" if unclear else ""
             words.append(
                 f"the check runs move the coefficient of plane {plane!r} on sensor {alone.sensors[c]!r} at "
-                f"{alone.speeds[s] * 30 / np.pi:.6g} rpm{within} by {_percent(change)} and "
+                f"{rpm_text(alone.speeds[s])}{within} by {_percent(change)} and "
                 f"{round(np.degrees(turn)):+d}°"
             )
     if words:

@@ -9,6 +9,8 @@ import numpy as np
 
 from balancing.baseline import describe_errors
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import finite
+from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
@@ -60,7 +62,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
                 "unit": unit,
                 "angle_deg": float(angle[p]),
                 "mass_std": None if mass_std is None else float(mass_std[p] * c.labels.weight_scale),
-                "angle_std_deg": None if angle_std is None else _number(np.degrees(angle_std[p])),
+                "angle_std_deg": None if angle_std is None else finite(np.degrees(angle_std[p])),
                 "covariance": None if covariance is None else covariance[p].tolist(),
                 "action": "remove" if plane in c.remove else "add",
                 "remove_at_deg": float((angle[p] + 180) % 360) if plane in c.remove else None,
@@ -70,12 +72,12 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         **_mounted(c),
         "residuals": [
             {
-                "speed_rpm": _rpm(speed),
+                "speed_rpm": rpm(speed),
                 "sensor": sensor,
                 "before": float(old[s, k]),
                 "before_phase_deg": float(old_phase[s, k]),
                 "after": float(new[s, k]),
-                "after_phase_deg": _number(new_phase[s, k]),
+                "after_phase_deg": finite(new_phase[s, k]),
                 "after_covariance": None if after_covariance is None else after_covariance[s, k].tolist(),
             }
             for s, speed in enumerate(c.speeds)
@@ -85,7 +87,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         "rms_after": float(np.sqrt(np.mean(new**2))),
         "max_before": float(old.max()),
         "max_after": float(new.max()),
-        "condition_number": _number(c.condition_number),
+        "condition_number": finite(c.condition_number),
         "rank": c.rank,
         "singular_values": c.singular_values.tolist(),
         "duality_gap": c.gap,
@@ -166,7 +168,7 @@ def _vibration(c: Correction) -> str:
         rows[0].append("95 % within")
     for s, speed in enumerate(c.speeds):
         for k, sensor in enumerate(c.sensors):
-            row = [f"{_rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
+            row = [f"{rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
             shown = small(new[s, k], old.max())
             row += [shown, "" if shown == "0" else _degrees(new_phase[s, k], 0)]
             if bound is not None:
@@ -253,8 +255,8 @@ def _limits(c: Correction) -> dict[str, Any] | None:
     weight = c.limits.max_weight * c.labels.weight_scale
     amplitude = c.limits.residual.ravel() * c.labels.vibration_scale
     return {
-        "max_weight": {p: _number(w) for p, w in zip(c.planes, weight, strict=True)},
-        "amplitude": [_number(a) for a in amplitude],
+        "max_weight": {p: finite(w) for p, w in zip(c.planes, weight, strict=True)},
+        "amplitude": [finite(a) for a in amplitude],
         "forbidden_deg": {
             p: [_degrees_of(c, arc, 180.0 if p in c.remove else 0.0) for arc in arcs]
             for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
@@ -309,14 +311,5 @@ def _degrees(angle: float, places: int = 1) -> str:
     return f"{round(angle, places) % 360:.{places}f}°"
 
 
-def _rpm(speed: float) -> float:
-    # 3000 rpm must come back as 3000, not as 3000.0000000000005
-    return float(f"{speed * 30 / np.pi:.12g}")
-
-
 def _wrap(text: str, indent: str) -> str:
     return textwrap.fill(text, WIDTH, subsequent_indent=indent)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

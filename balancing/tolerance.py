@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from balancing.allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,7 +124,7 @@ class Tolerance:
             "grade": f"G{self.grade:g}",
             "mass_kg": self.mass,
             "speed_rad_s": self.speed,
-            "speed_rpm": self.speed * 30 / math.pi,
+            "speed_rpm": self.speed * RPM,
             "permissible_kg_m": self.total,
             "permissible_g_mm": self.total * _GRAM_MM,
             "specific_um": self.eccentricity * 1e6,
@@ -157,7 +158,7 @@ class Tolerance:
         import textwrap
 
         head = (
-            f"G{self.grade:g} for {self.mass:.6g} kg at {self.speed * 30 / math.pi:.6g} rpm: permissible "
+            f"G{self.grade:g} for {self.mass:.6g} kg at {rpm_text(self.speed)}: permissible "
             f"residual unbalance {self.total * _GRAM_MM:.4g} g·mm "
             f"({self.eccentricity * 1e6:.3g} g·mm/kg)"
         )

@@ -23,8 +23,9 @@ from balancing.labels import Labels
 from balancing.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
 from balancing.trial_result import TrialWeight
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import ComplexArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.influence import Influence
@@ -233,9 +234,7 @@ def trial_from_coefficients(
         if not abs(w[most]):
             raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
         amount = share * size / abs(w[most])
-        reading = (
-            f"sensor {influence.sensors[most[1]]!r} at {influence.speeds[most[0]] * 30 / math.pi:.6g} rpm"
-        )
+        reading = f"sensor {influence.sensors[most[1]]!r} at {rpm_text(influence.speeds[most[0]])}"
         basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
         if amount > limit:
             amount, basis = limit, "the largest weight of the plane"

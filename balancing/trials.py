@@ -9,6 +9,7 @@ import numpy as np
 
 from balancing.labels import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.units import RPM
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class Trials:
         bad[1:] |= ~missing[1:] & missing[:-1]
         if bad.any():
             k, r, s, c = np.argwhere(bad)[0]
-            rpm = self.speeds[s] * 30 / np.pi
+            rpm = self.speeds[s] * RPM
             gap = np.isnan(readings[: k + 1, r, s, c]).any()
             raise ValueError(
                 f"the reading of sensor {self.sensors[c]!r} in run {self.runs[r]!r} at {rpm:.6g} rpm is "

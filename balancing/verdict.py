@@ -31,6 +31,7 @@ from balancing.repeatability import tail
 from balancing.tolerance import Tolerance
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
@@ -130,7 +131,7 @@ class Verdict:
         return {
             "kind": row.kind,
             "name": row.name,
-            "speed_rpm": None if row.speed is None else round(row.speed * 30 / np.pi, 9),
+            "speed_rpm": None if row.speed is None else round(row.speed * RPM, 9),
             "size": row.size * scale,
             "angle_deg": float(angle) if row.size else None,
             "low": None if row.low is None else row.low * scale,

@@ -12,11 +12,13 @@ from fem.crossing import synchronous
 from fem.growth import GROWTH, Growing, growing
 from fem.orbits import whirl_direction
 from fem.planes import both_planes
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
 from fem.tracking import Followed, follow
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl, solve_whirl
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.json import floats
+from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,8 +87,8 @@ class Campbell:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid campbell`; one list per mode."""
         return {
             "speeds_rad_s": self.speeds.tolist(),
-            "frequencies_rad_s": _plain(self.frequencies),
-            "log_decrements": _plain(self.log_decrements),
+            "frequencies_rad_s": [floats(row) for row in self.frequencies.T],
+            "log_decrements": [floats(row) for row in self.log_decrements.T],
             "direction": [
                 [
                     DIRECTION_NAMES[float(d)] if np.isfinite(w) else None
@@ -133,7 +135,7 @@ class Campbell:
         """Frequencies at both ends of the range and the damped critical speeds as text."""
         first, last = self.speeds[0], self.speeds[-1]
         lines = [
-            f"Whirl from {first:.6g} to {last:.6g} rad/s ({first * RPM:.6g} to {last * RPM:.6g} rpm)",
+            f"Whirl from {first:.6g} to {last:.6g} rad/s ({first * RPM:.6g} to {rpm_text(last)})",
             "mode    at first, rad/s   log dec    at last, rad/s   log dec",
         ]
         for k in range(self.frequencies.shape[1]):
@@ -389,7 +391,3 @@ def _warnings(whirl: Whirl, paths: Followed, columns: IndexArray, n: int) -> tup
 def _rounded(delta: float) -> float:
     """To the four digits that are printed, without a negative zero."""
     return round(float(delta), 4) + 0.0
-
-
-def _plain(array: FloatArray) -> list[list[float | None]]:
-    return [[float(v) if np.isfinite(v) else None for v in row] for row in array.T]

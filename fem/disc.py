@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fem.checks import attachment, number
+from rotorid.base.checks import attachment, number
 
 STEEL_DENSITY = 7800.0
 

@@ -10,10 +10,10 @@ import numpy as np
 from fem.crossing import crossings
 from fem.orbits import whirl_direction
 from fem.quadratic import NONE
-from fem.rotor import RPM
 from fem.whirl import DIRECTION_NAMES, in_both_planes
 from fem.whirlsolve import Whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM, speed_text
 
 GROWTH = 1e-7  # Re λ / |λ| above which a mode is said to grow: an undamped one has rounding there
 
@@ -69,7 +69,7 @@ class Growing:
         where = "already at" if self.from_start else "above"
         return (
             f"unstable: mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows {where} "
-            f"{self.speed:.6g} rad/s = {self.speed * RPM:.6g} rpm, log decrement down to "
+            f"{speed_text(self.speed)}, log decrement down to "
             f"{self.log_decrement:.3g} in this range"
         )
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
 from fem.supports import Support
 from rotorid.base.arrays import FloatArray
+from rotorid.base.units import speed_text
 
 _MODES = 6  # of lowest frequency that are looked at
 _PEAKS = 3
@@ -77,7 +78,7 @@ def _said(rotor: Rotor, speeds: FloatArray, unstable: float, m: int) -> str:
     first = found[0]
     where = "at and above" if first.from_start else "above"
     return (
-        f"the steady response does not exist {where} {first.speed:.6g} rad/s = {first.speed * RPM:.6g} rpm: "
+        f"the steady response does not exist {where} {speed_text(first.speed)}: "
         f"mode {first.mode} ({first.way} whirl, {first.frequency:.6g} rad/s) grows there; amplitudes "
         "computed there are never reached"
     )

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.checks import whole
 from fem.critical import critical_speeds
 from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray
+from rotorid.base.checks import whole
+from rotorid.base.json import floats
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +65,7 @@ class MeshCheck:
             "frequencies_rad_s": self.frequencies.tolist(),
             "extrapolated_rad_s": self.extrapolated.tolist(),
             "relative_error": self.errors.tolist(),
-            "rate": [None if np.isnan(rate) else float(rate) for rate in self.rates],
+            "rate": floats(self.rates),
         }
 
     def summary(self) -> str:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.rotor import RPM
 from rotorid.base.arrays import FloatArray
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     import pandas as pd

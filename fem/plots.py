@@ -6,7 +6,7 @@ from fem.plots_modes import draw_modes
 from fem.plots_orbits import draw_orbits
 from fem.plots_response import draw_bode, draw_influence, draw_polar, draw_response
 from fem.plots_rotor import draw_rotor
-from fem.plots_style import COLORS, new_axes
+from rotorid.base.style import COLORS, new_axes
 
 __all__ = [
     "COLORS",

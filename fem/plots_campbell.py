@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
-from fem.plots_style import COLORS, QUIET, hertz_beside, new_axes, plain, rpm_above
-from fem.rotor import RPM
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import COLORS, QUIET, hertz_beside, new_axes, plain, rpm_above
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

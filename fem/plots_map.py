@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.plots_style import COLORS, MARKERS, STYLES, legend_above, new_axes, plain, times
-from fem.rotor import RPM
+from rotorid.base.style import COLORS, MARKERS, STYLES, legend_above, new_axes, plain, times
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

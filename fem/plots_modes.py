@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.plots_rotor import EDGE, draw_rotor
-from fem.plots_style import COLORS, STYLES, legend_above, new_axes
-from fem.rotor import RPM
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import COLORS, STYLES, legend_above, new_axes
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

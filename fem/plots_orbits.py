@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.plots_style import COLORS, STYLES, new_axes, plain
+from rotorid.base.style import COLORS, STYLES, new_axes, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

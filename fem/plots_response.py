@@ -8,10 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.plots_style import COLORS, MARKERS, STYLES, legend_above, legend_beside, new_axes, plain, rpm_above
-from fem.rotor import RPM
 from fem.sensors import label
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import (
+    COLORS,
+    MARKERS,
+    STYLES,
+    legend_above,
+    legend_beside,
+    new_axes,
+    plain,
+    rpm_above,
+)
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

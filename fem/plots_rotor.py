@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.plots_style import COLORS, legend_above, new_axes
 from fem.rotor import Disc, Rotor, Support
 from fem.sensors import SensorLike, as_sensor, label
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import COLORS, legend_above, new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

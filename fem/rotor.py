@@ -10,18 +10,17 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fem.checks import whole
 from fem.disc import STEEL_DENSITY, Disc
-from fem.nearest import did_you_mean
 from fem.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray
+from rotorid.base.checks import whole
+from rotorid.base.suggestions import did_you_mean
 
-__all__ = ["RPM", "STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
+__all__ = ["STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
 __all__ += ["Disc", "FloatArray", "Model", "Pedestal", "Rotor", "Support", "whole"]
 
 STEEL_MODULUS = 2.1e11
 STEEL_POISSON = 0.3
-RPM = 60 / math.tau  # of 1 rad/s
 
 
 @dataclass(frozen=True)

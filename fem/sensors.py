@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fem.checks import number
 from fem.rotor import Rotor
+from rotorid.base.checks import number
 
 
 @dataclass(frozen=True)

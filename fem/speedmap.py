@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.critical import critical_speeds
-from fem.rotor import RPM, Rotor, whole
+from fem.rotor import Rotor, whole
 from fem.supports import Support
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import floats
+from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,15 +79,11 @@ class SpeedMap:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; one list of speeds per mode."""
-
-        def plain(row: FloatArray) -> list[float | None]:
-            return [float(v) if np.isfinite(v) else None for v in row]
-
         return {
             "stiffness_N_per_m": self.stiffness.tolist(),
-            "critical_speeds_rad_s": [plain(row) for row in self.speeds.T],
-            "free_rad_s": plain(self.free),
-            "pinned_rad_s": plain(self.pinned),
+            "critical_speeds_rad_s": [floats(row) for row in self.speeds.T],
+            "free_rad_s": floats(self.free),
+            "pinned_rad_s": floats(self.pinned),
             "intersections": [
                 {
                     "support": item.support,
@@ -120,7 +118,7 @@ class SpeedMap:
             lines.append("with the stiffness that the supports have")
         lines += [
             f"{item.support}, {item.direction}: critical speed {item.mode} at {item.speed:.6g} rad/s = "
-            f"{item.speed * RPM:.6g} rpm, {item.stiffness:.4g} N/m"
+            f"{rpm_text(item.speed)}, {item.stiffness:.4g} N/m"
             for item in self.intersections
         ]
         return "\n".join(lines)

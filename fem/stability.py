@@ -20,11 +20,13 @@ from fem.campbell import followed, runs_away
 from fem.orbits import whirl_direction
 from fem.planes import Quadratic
 from fem.quadratic import Solutions, polish, solve
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
 from fem.tracking import likeness, mass_weight
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
 from fem.whirlsolve import Whirl, enriched
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.json import finite
+from rotorid.base.units import RPM, speed_text
 
 _GROWTH = 1e-9  # Re λ / |λ| above which a mode grows: an undamped one has rounding there
 _PARTS = 8  # into how many parts the interval with the threshold is divided
@@ -93,7 +95,7 @@ class Stability:
             "frequency_rad_s": self.frequency,
             "whirl_ratio": self.whirl_ratio,
             "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
-            "smallest_log_decrement": self.margin if np.isfinite(self.margin) else None,
+            "smallest_log_decrement": finite(self.margin),
             "warnings": list(self.warnings),
         }
 
@@ -103,7 +105,7 @@ class Stability:
         if self.status == "stable":
             lines = [f"stable {where}; smallest logarithmic decrement {self.margin:.4g}"]
         elif self.status == "threshold" and self.threshold is not None:
-            lines = [f"stable up to {self.threshold:.6g} rad/s = {self.threshold * RPM:.6g} rpm"]
+            lines = [f"stable up to {speed_text(self.threshold)}"]
         else:
             lines = [f"unstable already at {self.lowest:.6g} rad/s, where the search began"]
         if self.mode is not None and self.frequency is not None and self.direction is not None:

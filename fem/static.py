@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.checks import number
 from fem.matrices import Matrices, assemble, general, multiply, rounding_error
 from fem.pencil import whole_rotor
 from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray
+from rotorid.base.checks import number
 
 if TYPE_CHECKING:
     import pandas as pd

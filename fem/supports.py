@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.checks import attachment, number
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import attachment, number
 
 Matrix2 = tuple[tuple[float, float], tuple[float, float]]
 Coefficient = float | Matrix2  # isotropic, or ((xx, xy), (yx, yy))

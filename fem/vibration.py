@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import RPM, Rotor, Support
+from fem.rotor import Rotor, Support
 from fem.sensors import SensorLike, as_sensor, label
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import phase_deg, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,8 +126,7 @@ class Response:
         k, i = np.unravel_index(int(np.argmax(amplitude)), amplitude.shape)
         lines = [
             f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
-            f"largest amplitude {1e6 * amplitude[k, i]:.4g} µm at node {i + 1}, "
-            f"{self.speeds[k]:.6g} rad/s = {self.speeds[k] * RPM:.6g} rpm",
+            f"largest amplitude {1e6 * amplitude[k, i]:.4g} µm at node {i + 1}, {speed_text(self.speeds[k])}",
         ]
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
@@ -279,7 +279,7 @@ class InfluenceCoefficients:
 
 def phase_degrees(Z: ComplexArray) -> FloatArray:
     """Phase as lead, 0 ≤ phase < 360 degrees."""
-    phase = np.mod(np.degrees(np.angle(Z)), 360.0)
+    phase = phase_deg(Z)
     return np.where(phase >= 360.0, 0.0, phase)
 
 

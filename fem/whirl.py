@@ -12,10 +12,11 @@ from fem.eigen import finite_modes
 from fem.matrices import assemble
 from fem.orbits import whirl_direction
 from fem.planes import both_planes
-from fem.rotor import RPM, Rotor, whole
+from fem.rotor import Rotor, whole
 from fem.whirlexact import exact_modes
 from fem.whirlsolve import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import RPM, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +98,7 @@ class WhirlModes:
     def summary(self) -> str:
         """The modes as text."""
         lines = [
-            f"Whirl at {self.speed:.6g} rad/s = {self.speed * RPM:.6g} rpm",
+            f"Whirl at {speed_text(self.speed)}",
             "mode     rad/s         rpm   log dec  direction",
         ]
         for k, (omega, delta, way) in enumerate(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import finite
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -172,14 +173,14 @@ class Estimate:
         return {
             "parameters": {
                 name: {
-                    "value": _number(self.values[i]),
-                    "std": None if std is None else _number(std[i]),
+                    "value": finite(self.values[i]),
+                    "std": None if std is None else finite(std[i]),
                     "ci95": None if ci95 is None or np.isnan(ci95[i]).any() else ci95[i].tolist(),
                 }
                 for i, name in enumerate(self.names)
             },
             "rank": self.rank,
-            "condition_number": _number(self.condition_number),
+            "condition_number": finite(self.condition_number),
             "identifiable": self.full_rank,
             "unidentifiable": [] if self.full_rank else [self.describe_rank()],
             "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
@@ -305,7 +306,3 @@ def _digits(value: float, std: float | None) -> int:
     if std is None or not (std > 0 and np.isfinite(std)) or value == 0:
         return 6
     return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 15))
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

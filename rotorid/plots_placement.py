@@ -27,7 +27,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.colors import LogNorm
 
-    from fem.plots_style import COLORS, new_axes, plain
+    from rotorid.base.style import COLORS, new_axes, plain
 
     axes = new_axes((9.5, 6.4)) if ax is None else ax
     plain(axes)
@@ -85,7 +85,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
 
 def _named(placement: Placement, x: FloatArray, y: FloatArray, axes: Axes) -> None:
     """Mark the choices that have a name; one with several names is marked once."""
-    from fem.plots_style import COLORS
+    from rotorid.base.style import COLORS
 
     names = (
         ("best by frequency", placement.best_by_frequency, "s", COLORS[0]),

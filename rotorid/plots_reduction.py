@@ -10,6 +10,7 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +45,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         Where; default new axes.
     """
     from fem.plots import COLORS, draw_rotor, new_axes
-    from fem.plots_style import MARKERS, STYLES
+    from rotorid.base.style import MARKERS, STYLES
 
     axes = new_axes((10, 5.6)) if ax is None else ax
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.frequencies)
@@ -98,7 +99,7 @@ def _smooth(modes: fem.Modes) -> tuple[FloatArray, FloatArray]:
 def _words(reduction: Reduction, k: int) -> str:
     """Frequency, error and MAC of a mode, where the rotor's is known."""
     f, error = reduction.frequencies[k], reduction.relative_error[k]
-    text = f"mode {k + 1}: {f:.5g} rad/s ({f * 30 / np.pi:.0f} rpm"
+    text = f"mode {k + 1}: {f:.5g} rad/s ({f * RPM:.0f} rpm"
     if not np.isfinite(error):
         return f"{text})"
     return f"{text}, {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}"
@@ -112,7 +113,7 @@ def _along(shape: FloatArray, reference: FloatArray) -> FloatArray:
 
 def _measured(reduction: Reduction, axes: Axes) -> Axes:
     """Measured shapes (hollow) and those of the model (full) at the masses."""
-    from fem.plots_style import COLORS, MARKERS, legend_above, plain
+    from rotorid.base.style import COLORS, MARKERS, legend_above, plain
 
     n, k = reduction.rotor_shapes.shape
     x = np.arange(n)
@@ -223,7 +224,7 @@ def _bars(
     ax: Axes, tops: FloatArray, bottoms: FloatArray, names: Sequence[str], texts: Sequence[Sequence[str]]
 ) -> None:
     """Groups of bars by mode, a colour per method, a text at the end of each."""
-    from fem.plots_style import COLORS, plain
+    from rotorid.base.style import COLORS, plain
 
     count, n = tops.shape
     width = 0.84 / count

@@ -53,7 +53,7 @@ def plot_running(
     ValueError
         For a sensor or plane that does not exist, or one without the other.
     """
-    from fem.plots_style import plain, rpm_above
+    from rotorid.base.style import plain, rpm_above
 
     full, small, difference, words = _chosen(running, sensor, plane)
     above: Axes
@@ -170,7 +170,7 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     ax
         Where; default new axes.
     """
-    from fem.plots_style import new_axes, plain, rpm_above
+    from rotorid.base.style import new_axes, plain, rpm_above
 
     axes = new_axes((10, 5.2)) if ax is None else ax
     plain(axes)

@@ -329,7 +329,7 @@ def _check_options(method: str, coefficients: str | None, ridge: str | None, tru
         ("--coefficients", coefficients, (*COEFFICIENTS, None)),
     ):
         if value not in known:
-            from fem.nearest import did_you_mean
+            from rotorid.base.suggestions import did_you_mean
 
             names = [name for name in known if name is not None]
             raise ValueError(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -261,11 +262,10 @@ def separation(criticals: Iterable[float], operating: tuple[float, float]) -> di
 def separation_text(operating: Mapping[str, Any]) -> str:
     """The result of `separation` for an engineer."""
     low, high = operating["range_rad_s"]
-    rpm = 60 / (2 * math.pi)
-    lines = [f"operating range {low:.6g} to {high:.6g} rad/s ({low * rpm:.6g} to {high * rpm:.6g} rpm)"]
+    lines = [f"operating range {low:.6g} to {high:.6g} rad/s ({low * RPM:.6g} to {rpm_text(high)})"]
     for row in operating["critical_speeds"]:
         where = "INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} % away"
-        lines.append(f"{row['speed_rad_s']:14.4f} rad/s {row['speed_rad_s'] * rpm:14.2f} rpm   {where}")
+        lines.append(f"{row['speed_rad_s']:14.4f} rad/s {row['speed_rad_s'] * RPM:14.2f} rpm   {where}")
     if not operating["critical_speeds"]:
         lines.append("no critical speed was found")
     return "\n".join(lines)

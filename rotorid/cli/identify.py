@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rotorid.base.json import finite
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note
@@ -90,7 +91,7 @@ def identify(
     check_targets(plot, output)
     for option, value, known in (("--method", method, METHODS), ("--loss", loss, LOSSES)):
         if value not in known:
-            from fem.nearest import did_you_mean
+            from rotorid.base.suggestions import did_you_mean
 
             raise ValueError(
                 f"{option} {value!r} is not known{did_you_mean(value, known)}: {' or '.join(known)}"
@@ -169,9 +170,9 @@ def _details(result: Identification) -> Mapping[str, Any]:
     return {
         "correlation": None
         if correlation is None
-        else {a: {b: _plain(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
+        else {a: {b: finite(correlation[i, j]) for j, b in enumerate(names)} for i, a in enumerate(names)},
         "residuals": [
-            {key: _plain(value) if key in ("re", "im") else value for key, value in row.items()}
+            {key: finite(value) if key in ("re", "im") else value for key, value in row.items()}
             for row in frame.to_dict("records")
         ],
         "influence": None
@@ -179,12 +180,8 @@ def _details(result: Identification) -> Mapping[str, Any]:
         else [
             {
                 "experiment": experiment,
-                "change": {name: _plain(np.asarray(influence)[i, j]) for j, name in enumerate(names)},
+                "change": {name: finite(np.asarray(influence)[i, j]) for j, name in enumerate(names)},
             }
             for i, experiment in enumerate(result.experiments.names)
         ],
     }
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

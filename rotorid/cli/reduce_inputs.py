@@ -114,7 +114,7 @@ def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) 
     stem = (found.group(1) or found.group(4)) if found else ""
     at = tuple(int(d) - 1 for d in found.group(2, 3, 5) if d) if found else ()
     if not found or any(not 0 <= i < size for i, size in zip(at, shapes[stem], strict=True)):
-        from fem.nearest import did_you_mean
+        from rotorid.base.suggestions import did_you_mean
 
         raise ValueError(
             f"--errors: {name!r} is not known{did_you_mean(name, ERRORS)}; known are {', '.join(ERRORS)}, or "

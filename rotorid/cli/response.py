@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from rotorid.base.units import RPM
 from rotorid.cli.common import (
     JsonOption,
     OperatingOption,
@@ -210,7 +211,7 @@ def _summary(
     for k, label in enumerate(labels):
         size = np.abs(Z[:, k])
         i = int(np.argmax(size))
-        lines.append(f"{label:>20} {1e6 * size[i]:14.4g} {finer.speeds[i] * 30 / np.pi:11.1f}")
+        lines.append(f"{label:>20} {1e6 * size[i]:14.4g} {finer.speeds[i] * RPM:11.1f}")
     if result.rotor.supports:
         lines += ["", finer.bearing_forces().summary()]
     for label, found in zip(labels, peaks, strict=False):
@@ -255,7 +256,7 @@ def _bode(
         loudest = int(np.argmax(np.abs(Z).max(axis=0)))
         for peak in peaks[loudest].peaks:
             factor = "" if peak.amplification is None else f", AF {peak.amplification:.1f}"
-            marks.append((peak.speed, f"{peak.speed * 30 / np.pi:.0f} rpm{factor}"))
+            marks.append((peak.speed, f"{peak.speed * RPM:.0f} rpm{factor}"))
     draw_bode(result.speeds, Z, labels, (above, below), peaks=marks, operating=operating)
     return figure
 
@@ -284,7 +285,7 @@ def _orbits(
     names = list(dict.fromkeys(as_sensor(place, result.rotor).node for place in places))
     index = [result.rotor.node(name) - 1 for name in names]
     labels = [f"node {name}" if isinstance(name, int) else name for name in names]
-    title = f"{result.speeds[k] * 30 / np.pi:.0f} rpm = {result.speeds[k]:.5g} rad/s"
+    title = f"{result.speeds[k] * RPM:.0f} rpm = {result.speeds[k]:.5g} rad/s"
     return draw_orbits(result.x[k, index], result.y[k, index], labels, ax, title=title)
 
 

@@ -185,7 +185,7 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
     if missing:
         raise ValueError(f"without a job, give --{' and --'.join(missing)}")
     if asked["measures"] not in MEASURES:
-        from fem.nearest import did_you_mean
+        from rotorid.base.suggestions import did_you_mean
 
         hint = did_you_mean(asked["measures"], MEASURES)
         raise ValueError(f"--measures {asked['measures']!r} is not known{hint}: one of {', '.join(MEASURES)}")

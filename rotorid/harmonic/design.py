@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.json import finite
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
@@ -111,13 +112,13 @@ class Design:
             "parameters": {
                 name: {
                     "guess": float(self.guess[j]),
-                    "std": _number(self.std[j]),
-                    "std_all_candidates": _number(self.std_all[j]),
-                    "std_alone": [_number(s) for s in self.std_alone[:, j]],
+                    "std": finite(self.std[j]),
+                    "std_all_candidates": finite(self.std_all[j]),
+                    "std_alone": [finite(s) for s in self.std_alone[:, j]],
                 }
                 for j, name in enumerate(self.parameters)
             },
-            "efficiency": _number(self.efficiency),
+            "efficiency": finite(self.efficiency),
             "determined": self.determined,
         }
 
@@ -292,7 +293,3 @@ def _efficiency(J: FloatArray, chosen: IntArray) -> float:
     if not np.isfinite(whole):
         return float("nan")
     return float(np.exp((part - whole) / J.shape[2]) * len(J) / len(chosen))
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

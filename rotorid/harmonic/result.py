@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import finite
 from rotorid.estimate import coverage_factor
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
@@ -150,22 +151,22 @@ class Identification:
             "method": self.method,
             "parameters": {
                 name: {
-                    "value": _number(self.values[i]),
-                    "std": None if std is None else _number(std[i]),
+                    "value": finite(self.values[i]),
+                    "std": None if std is None else finite(std[i]),
                     "ci95": None if ci95 is None or not np.isfinite(ci95[i]).all() else ci95[i].tolist(),
                 }
                 for i, name in enumerate(self.parameters)
             },
             "rank": self.rank,
-            "condition_number": _number(self.condition_number),
+            "condition_number": finite(self.condition_number),
             "identifiable": self.identifiable,
             "unidentifiable": list(self.unidentifiable),
             "combinations": {
-                c.words: {"value": _number(c.value), "std": None if c.std is None else _number(c.std)}
+                c.words: {"value": finite(c.value), "std": None if c.std is None else finite(c.std)}
                 for c in self.combinations
             },
-            "solutions": [{k: _number(v) for k, v in s.items()} for s in self.solutions],
-            "residual_rms": _number(self.residual_rms),
+            "solutions": [{k: finite(v) for k, v in s.items()} for s in self.solutions],
+            "residual_rms": finite(self.residual_rms),
             "left_out": list(self.left_out),
             "warnings": list(self.warnings),
         }
@@ -245,7 +246,3 @@ class Identification:
         if ci95 is not None and np.isfinite(ci95[i]).all():
             text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
         return text
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

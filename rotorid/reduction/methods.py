@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.checks import whole
 from fem.eigen import Spectrum, lowest_modes
 from fem.matrices import assemble, ignored_inertia, multiply
 from fem.pencil import Pencil, whole_rotor
 from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.checks import whole
 from rotorid.reduction.masses import Normalisation, RowWeights, equivalent_masses, normalised, row_factors
 from rotorid.reduction.methods_result import Method, Methods
 from rotorid.reduction.plane import plane_at_rest

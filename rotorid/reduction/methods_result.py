@@ -11,7 +11,7 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import floats
 
 if TYPE_CHECKING:
     import pandas as pd

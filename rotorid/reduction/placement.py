@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import fem
-from fem.checks import whole
 from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.checks import whole
 from rotorid.reduction.masses import Normalisation, RowWeights, design
 from rotorid.reduction.placement_result import ALIKE, BADLY, Placement
 from rotorid.reduction.plane import plane_at_rest

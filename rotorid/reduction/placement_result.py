@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import fem
 from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import finite, floats
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -219,10 +219,10 @@ class Placement:
             "nodes": self.nodes[i].tolist(),
             "masses_kg": floats(self.masses[i]),
             "natural_frequencies_rad_s": floats(self.frequencies[i]),
-            "largest_error": _float(self.error[i]),
-            "smallest_mac": _float(self.mac[i]),
+            "largest_error": finite(self.error[i]),
+            "smallest_mac": finite(self.mac[i]),
             "worst_mode": int(self.worst_mode[i]) or None,
-            "condition_number": _float(self.condition[i]),
+            "condition_number": finite(self.condition[i]),
         }
 
     def summary(self, top: int = 10) -> str:
@@ -288,7 +288,3 @@ class Placement:
     def with_warnings(self, *more: str) -> Placement:
         """The same with further warnings."""
         return dataclasses.replace(self, warnings=(*self.warnings, *more))
-
-
-def _float(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

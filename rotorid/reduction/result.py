@@ -10,8 +10,9 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import floats
+from rotorid.base.units import RPM
 from rotorid.estimate import Estimate
-from rotorid.reduction.jsonable import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
 from rotorid.reduction.separated import Separated
 from rotorid.reduction.shift import Shift
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rotorid.reduction.small import SmallRotor
-
-
-RAD_S_TO_RPM = 30.0 / np.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,7 +303,7 @@ class Reduction:
 
 
 def _speed(omega: float) -> str:
-    return f"{omega:9.4f} rad/s {omega * RAD_S_TO_RPM:7.1f}/min"
+    return f"{omega:9.4f} rad/s {omega * RPM:7.1f}/min"
 
 
 def _plain(value: float) -> str:

@@ -14,7 +14,8 @@ from fem.matrices import assemble
 from fem.sensors import SensorLike, label
 from fem.whirl import checked_speeds
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import floats
+from rotorid.base.units import phase_deg
 from rotorid.reduction.threshold import stability_threshold
 from rotorid.reduction.turning import equations
 
@@ -327,4 +328,4 @@ def _percent(part: float) -> str:
 
 
 def _phase(W: ComplexArray) -> FloatArray:
-    return np.asarray(np.mod(np.degrees(np.angle(W)), 360.0))
+    return np.asarray(phase_deg(W))

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.nearest import did_you_mean
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
 from rotorid.reduction.masses import (
     Normalisation,
     RowWeights,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotorid.base.arrays import FloatArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import floats
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,9 @@ import numpy as np
 import fem
 from fem.campbell import runs_away
 from fem.planes import both_planes
-from fem.rotor import RPM
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number
 from fem.whirlsolve import Whirl, solve_whirl
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import floats
 from rotorid.reduction.running import without_modal_damping
 from rotorid.reduction.threshold import STEPS, grid, searched, stability_threshold
 from rotorid.reduction.turning import whirl_of
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.units import RPM
 from rotorid.reduction.small import SmallRotor
 
 __all__ = ["StabilityCost", "compare_stability", "stability_threshold"]

@@ -11,7 +11,7 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import finite, floats
 from rotorid.reduction.masses import Normalisation, equivalent_masses
 from rotorid.reduction.matching import match
 from rotorid.reduction.placement_result import ALIKE
@@ -99,7 +99,7 @@ class TradeOff:
                     "natural_frequencies_rad_s": floats(self.frequencies[r]),
                     "relative_error": floats(self.relative_error[r]),
                     "mac": floats(self.mac[r]),
-                    "condition_number": floats(self.condition[r : r + 1])[0],
+                    "condition_number": finite(self.condition[r]),
                 }
                 for r, name in enumerate(self.names)
             ],

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.reduction.jsonable import floats
+from rotorid.base.json import floats
 from rotorid.reduction.masses import Normalisation, RowWeights
 from rotorid.reduction.sensitivity import InputErrors, Inputs, input_index, inputs, standard_deviations
 from rotorid.reduction.shift import Shift, labels, units

@@ -9,6 +9,8 @@ import numpy as np
 from balancing.correction import region_radius
 from balancing.sheet import HELD
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import finite
+from rotorid.base.units import rpm
 from rotorid.regression import coverage_factor
 from rotorid.tables import units
 
@@ -53,7 +55,7 @@ def _machine(c: Correction, job: Job) -> dict[str, Any]:
     forbidden = (c.to_dict()["limits"] or {}).get("forbidden_deg", {})
     planes = []
     for p, plane in enumerate(c.planes):
-        largest = None if limits is None else _number(limits.max_weight[p] * labels.weight_scale)
+        largest = None if limits is None else finite(limits.max_weight[p] * labels.weight_scale)
         holes = job.holes.get(plane)
         planes.append(
             {
@@ -74,7 +76,7 @@ def _machine(c: Correction, job: Job) -> dict[str, Any]:
             {"sensor": s, "node": None if (at := job.sensor_places.get(s)) is None else at.node}
             for s in c.sensors
         ],
-        "speeds_rpm": [_rpm(w) for w in c.speeds],
+        "speeds_rpm": [rpm(w) for w in c.speeds],
         "speed_unit": labels.speed_unit,
         "speeds": [float(f"{w * unit.scale:.12g}") for w in c.speeds],
     }
@@ -99,7 +101,7 @@ def _runs(trials: Trials) -> list[dict[str, Any]]:
             ],
             "readings": [
                 {
-                    "speed_rpm": _rpm(speed),
+                    "speed_rpm": rpm(speed),
                     "sensor": sensor,
                     "values": [
                         {"amplitude": float(size[k, r, s, c]), "phase_deg": float(phase[k, r, s, c])}
@@ -121,7 +123,7 @@ def _slow_roll(job: Job) -> list[dict[str, Any]] | None:
         return None
     size, phase = job.trials.labels.vibration(job.slow_roll)
     by_speed = job.slow_roll.ndim == 2
-    speeds: list[float | None] = [_rpm(w) for w in job.trials.speeds] if by_speed else [None]
+    speeds: list[float | None] = [rpm(w) for w in job.trials.speeds] if by_speed else [None]
     size, phase = np.atleast_2d(size), np.atleast_2d(phase)
     return [
         {
@@ -145,13 +147,13 @@ def _influence(f: Influence) -> dict[str, Any]:
         "unit": f.unit,
         "rows": [
             {
-                "speed_rpm": _rpm(speed),
+                "speed_rpm": rpm(speed),
                 "sensor": sensor,
                 "plane": plane,
                 "influence": float(size[s, c, p]),
                 "phase_deg": float(phase[s, c, p]),
                 "influence_95_percent": None if along is None else _percent(along[s, c, p], f.W[s, c, p]),
-                "phase_95_deg": None if across is None else _number(across[s, c, p]),
+                "phase_95_deg": None if across is None else finite(across[s, c, p]),
             }
             for s, speed in enumerate(f.speeds)
             for c, sensor in enumerate(f.sensors)
@@ -196,7 +198,7 @@ def _corrections(c: Correction, job: Job) -> list[dict[str, Any]]:
         held = False
         if factor is not None and mass_std is not None and angle_std is not None:
             width = float(factor * mass_std[p] * c.labels.weight_scale)
-            half = _number(float(factor * np.degrees(angle_std[p])))
+            half = finite(float(factor * np.degrees(angle_std[p])))
             held = bool(width < HELD * mass[p])
         rows.append(
             {
@@ -255,27 +257,18 @@ def _residuals(c: Correction, mounted: Mounted | None) -> list[dict[str, Any]]:
             gone = bool(new[s, k] <= nothing)
             rows.append(
                 {
-                    "speed_rpm": _rpm(speed),
+                    "speed_rpm": rpm(speed),
                     "sensor": sensor,
                     "before": float(old[s, k]),
                     "before_phase_deg": float(old_phase[s, k]),
                     "after": 0.0 if gone else float(new[s, k]),
                     "after_phase_deg": None if gone else float(new_phase[s, k]),
                     "within_95": None if within is None else float(within[s, k]),
-                    "limit": None if limit is None else _number(limit[s, k]),
+                    "limit": None if limit is None else finite(limit[s, k]),
                 }
             )
     return rows
 
 
-def _rpm(speed: float) -> float:
-    # 3000 rpm must come back as 3000, not as 3000.0000000000005
-    return float(f"{speed * 30 / np.pi:.12g}")
-
-
 def _millimetres(metres: float | None) -> float | None:
     return None if metres is None else float(f"{metres * 1e3:.12g}")
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

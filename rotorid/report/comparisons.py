@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from fem.rotor import RPM
+from rotorid.base.units import RPM
 from rotorid.report.grids import Grid, Numbers, Part
 from rotorid.report.page import NOTHING
 from rotorid.report.pictures import (

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
+from rotorid.base.units import RPM
 from rotorid.report.grids import Grid, texts
 from rotorid.report.pictures import Drawing, rotor_picture
 

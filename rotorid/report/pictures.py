@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.rotor import RPM
+from rotorid.base.units import RPM
 from rotorid.report.page import inline_svg
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from fem.rotor import RPM
+from rotorid.base.units import RPM
 from rotorid.report.comparisons import (
     methods_part,
     placement_part,

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fem.rotor import RPM, Rotor
+from fem.rotor import Rotor
+from rotorid.base.units import RPM, rpm_text
 from rotorid.report.grids import Grid, Numbers, Part, evenly, every_warning
 from rotorid.report.inputs import place, rotor_sheet, unbalance_table
 from rotorid.report.page import render_report
@@ -113,7 +114,7 @@ def response_report(
         *_files(provenance),
         (
             "Speeds",
-            f"{len(document['speeds_rad_s'])}, from {low * RPM:.6g} to {high * RPM:.6g} rpm "
+            f"{len(document['speeds_rad_s'])}, from {low * RPM:.6g} to {rpm_text(high)} "
             f"({low:.6g} to {high:.6g} rad/s)",
         ),
         *_operating(operating),
@@ -148,7 +149,7 @@ def _operating(operating: Band) -> list[tuple[str, str]]:
     if operating is None:
         return []
     low, high = operating
-    return [("Operating", f"{low * RPM:.6g} to {high * RPM:.6g} rpm ({low:.6g} to {high:.6g} rad/s)")]
+    return [("Operating", f"{low * RPM:.6g} to {rpm_text(high)} ({low:.6g} to {high:.6g} rad/s)")]
 
 
 def _inside(document: Mapping[str, Any]) -> list[str]:

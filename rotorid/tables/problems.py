@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fem.nearest import did_you_mean, suggest
+from rotorid.base.suggestions import did_you_mean, suggest
 
 __all__ = ["InputError", "Problem", "Problems", "TableWarning", "did_you_mean", "listing"]
 __all__ += ["printable", "quote", "suggest"]

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import finite
 from rotorid.estimate import Estimate
 from rotorid.timedomain.model import OdeModel
 from rotorid.timedomain.record import Record
@@ -135,7 +134,7 @@ class Fit:
         return {
             **self.estimate.to_dict(),
             "solutions": [],
-            "residual_rms": _number(self.residual_rms),
+            "residual_rms": finite(self.residual_rms),
             "method": self.method,
             "integrator": self.integrator,
             "loss": self.loss,
@@ -144,18 +143,18 @@ class Fit:
             "reliable": self.reliable,
             "iterations": self.iterations,
             "history": [
-                {"cost": _number(cost), "parameters": dict(zip(self.parameters, row.tolist(), strict=True))}
+                {"cost": finite(cost), "parameters": dict(zip(self.parameters, row.tolist(), strict=True))}
                 for row, cost in zip(self.history, self.costs, strict=True)
             ],
             "errors": self.errors,
             "at_bounds": list(self.at_bounds),
             "minima": [
-                {"parameters": m.values, "cost": _number(m.cost), "starts": m.starts} for m in self.minima
+                {"parameters": m.values, "cost": finite(m.cost), "starts": m.starts} for m in self.minima
             ],
             "integration_change": None
             if change is None
-            else {name: _number(c) for name, c in zip(self.parameters, change, strict=True)},
-            "autocorrelation": None if self.autocorrelation is None else _number(self.autocorrelation),
+            else {name: finite(c) for name, c in zip(self.parameters, change, strict=True)},
+            "autocorrelation": None if self.autocorrelation is None else finite(self.autocorrelation),
             "warnings": list(self.warnings),
         }
 
@@ -195,7 +194,3 @@ class Fit:
         from importlib import import_module
 
         return import_module("rotorid.plots_timedomain").figure_fit(self)  # type: ignore[no-any-return]
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

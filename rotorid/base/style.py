@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.rotor import RPM
+from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

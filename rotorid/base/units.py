@@ -1,0 +1,32 @@
+"""Speeds and angles as people read them: revolutions per minute and degrees."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray
+
+RPM = 60 / math.tau  # of 1 rad/s
+
+
+def rpm(speed: float) -> float:
+    """Revolutions per minute to 12 digits: 3000 come back as 3000, not as 3000.0000000000005."""
+    return float(f"{speed * RPM:.12g}")
+
+
+def rpm_text(speed: float) -> str:
+    """A speed in rad/s as `2980.5 rpm`."""
+    return f"{speed * RPM:.6g} rpm"
+
+
+def speed_text(speed: float) -> str:
+    """A speed in both units, `312.114 rad/s = 2980.5 rpm`."""
+    return f"{speed:.6g} rad/s = {speed * RPM:.6g} rpm"
+
+
+def phase_deg(z: ArrayLike) -> FloatArray:
+    """Phases of complex numbers, degrees from 0 to 360."""
+    return np.asarray(np.mod(np.degrees(np.angle(np.asarray(z))), 360.0))
