@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.sheet import DUST, WIDTH, figures, table
+from balancing.sheet import DUST
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import figures, sentence, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
@@ -106,11 +106,11 @@ def summary(c: CheckComparison) -> str:
     """`CheckComparison.summary`."""
     mounted = "the proposed corrections" if c.as_proposed else "what the weights table of the check says"
     blocks = [
-        *(_wrap(f"Warning: {w}", "  ") for w in c.warnings),
-        _wrap(f"Check run, mounted: {mounted}.", ""),
+        *(wrap(f"Warning: {w}", "  ") for w in c.warnings),
+        wrap(f"Check run, mounted: {mounted}.", ""),
         _readings(c),
-        _wrap(f"{c.verdict[0].upper()}{c.verdict[1:]}.", ""),
-        _wrap(
+        wrap(sentence(c.verdict)),
+        wrap(
             f"Vibration (rms) before by after: predicted {_times(c.improvement_predicted)}, "
             f"achieved {_times(c.improvement_achieved)}.",
             "",
@@ -174,7 +174,3 @@ def _percent(probability: float) -> str:
 
 def _rms(amplitudes: FloatArray) -> float:
     return float(np.sqrt(np.mean(amplitudes**2)))
-
-
-def _wrap(text: str, indent: str) -> str:
-    return textwrap.fill(text, WIDTH, subsequent_indent=indent)

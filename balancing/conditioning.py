@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
+from rotorid.base.text import sentence
 from rotorid.regression import RCOND
 
 ALIKE = 0.1
@@ -98,7 +99,7 @@ class Conditioning:
             "Singular values: " + ", ".join(f"{s:.3g}" for s in self.singular_values) + ".",
         ]
         lines += [f"Plane {p!r} has no effect on any reading." for p in self.without_effect]
-        lines += [f"{a.words[0].upper()}{a.words[1:]}." for a in self.alike]
+        lines += [sentence(a.words) for a in self.alike]
         if not self.alike and not self.without_effect and P > 1:
             lines.append(
                 f"No planes act alike: each does more than {_percent(ALIKE)} that the others cannot do."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,9 +12,9 @@ from balancing.baseline import match_speeds
 from balancing.labels import Labels
 from balancing.limits import Limits
 from balancing.refine import different, mounted_in
-from balancing.sheet import WIDTH, figures, table
 from balancing.trials import Trials
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.text import figures, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
@@ -161,7 +160,7 @@ class History:
                 rows.append(cells + [""] * (len(rows[0]) - len(cells)))
         turn = self.labels.turning_in_words()
         foot = f"Vibration{unit}: the largest of the sensors, and the root mean square of them; {turn}."
-        return f"History of the job\n{table(rows, left=2)}\n{textwrap.fill(foot, WIDTH)}"
+        return f"History of the job\n{table(rows, left=2)}\n{wrap(foot)}"
 
 
 def history(

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.sheet import figures, small, table
+from balancing.sheet import small
 from rotorid.base.json import finite
+from rotorid.base.text import figures, table
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:

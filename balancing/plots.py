@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from balancing.sheet import figures
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import figures
 from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:

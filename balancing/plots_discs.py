@@ -15,7 +15,7 @@ import numpy as np
 
 from balancing.holes import Holes, Mounting
 from balancing.labels import Labels
-from balancing.sheet import figures
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from balancing.plots import COLOURS, MARKERS
-from balancing.sheet import figures
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,13 +9,13 @@ import numpy as np
 from balancing.baseline import describe_errors
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
+from rotorid.base.text import capital, figures, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     from balancing.correction import Correction
 
 
-WIDTH = 80
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
 DUST = 1e-12
@@ -103,7 +102,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
 def summary(c: Correction) -> str:
     """`Correction.summary`."""
     blocks = [
-        *(_wrap(f"Warning: {w}", "  ") for w in c.warnings),
+        *(wrap(f"Warning: {w}", "  ") for w in c.warnings),
         _corrections(c),
         _add(c),
         _vibration(c),
@@ -131,7 +130,7 @@ def _corrections(c: Correction) -> str:
                 row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
         rows.append(row)
     head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
-    foot = _wrap(f"{_capital(c.labels.turning_in_words())}; phases as {c.labels.phase}.", "")
+    foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}.", "")
     return f"{head}\n{table(rows)}\n{foot}"
 
 
@@ -148,7 +147,7 @@ def _add(c: Correction) -> str:
         name = f"{plane} (remove)" if gone else plane
         more_at = _degrees(more_angle[p] + 180 * gone)
         rows.append([name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at])
-    head = _wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
+    head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
     foot = ""
     if any(plane in c.remove for plane in planes):
         foot = "\nWhere material is removed, the last columns say how much and where."
@@ -216,7 +215,7 @@ def _quality(c: Correction) -> str:
             f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
             f"({_SOURCES[c.error_source]}{dof})."
         )
-    return "\n".join(_wrap(line, "") for line in lines)
+    return "\n".join(wrap(line, "") for line in lines)
 
 
 def _mounted(c: Correction) -> dict[str, Any]:
@@ -271,37 +270,6 @@ def _degrees_of(c: Correction, arc: tuple[float, float], turn: float) -> list[fl
     return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
 
 
-def figures(value: float, digits: int = 4) -> str:
-    """A number with so many significant digits, written out where that is short."""
-    if not 1e-4 <= abs(value) < 1e6:
-        return "0" if value == 0 else f"{value:.{digits - 1}e}"
-    exponent = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number: 0.9999 is 1.00
-    places = max(digits - 1 - exponent, 0)
-    return f"{value:.{places}f}"
-
-
-def table(rows: list[list[str]], left: int = 1) -> str:
-    """Columns right-aligned, except for the first `left` ones; names are cut where 80 columns need it."""
-    columns = len(rows[0])
-    widths = [max(len(r[i]) for r in rows) for i in range(columns)]
-    names = left - 1
-    widths[names] = max(min(widths[names], WIDTH - 2 * columns - (sum(widths) - widths[names])), 8)
-    lines = []
-    for row in rows:
-        cells = [_cut(cell, widths[i]) for i, cell in enumerate(row)]
-        cells = [f"{x:<{widths[i]}}" if i < left else f"{x:>{widths[i]}}" for i, x in enumerate(cells)]
-        lines.append(("  " + "  ".join(cells)).rstrip())
-    return "\n".join(lines)
-
-
-def _cut(text: str, width: int) -> str:
-    return text if len(text) <= width else text[: width - 1] + "…"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def small(value: float, scale: float) -> str:
     """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
     return "0" if value <= 1e-9 * scale else figures(value, 3)
@@ -309,7 +277,3 @@ def small(value: float, scale: float) -> str:
 
 def _degrees(angle: float, places: int = 1) -> str:
     return f"{round(angle, places) % 360:.{places}f}°"
-
-
-def _wrap(text: str, indent: str) -> str:
-    return textwrap.fill(text, WIDTH, subsequent_indent=indent)

@@ -15,6 +15,7 @@ from balancing.conditioning import check_stack, scaled_columns
 from balancing.determined import UndeterminedError
 from balancing.labels import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.text import figures, table
 from rotorid.regression import RCOND, gain
 
 if TYPE_CHECKING:
@@ -110,8 +111,6 @@ class Subsets:
 
     def summary(self) -> str:
         """Table of 80 columns, the best choice first."""
-        from balancing.sheet import figures, table
-
         found = self.to_dict()
         by = "rms" if self.criterion == "rms" else "largest amplitude"
         units = self.labels.weight_unit, self.labels.vibration_unit

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from balancing.allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import wrap
 from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
@@ -155,19 +156,17 @@ class Tolerance:
 
     def summary(self) -> str:
         """Text of 80 columns."""
-        import textwrap
-
         head = (
             f"G{self.grade:g} for {self.mass:.6g} kg at {rpm_text(self.speed)}: permissible "
             f"residual unbalance {self.total * _GRAM_MM:.4g} g·mm "
             f"({self.eccentricity * 1e6:.3g} g·mm/kg)"
         )
-        lines = [textwrap.fill(f"Warning: {w}", 80, subsequent_indent="  ") for w in self.warnings]
-        lines += [textwrap.fill(head, 80), ""]
+        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
+        lines += [wrap(head), ""]
         for place, z, limit in self.to_frame().to_numpy().tolist():
             where = "" if math.isnan(z) else f"at {z:.6g} mm"
             lines.append(f"{place:24} {where:>16} {limit:14.4g} g·mm")
-        return "\n".join([*lines, "", textwrap.fill(self.rule, 80)])
+        return "\n".join([*lines, "", wrap(self.rule)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Polar picture with the tolerance circles of the planes, in g·mm."""

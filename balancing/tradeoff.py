@@ -13,6 +13,7 @@ from balancing.conditioning import check_stack
 from balancing.determined import check_planes
 from balancing.labels import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import figures, table
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
@@ -114,8 +115,6 @@ class TradeOff:
 
     def summary(self) -> str:
         """Table of 80 columns, the knee marked."""
-        from balancing.sheet import figures, table
-
         unit, vibration = self.labels.weight_unit, self.labels.vibration_unit
         rows = [[f"total{f', {unit}' if unit else ''}", "rms", "largest", "of the whole effect", ""]]
         gained = self.objective[0] - self.objective[-1]
@@ -128,7 +127,6 @@ class TradeOff:
         return f"{head}\n{table(rows, left=0)}\n{self._words()}"
 
     def _words(self) -> str:
-        from balancing.sheet import figures
 
         if self.knee is None:
             if len(self.totals) == 1:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from balancing.labels import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import wrap
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class TrialWeight:
     def summary(self) -> str:
         """Text of 80 columns."""
         found = self.to_dict()
-        lines = [textwrap.fill(f"Warning: {w}", 80, subsequent_indent="  ") for w in self.warnings]
+        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
         if found["angle_deg"] is not None:
@@ -118,7 +118,7 @@ class TrialWeight:
             if self.angle_reach:
                 angle += f" (± {math.degrees(self.angle_reach):.0f}°)"
         head = f"Trial weight in plane {self.plane}: {found['mass']:.4g} {found['unit']}{at}, {angle}"
-        lines += [textwrap.fill(head, 80), textwrap.fill(f"Basis: {self.basis}", 80)]
+        lines += [wrap(head), wrap(f"Basis: {self.basis}")]
         if self.force is not None:
             share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
             lines.append(f"Force at {found['speed_rpm']:.6g} rpm: {self.force:.4g} N{share}")

@@ -31,6 +31,7 @@ from balancing.repeatability import tail
 from balancing.tolerance import Tolerance
 from balancing.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import wrap
 from rotorid.base.units import RPM
 from rotorid.regression import gain
 
@@ -89,10 +90,8 @@ class Verdict:
 
     def summary(self) -> str:
         """Text of 80 columns."""
-        import textwrap
-
         rows = self.to_dict()["rows"]
-        lines = [textwrap.fill(f"Warning: {w}", 80, subsequent_indent="  ") for w in self.warnings]
+        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
         lines.append(f"Verdict ({self.source}): {self.overall}")
         for row in rows:
             at = "" if row["speed_rpm"] is None else f" at {row['speed_rpm']:.6g} rpm"
@@ -103,13 +102,13 @@ class Verdict:
                 f"  {row['kind']} {row['name']}{at}: {row['size']:.4g} {row['unit']}".rstrip()
                 + f" ({within}), limit {row['limit']:.4g}: {row['verdict']}"
             )
-            lines.append(textwrap.fill(line, 80, subsequent_indent="    "))
+            lines.append(wrap(line, "    "))
         if any(row["verdict"] == "not decidable" for row in rows):
             words = (
                 "Not decidable: the 95 % region of the value lies on both sides of the limit, or the errors "
                 "are unknown; repeated readings or stated errors would tell."
             )
-            lines.append(textwrap.fill(words, 80))
+            lines.append(wrap(words))
         return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rotorid.base.suggestions import did_you_mean, suggest
 from rotorid.tables import read_trials, units
 from rotorid.tables.number import NotANumber, parse_number, thousands_or_decimals
-from rotorid.tables.problems import InputError, Problem, Problems, did_you_mean, suggest
+from rotorid.tables.problems import InputError, Problem, Problems
 
 
 @pytest.mark.parametrize(

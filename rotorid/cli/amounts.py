@@ -7,11 +7,11 @@ import re
 import numpy as np
 
 from balancing.labels import Labels
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.conventions import ANGLES, as_angles, polar
 from rotorid.tables.jobquantity import Quantity, to_job_weight
 from rotorid.tables.number import NotANumber, check_size, parse_number
-from rotorid.tables.problems import listing
 from rotorid.tables.units import Unit, UnitError
 
 _WORD = re.compile(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d].*)?")

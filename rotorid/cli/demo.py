@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.cli.common import JsonOption, json_text, provenance
 from rotorid.cli.demo_samples import SAMPLES, Sample
 
@@ -35,8 +36,6 @@ def demo(
         _list(as_json=json)
         return
     if sample not in SAMPLES:
-        from rotorid.tables.problems import did_you_mean
-
         raise ValueError(
             f"there is no sample {sample!r}{did_you_mean(sample, SAMPLES)}: one of {', '.join(SAMPLES)}"
         )

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note
@@ -193,8 +195,6 @@ def fit(
 
 def _known(option: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
-        from rotorid.tables.problems import did_you_mean
-
         raise ValueError(
             f"{option} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
         )
@@ -250,7 +250,6 @@ def _read(
 
 def _start(text: str, model: OdeModel, count: int) -> dict[str, float]:
     """Read "k=2,d=0.1" as starting values; x0_2 is that of the second record, where each has its own."""
-    from rotorid.tables.problems import did_you_mean, listing
     from rotorid.timedomain.several import models_of
 
     copy = models_of(model, count)[0]

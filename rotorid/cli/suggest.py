@@ -11,6 +11,8 @@ from typing import Any, Literal, cast
 import typer
 from typer.core import TyperGroup
 
+from rotorid.base.suggestions import suggest
+
 # The class of all complaints about usage; where it lives depends on the version of typer.
 UsageError = cast("type[Exception]", typer.BadParameter.__base__)
 _CHOICE = re.compile(r"'([^']*)' is not one of (.+?)\.?$", re.DOTALL)
@@ -56,8 +58,6 @@ class NearestGroup(TyperGroup):
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """`No such command 'balence'. Did you mean 'balance'?`; the question only where something is near."""
-    from rotorid.tables.problems import suggest
-
     near = suggest(name, known)
     return f"No such {kind} {name!r}." + (f" Did you mean {near!r}?" if near else "")
 
@@ -90,8 +90,6 @@ def _options(context: Any) -> list[str]:  # noqa: ANN401 - typer's or click's, w
 
 def choice(message: str) -> str:
     """A complaint about a value that is none of a few, with the nearest one; other messages as they are."""
-    from rotorid.tables.problems import suggest
-
     found = _CHOICE.search(message)
     if found is None:
         return message

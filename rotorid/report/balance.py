@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import sentence
 from rotorid.report import conventions
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
@@ -139,17 +140,6 @@ def _warnings(document: Mapping[str, Any]) -> list[str]:
     if check is not None and check["explained"] is False:
         found.append(f"check run: {check['verdict']}")
     return [sentence(words) for words in dict.fromkeys(found)]
-
-
-def sentence(words: str) -> str:
-    """Write a clause as a sentence.
-
-    Examples
-    --------
-    >>> sentence("the runs agree")
-    'The runs agree.'
-    """
-    return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') else '.'}"
 
 
 def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any]) -> str:

@@ -13,9 +13,10 @@ import numpy as np
 
 from fem.supports import Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, read_table
-from rotorid.tables.problems import Problems, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.tomlfile import Section
 from rotorid.tables.units import one_of
 

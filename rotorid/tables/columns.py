@@ -11,9 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import suggest
+from rotorid.base.text import listing
 from rotorid.tables.grid import BadCell, Cell, Grid, make_grid, show
 from rotorid.tables.number import NotANumber, check_size, decimal_comma, parse_number, thousands_or_decimals
-from rotorid.tables.problems import Problems, listing, suggest
+from rotorid.tables.problems import Problems
 from rotorid.tables.sheet import is_workbook, pick_sheet, read_workbook
 from rotorid.tables.textfile import decode, parse_text, read_bytes
 from rotorid.tables.units import Unit, UnitError, UnitReader

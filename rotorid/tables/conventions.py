@@ -13,7 +13,8 @@ from balancing.labels import Labels, Rotation, View, check_turning
 from balancing.labels import Phase as Phase
 from balancing.trials import ReadingErrors
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.tables.problems import did_you_mean, listing
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables.tomlfile import Section
 
 PHASES = ("lead", "lag")

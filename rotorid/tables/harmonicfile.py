@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.expressions import ExpressionError, is_name, parse_equation
 from rotorid.tables.number import LARGEST
-from rotorid.tables.problems import Problems, TableWarning, did_you_mean, listing
+from rotorid.tables.problems import Problems, TableWarning
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:

@@ -13,6 +13,8 @@ from balancing.labels import Labels
 from balancing.trials import Trials
 from fem.sensors import label
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.columns import Column, make_table, must_be, read_grid
 from rotorid.tables.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
@@ -25,7 +27,7 @@ from rotorid.tables.influence_comments import (
     read_errors,
 )
 from rotorid.tables.influence_errors import error_columns, error_values, read_covariance
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.runs import PHASE, SPEED
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.units import Unit, UnitError

@@ -12,10 +12,12 @@ from balancing.errors import Source
 from balancing.influence import Influence
 from balancing.labels import Labels
 from balancing.trials import ReadingErrors
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables.columns import Table
 from rotorid.tables.conventions import ANGLES, PHASES, StatedErrors
 from rotorid.tables.number import NotANumber, parse_number
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.units import Unit
 
 _CONVENTION = re.compile(r"(phase|angle)s?\b\s*([:=]|\bis\b|\bare\b)?\s*[\"']?(.*?)[\"']?\.?", re.IGNORECASE)

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables.columns import REMARKS, sheet_source
 from rotorid.tables.grid import BadCell, Cell, Grid, Row, make_grid, show
 from rotorid.tables.jobkeys import Columns
 from rotorid.tables.number import NotANumber, decimal_comma, parse_number
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 
 TABLES = ("runs", "weights", "influence", "check", "check_weights", "slow_roll")
 """Sheets that are tables, by the key of a job file that names such a table."""

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from balancing.trials import Trials
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.jobdata import Job
 from rotorid.tables.jobholes import make_holes
@@ -16,7 +18,7 @@ from rotorid.tables.jobkeys import PlaneKeys, SensorKeys
 from rotorid.tables.joblimits import make_limits, make_row_weights
 from rotorid.tables.jobmodel import Model, complain_about_places, read_check, weight_unit_without_weights
 from rotorid.tables.jobsettings import Extra, Settings
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.slowroll import make_slow_roll, subtract_slow_roll
 from rotorid.tables.tomlfile import Section
 

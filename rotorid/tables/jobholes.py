@@ -17,6 +17,7 @@ import numpy as np
 from balancing.holes import Holes, from_list
 from balancing.labels import Labels
 from balancing.limits import Arc, Limits
+from rotorid.base.suggestions import did_you_mean
 from rotorid.tables import units
 from rotorid.tables.jobquantity import (
     Quantity,
@@ -27,7 +28,6 @@ from rotorid.tables.jobquantity import (
     to_job_weight,
     whole,
 )
-from rotorid.tables.problems import did_you_mean
 from rotorid.tables.tomlfile import Section
 
 if TYPE_CHECKING:

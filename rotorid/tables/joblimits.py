@@ -13,11 +13,12 @@ import numpy as np
 from balancing.limits import Arc, Limits
 from balancing.trials import Trials
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.jobkeys import Pair, PlaneKeys, SensorKeys
 from rotorid.tables.jobquantity import Quantity, to_job_weight
 from rotorid.tables.number import NotANumber, check_size, parse_number
-from rotorid.tables.problems import did_you_mean, listing
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.tomlfile import Section
 from rotorid.tables.units import Unit, UnitError

@@ -11,11 +11,13 @@ import numpy as np
 
 from balancing.trials import Trials
 from fem.sensors import Sensor
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.conventions import Conventions, StatedErrors
 from rotorid.tables.jobdata import Source, source_name
 from rotorid.tables.jobkeys import PlaneKeys, SensorKeys
-from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
+from rotorid.tables.problems import InputError, Problems
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.tomlfile import Section
 from rotorid.tables.trials import make_trials

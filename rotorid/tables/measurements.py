@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, read_table
 from rotorid.tables.conventions import FULL_TURN, polar
 from rotorid.tables.harmonicfile import HarmonicFile
-from rotorid.tables.problems import Problems, TableWarning, listing
+from rotorid.tables.problems import Problems, TableWarning
 from rotorid.tables.repeats import FREQUENCIES, merge_repeats
 from rotorid.tables.units import Unit, UnitError, one_of
 

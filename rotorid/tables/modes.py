@@ -11,9 +11,11 @@ import numpy as np
 
 from fem.rotor import Rotor
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.columns import Column, Table, must_be, nearest, read_table
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.units import Unit, one_of, ratio
 
 Node = int | str

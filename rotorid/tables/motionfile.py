@@ -11,8 +11,9 @@ import numpy as np
 
 from rotorid import expressions
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.odefile import TimeForm, read_time_form
-from rotorid.tables.problems import Problems, did_you_mean
+from rotorid.tables.problems import Problems
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid import expressions
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.expressions import ExpressionError, is_name
 from rotorid.tables.harmonicfile import pair, read_errors
 from rotorid.tables.matrixform import Matrices, read_matrices
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.tomlfile import Section, read_toml
 
 if TYPE_CHECKING:

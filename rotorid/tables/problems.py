@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from rotorid.base.suggestions import did_you_mean, suggest
+from rotorid.base.suggestions import suggest
 
-__all__ = ["InputError", "Problem", "Problems", "TableWarning", "did_you_mean", "listing"]
+__all__ = ["InputError", "Problem", "Problems", "TableWarning"]
 __all__ += ["printable", "quote", "suggest"]
 
 LONGEST_VALUE = 60
@@ -15,7 +15,6 @@ FEW = 3
 """So many equal complaints about a column stand alone; more share a line."""
 MOST_LINES = 20
 """Of one message; a whole column in a wrong format needs no more."""
-MOST_NAMES = 40
 
 
 @dataclass(frozen=True)
@@ -155,14 +154,3 @@ def quote(value: str) -> str:
         return "nothing (a blank)"
     shown = value if len(value) <= LONGEST_VALUE else value[: LONGEST_VALUE - 1] + "…"
     return repr(shown)
-
-
-def listing(names: Iterable[str], conjunction: str = "or") -> str:
-    """`a, b or c`; of a great many only the first."""
-    items = list(names)
-    if len(items) > MOST_NAMES:
-        items = [*items[: MOST_NAMES - 1], f"{len(items) - MOST_NAMES + 1} more"]
-        conjunction = "and"
-    if len(items) < 2:
-        return "".join(items)
-    return f"{', '.join(items[:-1])} {conjunction} {items[-1]}"

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables.columns import Column, Table, make_table, read_grid
 from rotorid.tables.grid import Cell, Grid
-from rotorid.tables.problems import Problems, TableWarning, did_you_mean, listing
+from rotorid.tables.problems import Problems, TableWarning
 from rotorid.tables.units import Unit, UnitError, one_of
 
 if TYPE_CHECKING:

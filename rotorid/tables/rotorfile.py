@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fem.rotor import Disc, Model, Rotor
+from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.bearing import bearing_tables, read_support
-from rotorid.tables.problems import Problems, did_you_mean
+from rotorid.tables.problems import Problems
 from rotorid.tables.rotor import Material, build, read_shaft
 from rotorid.tables.tomlfile import Section, read_toml
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from fem.rotor import Disc, Model, Rotor, Support
 from fem.supports import Coefficient
+from rotorid.base.text import listing
 from rotorid.tables.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
 from rotorid.tables.number import LARGEST, SMALLEST
-from rotorid.tables.problems import InputError, Problem, listing
+from rotorid.tables.problems import InputError, Problem
 from rotorid.tables.rotor import ATTACHED, OF_ELEMENTS, Material
 from rotorid.tables.writing import Value, csv_bytes, write_files
 

@@ -23,10 +23,12 @@ import numpy as np
 from balancing.labels import Labels
 from balancing.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.conventions import Conventions, polar
 from rotorid.tables.grid import Grid
-from rotorid.tables.problems import InputError, Problems, did_you_mean, listing
+from rotorid.tables.problems import InputError, Problems
 from rotorid.tables.runs import Runs, read_runs
 from rotorid.tables.speeds import same_speed, show_speed
 from rotorid.tables.tomlfile import Section

@@ -8,8 +8,9 @@ import re
 import warnings
 from pathlib import Path
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.grid import Grid, Row, clean, make_grid
-from rotorid.tables.problems import Problems, TableWarning, did_you_mean
+from rotorid.tables.problems import Problems, TableWarning
 
 _SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
 _WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")

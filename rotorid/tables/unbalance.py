@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from fem.rotor import Rotor
+from rotorid.base.suggestions import did_you_mean
 from rotorid.tables import units
 from rotorid.tables.columns import Column, must_be, nearest, read_table
 from rotorid.tables.conventions import FULL_TURN, polar
-from rotorid.tables.problems import Problems, did_you_mean
+from rotorid.tables.problems import Problems
 from rotorid.tables.units import one_of
 
 COLUMNS = (

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import pi, sqrt
 
-from rotorid.tables.problems import did_you_mean, listing
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 
 STANDARD_GRAVITY = 9.80665
 

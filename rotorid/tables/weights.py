@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.columns import Column, make_table, must_be, nearest, read_table
 from rotorid.tables.conventions import FULL_TURN, Conventions, polar
 from rotorid.tables.grid import Grid
-from rotorid.tables.problems import Problems, did_you_mean, listing
+from rotorid.tables.problems import Problems
 from rotorid.tables.units import Unit, one_of
 
 COLUMNS = (

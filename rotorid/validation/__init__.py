@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rotorid.base.text import sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row
 
 if TYPE_CHECKING:
@@ -224,15 +225,11 @@ def _difference(rows: Sequence[Row]) -> str:
 
 
 def _erratum(rows: Sequence[Row]) -> str:
-    return f"{_named(rows)}. {_sentence(rows[0].erratum)}"
+    return f"{_named(rows)}. {sentence(rows[0].erratum)}"
 
 
 def _tolerance(rows: Sequence[Row]) -> str:
     what = rows[0].quantity if len(rows) == 1 else f"{len(rows)} numbers"
     low, high = min(r.tolerance for r in rows), max(r.tolerance for r in rows)
     size = f"{low:.2g}" if low == high else f"{low:.2g} to {high:.2g}"
-    return f"{rows[0].source}, {what}: {size}. {_sentence(rows[0].reason)}"
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    return f"{rows[0].source}, {what}: {size}. {sentence(rows[0].reason)}"
