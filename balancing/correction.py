@@ -223,7 +223,7 @@ class Correction:
         return plots.amplitudes(self, ax)
 
 
-def correct(
+def correct(  # noqa: PLR0913
     influence: Influence,
     baseline: Trials | ArrayLike | None = None,
     planes: Sequence[str] | None = None,

@@ -36,7 +36,7 @@ Quantity = Literal["displacement", "velocity", "acceleration"]
 _DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
-def model_influence(
+def model_influence(  # noqa: PLR0913
     rotor: Rotor,
     planes: Mapping[str, str | int],
     sensors: Mapping[str, SensorLike],

@@ -33,7 +33,7 @@ _ARROW = 0.52
 """Length of the longest arrow, of the disc's radius."""
 
 
-def disc(
+def disc(  # noqa: PLR0913
     ax: Axes,
     plane: str,
     holes: Holes | None,

@@ -52,7 +52,7 @@ class Solution:
     active_residuals: BoolArray
 
 
-def solve(
+def solve(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     *,

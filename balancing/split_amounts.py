@@ -17,7 +17,7 @@ _SLACK = 1e-12
 _MOST = 1_000_000
 
 
-def nearest_amounts(target: complex, holes: Holes) -> FloatArray:
+def nearest_amounts(target: complex, holes: Holes) -> FloatArray:  # noqa: C901
     """Amounts (H,) of the nearest vector; of equally near ones that with fewer holes.
 
     Raises

@@ -93,7 +93,7 @@ def force_amount(
     return fraction * load / (radius * speed**2), load
 
 
-def trial_from_force(
+def trial_from_force(  # noqa: PLR0913
     plane: str,
     speed: float,
     radius: float,
@@ -158,7 +158,7 @@ def trial_from_force(
     )
 
 
-def trial_from_coefficients(
+def trial_from_coefficients(  # noqa: PLR0913, PLR0915
     influence: Influence,
     readings: ComplexArray,
     plane: str,

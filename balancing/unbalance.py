@@ -51,7 +51,7 @@ _SMALLEST, _LARGEST = 1e-10, 1e6
 """Range of λ, relative to the largest singular value."""
 
 
-def estimate_unbalance(
+def estimate_unbalance(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     *,

@@ -121,7 +121,7 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     return np.asarray((k + k.T) / 2)
 
 
-def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
+def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:  # noqa: C901, PLR0915
     """Pencil of the synchronous conservative rotor with all its supports as they are at a speed.
 
     One plane, forward, where the supports are rotationally symmetric, else both. Unknowns of pedestals

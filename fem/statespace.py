@@ -117,7 +117,7 @@ class StateSpace:
         }
 
 
-def state_space(
+def state_space(  # noqa: PLR0915
     motion: Motion, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
 ) -> StateSpace:
     """Write equations of motion as a state space.

@@ -121,7 +121,7 @@ class NonlinearEstimate:
         return frame
 
 
-def nonlinear_least_squares(
+def nonlinear_least_squares(  # noqa: PLR0913
     residual: Function,
     jacobian: Function,
     start: ArrayLike,

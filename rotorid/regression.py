@@ -109,7 +109,7 @@ def stack(a: ArrayLike) -> FloatArray:
     return np.stack((z.real, z.imag), axis=1).reshape(2 * z.shape[0], *z.shape[1:])
 
 
-def least_squares(
+def least_squares(  # noqa: PLR0915
     K: ArrayLike,
     Y: ArrayLike,
     *,

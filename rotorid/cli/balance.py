@@ -34,7 +34,7 @@ class Overrides(TypedDict):
     phase_error_deg: float | None
 
 
-def balance(
+def balance(  # noqa: PLR0915
     files: Annotated[
         list[Path] | None,
         typer.Argument(

@@ -56,7 +56,7 @@ class View(StrEnum):
     STABILITY = "stability"
 
 
-def reduce(
+def reduce(  # noqa: C901, PLR0915
     rotor: Annotated[
         Path | None,
         typer.Argument(

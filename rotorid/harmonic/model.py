@@ -158,7 +158,7 @@ class HarmonicModel:
         return out
 
 
-def harmonic_model(
+def harmonic_model(  # noqa: C901
     equations: Sequence[str],
     *,
     known: Mapping[str, float] | None = None,
@@ -250,7 +250,7 @@ def exact_number(value: float) -> Fraction:
     return Fraction(repr(float(value)))
 
 
-def _expand(
+def _expand(  # noqa: C901
     index: int,
     lhs: Any,  # noqa: ANN401 - sympy
     rhs: Any,  # noqa: ANN401

@@ -110,7 +110,7 @@ class Ratio:
         return top
 
 
-def from_expression(
+def from_expression(  # noqa: C901
     expression: Any,  # noqa: ANN401 - a sympy expression; sympy has no types
     constant: Callable[[Any], Fraction | None],
 ) -> Ratio:

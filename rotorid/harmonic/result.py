@@ -228,9 +228,9 @@ class Identification:
 
     def plot(self, ax: Any = None) -> Axes:  # noqa: ANN401 - matplotlib's axes
         """Draw measured and fitted amplitudes over frequency."""
-        from importlib import import_module
+        from rotorid.plots_harmonic import plot_identification
 
-        return import_module("rotorid.plots_harmonic").plot_identification(self, ax)  # type: ignore[no-any-return]
+        return plot_identification(self, ax)
 
     def _line(self, i: int, width: int) -> str:
         name, std, ci95 = self.parameters[i], self.std, self.ci95

@@ -317,7 +317,7 @@ def _regression(C: _Condensed, name: str, modes: int, normalise: Normalisation, 
     return _judged(name, C, np.diag(masses), (K + K.T) / 2, None, omega, own, True, reason)
 
 
-def _judged(
+def _judged(  # noqa: PLR0913
     name: str,
     C: _Condensed,
     M: FloatArray,

@@ -28,7 +28,7 @@ from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_unc
 from rotorid.reduction.vibration import like, mac, natural_frequencies
 
 
-def reduce(
+def reduce(  # noqa: PLR0913
     rotor: fem.Rotor,
     nodes: Sequence[int],
     modes: int = 2,
@@ -119,7 +119,7 @@ def reduce(
     )
 
 
-def reduce_measured(
+def reduce_measured(  # noqa: PLR0913
     compliance: ArrayLike,
     frequencies: ArrayLike,
     shapes: ArrayLike,

@@ -69,7 +69,7 @@ def read_conventions(source: str, comments: Sequence[str], problems: Problems) -
     return said
 
 
-def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
+def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:  # noqa: C901
     """Errors of a reading from comment lines such as `# errors.phase_deg = 2`, or what is unknown."""
     before = len(problems)
     said: dict[str, tuple[str, int]] = {}

@@ -26,7 +26,7 @@ def differences(a: Job, b: Job) -> tuple[str, ...]:
     return tuple(_unlike(a, b, ""))
 
 
-def _unlike(a: Any, b: Any, name: str) -> Iterator[str]:  # noqa: ANN401  parts of jobs are of all kinds
+def _unlike(a: Any, b: Any, name: str) -> Iterator[str]:  # noqa: ANN401, C901
     if dataclasses.is_dataclass(a) and type(a) is type(b):
         for field in dataclasses.fields(a):
             if field.name not in _NOT_SAID:

@@ -161,7 +161,7 @@ def _sum(values: Sequence[float], names: Sequence[str]) -> str:
     return " + ".join(terms) or "0"
 
 
-def _check(
+def _check(  # noqa: C901
     motion: Motion,
     dampers: Mapping[str, float],
     initial: Mapping[str, float],

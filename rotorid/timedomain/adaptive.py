@@ -80,7 +80,7 @@ def _solve(
     return system.unpack(table)
 
 
-def _segment(
+def _segment(  # noqa: PLR0913
     system: Augmented,
     table: FloatArray,
     begin: int,

@@ -32,7 +32,7 @@ Searching = Callable[[FloatArray], Path]
 Trajectories = str | Mapping[str, str | float | ArrayLike]
 
 
-def fit(
+def fit(  # noqa: C901, PLR0913
     model: OdeModel,
     records: Record | Sequence[Record],
     *,

@@ -34,7 +34,7 @@ class Judgement:
     autocorrelation: float | None
 
 
-def judge(problem: Problem, path: Path, loss: str) -> Judgement:
+def judge(problem: Problem, path: Path, loss: str) -> Judgement:  # noqa: C901, PLR0915
     """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
     found, names = path.estimate, problem.model.parameters
     warnings: list[str] = []

@@ -191,6 +191,6 @@ class Fit:
 
     def plot(self) -> Figure:
         """Draw record and model, residuals, sensitivities and iterations."""
-        from importlib import import_module
+        from rotorid.plots_timedomain import figure_fit
 
-        return import_module("rotorid.plots_timedomain").figure_fit(self)  # type: ignore[no-any-return]
+        return figure_fit(self)

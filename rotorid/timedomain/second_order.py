@@ -103,7 +103,7 @@ class SecondOrderModel(OdeModel):
         return self._last[key]
 
 
-def second_order(
+def second_order(  # noqa: PLR0913
     mass: Matrix,
     damping: Matrix,
     stiffness: Matrix,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.text import sentence
@@ -155,12 +154,16 @@ def validate(groups: Iterable[str] | None = None) -> Validation:
             raise ValueError(
                 f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
             )
-    return Validation(
-        tuple(
-            Group(name, PROVIDERS[name], tuple(import_module(f"rotorid.validation.{name}").rows()))
-            for name in chosen
-        )
-    )
+    from rotorid.validation import balancing, lessons, masses, rotor, time_records
+
+    rows = {
+        "rotor": rotor.rows,
+        "masses": masses.rows,
+        "lessons": lessons.rows,
+        "time_records": time_records.rows,
+        "balancing": balancing.rows,
+    }
+    return Validation(tuple(Group(name, PROVIDERS[name], tuple(rows[name]())) for name in chosen))
 
 
 def _counts(rows: Sequence[Row]) -> dict[Status, int]:
