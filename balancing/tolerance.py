@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from balancing.allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
-from rotorid.base.units import RPM, rpm_text
+from rotorid.base.units import rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,7 +125,7 @@ class Tolerance:
             "grade": f"G{self.grade:g}",
             "mass_kg": self.mass,
             "speed_rad_s": self.speed,
-            "speed_rpm": self.speed * RPM,
+            "speed_rpm": rpm(self.speed),
             "permissible_kg_m": self.total,
             "permissible_g_mm": self.total * _GRAM_MM,
             "specific_um": self.eccentricity * 1e6,
