@@ -1,30 +1,30 @@
 """Unbalance from influence coefficients: trial runs in, correction weights out."""
 
-from balancing.check import CheckComparison, compare_check
-from balancing.combine import combine
-from balancing.conditioning import Conditioning, conditioning
-from balancing.correction import Correction, correct
-from balancing.determined import UndeterminedError
-from balancing.discrete import Discrete, solve_discrete
-from balancing.history import History, history
-from balancing.holes import Holes, equal_holes, from_list
-from balancing.influence import Influence, estimate_influence
-from balancing.labels import Labels
-from balancing.limits import Limits
-from balancing.modelled import modal_shapes, model_influence
-from balancing.mounted import Mounted, mount
-from balancing.refine import Trim, refine, trim
-from balancing.removal import Drill, drill_holes
-from balancing.solve import Solution, solve
-from balancing.split import Split, split
-from balancing.subset import Subsets, best_subsets
-from balancing.tolerance import Tolerance, tolerance
-from balancing.tradeoff import TradeOff, trade_off
+from balancing.coefficients.combine import combine
+from balancing.coefficients.from_model import modal_shapes, model_influence
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.influence import Influence, estimate_influence
+from balancing.correction.check import CheckComparison, compare_check
+from balancing.correction.correct import Correction, correct
+from balancing.correction.history import History, history
+from balancing.correction.refine import Trim, refine, trim
+from balancing.correction.subsets import Subsets, best_subsets
+from balancing.correction.trade_off import TradeOff, trade_off
+from balancing.correction.verdict import Verdict, verdict_of_check, verdict_of_prediction
+from balancing.data.conventions import Labels
+from balancing.data.limits import Limits
+from balancing.data.trials import ReadingErrors, Trials
+from balancing.iso21940 import Tolerance, tolerance
+from balancing.mounting.discrete import Discrete, solve_discrete
+from balancing.mounting.holes import Holes, equal_holes, from_list
+from balancing.mounting.mounted import Mounted, mount
+from balancing.mounting.removal import Drill, drill_holes
+from balancing.mounting.split import Split, split
+from balancing.solvers.conditioning import Conditioning, conditioning
+from balancing.solvers.solve import Solution, solve
 from balancing.trial_weight import trial_from_coefficients, trial_from_force
-from balancing.trials import ReadingErrors, Trials
 from balancing.unbalance import estimate_unbalance, unbalance_of_run
 from balancing.unbalance_result import Unbalance
-from balancing.verdict import Verdict, verdict_of_check, verdict_of_prediction
 
 __all__ = [
     "CheckComparison",

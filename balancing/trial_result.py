@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.labels import Labels
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
 from rotorid.base.units import RPM
@@ -140,7 +140,7 @@ class TrialWeight:
         ValueError
             Without an angle.
         """
-        from balancing.plots_tolerance import trial_arrow
+        from balancing.plots.tolerances import trial_arrow
 
         return trial_arrow(self, ax)
 

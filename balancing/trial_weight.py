@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.errors import reading_covariance
-from balancing.labels import Labels
-from balancing.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
+from balancing.coefficients.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
+from balancing.data.conventions import Labels
+from balancing.data.errors import reading_covariance
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
 from balancing.trial_result import TrialWeight
 from rotorid.base.arrays import ComplexArray
@@ -28,8 +28,8 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
-    from balancing.influence import Influence
-    from balancing.trials import ReadingErrors
+    from balancing.coefficients.influence import Influence
+    from balancing.data.trials import ReadingErrors
 
 
 GRAVITY = 9.80665

@@ -30,14 +30,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.baseline import starting_point
-from balancing.determined import UndeterminedError
-from balancing.influence import Influence
-from balancing.labels import Labels
-from balancing.propagation import prediction_covariance
-from balancing.repeatability import tail
-from balancing.resolution import HOPELESS
-from balancing.trials import Trials, check_names
+from balancing.coefficients.baseline import starting_point
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.influence import Influence
+from balancing.coefficients.repeatability import tail
+from balancing.coefficients.resolution import HOPELESS
+from balancing.data.conventions import Labels
+from balancing.data.trials import Trials, check_names
+from balancing.solvers.error_propagation import prediction_covariance
 from balancing.unbalance_result import Unbalance
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, stretch

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.labels import Labels
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ Run `python examples/coverage_balance.py [jobs]`. Two planes, four sensors, thre
 in every reading of every run (a baseline and two trial runs); the unbalance stands in the two planes. For
 each class of condition numbers and trial weights it prints how many jobs are refused (they count nowhere
 else), the share of 95 % regions that contain the true weights, of readings of a check run within their 95 %
-bands, and of jobs with the warning of `balancing.optimism`. Then the shares by how clearly the readings show
-the weakest combination of the planes, which is what that warning goes by.
+bands, and of jobs with the warning of `balancing.correction.region_coverage`. Then the shares by how clearly
+the readings show the weakest combination of the planes, which is what that warning goes by.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from balancing import Influence, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
-from balancing.effective import effective_variance
-from balancing.errors import reading_covariance
-from balancing.likelihood import evaluate, hessian, jacobian, problem_of
-from balancing.optimism import LEAST_SQUARES_LEVELS, WEIGHTED_LEVELS, clearness, optimism
-from balancing.propagation import prediction_covariance
+from balancing.correction.region_coverage import LEAST_SQUARES_LEVELS, WEIGHTED_LEVELS, clearness, optimism
+from balancing.data.errors import reading_covariance
+from balancing.solvers.effective_variance import effective_variance
+from balancing.solvers.error_propagation import prediction_covariance
+from balancing.solvers.likelihood import evaluate, hessian, jacobian, problem_of
 from rotorid.regression import stretch
 
 FloatArray = NDArray[np.float64]

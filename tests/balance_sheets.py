@@ -6,8 +6,8 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from balancing import correct
-from balancing.check import compare_check
-from balancing.mounted import mount
+from balancing.correction.check import compare_check
+from balancing.mounting.mounted import mount
 from rotorid.cli.balance_report import Report
 from rotorid.cli.coefficients import choose
 from rotorid.cli.common import provenance

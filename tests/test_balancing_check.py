@@ -10,9 +10,9 @@ from fem_rotors import rotor23
 
 import fem
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.check import compare_check
-from balancing.errors import reading_covariance
-from balancing.propagation import prediction_covariance
+from balancing.correction.check import compare_check
+from balancing.data.errors import reading_covariance
+from balancing.solvers.error_propagation import prediction_covariance
 
 ERRORS = ReadingErrors(amplitude=0.02, phase=np.deg2rad(1.0))
 P, C, S = 2, 4, 3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal, polar
 
-from balancing.conditioning import ALIKE, conditioning
+from balancing.solvers.conditioning import ALIKE, conditioning
 
 
 def orthonormal(rng, N, P):

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from balancing.certificate import lower_bound, project
-from balancing.cone import (
+from balancing.solvers.certificate import lower_bound, project
+from balancing.solvers.cone import (
     InfeasibleError,
     least_squares_cone,
     minmax_cone,

@@ -13,8 +13,8 @@ import pytest
 from balancing_data import complex_normal
 from scipy.stats import binom
 
-from balancing.effective import effective_variance
-from balancing.optimism import clearness, optimism
+from balancing.correction.region_coverage import clearness, optimism
+from balancing.solvers.effective_variance import effective_variance
 
 PATH = Path(__file__).parents[1] / "examples" / "coverage_balance.py"
 STRONG, MEDIUM, WEAK = (0.3, 1.0), (0.1, 0.3), (0.03, 0.1)

@@ -5,11 +5,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from balancing.cone import InfeasibleError, minmax_cone
-from balancing.discrete import solve_discrete
-from balancing.discrete_sets import PieceSums
-from balancing.holes import equal_holes, from_list
-from balancing.limits import Limits
+from balancing.data.limits import Limits
+from balancing.mounting.discrete import solve_discrete
+from balancing.mounting.discrete_sets import PieceSums
+from balancing.mounting.holes import equal_holes, from_list
+from balancing.solvers.cone import InfeasibleError, minmax_cone
 
 METHODS = ("least-squares", "minmax")
 

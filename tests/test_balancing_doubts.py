@@ -6,7 +6,7 @@ from balancing_data import GRAM, bruel_kjaer, complex_normal, job, polar
 from test_balancing_uncertainty import noisy
 
 from balancing import Influence, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
-from balancing.resolution import resolution
+from balancing.coefficients.resolution import resolution
 
 ERRORS = ReadingErrors(0.01, 0.01)
 

@@ -7,10 +7,10 @@ from scipy.optimize import least_squares as optimise
 from scipy.optimize import minimize
 
 from balancing import UndeterminedError
-from balancing.effective import FLOOR, effective_variance
-from balancing.errors import ReadingErrors, reading_covariance
-from balancing.likelihood import evaluate, gradient, hessian, problem_of
-from balancing.propagation import prediction_covariance
+from balancing.data.errors import ReadingErrors, reading_covariance
+from balancing.solvers.effective_variance import FLOOR, effective_variance
+from balancing.solvers.error_propagation import prediction_covariance
+from balancing.solvers.likelihood import evaluate, gradient, hessian, problem_of
 from rotorid.regression import least_squares, stretch, unstretch
 
 

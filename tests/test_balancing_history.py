@@ -9,7 +9,7 @@ import pytest
 from balancing_data import GRAM, bruel_kjaer, job, synthetic
 
 from balancing import Limits, correct, estimate_influence
-from balancing.history import history
+from balancing.correction.history import history
 from rotorid.tables import read_job
 
 SAMPLES = Path(__file__).parents[1] / "sample_data"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from balancing.holes import Holes, equal_holes, from_list, mounting
+from balancing.mounting.holes import Holes, equal_holes, from_list, mounting
 
 
 def test_equal_holes_go_with_or_against_the_rotation():

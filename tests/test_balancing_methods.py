@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import Labels, Limits, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
-from balancing.effective import effective_variance
+from balancing.solvers.effective_variance import effective_variance
 
 ERRORS = ReadingErrors(0.02, 0.02)
 S, C, P = 3, 4, 2
@@ -143,7 +143,7 @@ def test_limits_of_each_method_are_kept():
 def test_weighted_with_limits_is_the_constrained_optimum_and_passes_without_a_jump():
     from scipy.optimize import minimize
 
-    from balancing import likelihood
+    from balancing.solvers import likelihood
     from rotorid.regression import stretch
 
     trials, _ = job(5, effect=1.2)

@@ -8,7 +8,7 @@ import pytest
 from balancing_data import GRAM, complex_normal, job, synthetic
 
 from balancing import ReadingErrors, UndeterminedError, correct, estimate_influence
-from balancing.refine import refine, trim
+from balancing.correction.refine import refine, trim
 from rotorid.tables import read_job
 
 SAMPLES = Path(__file__).parents[1] / "sample_data"

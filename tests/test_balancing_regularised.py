@@ -5,8 +5,8 @@ import pytest
 from balancing_data import complex_normal
 
 from balancing import ReadingErrors, UndeterminedError
-from balancing.errors import reading_covariance
-from balancing.regularised import STRENGTHS, cross_validated, ridge, truncated
+from balancing.data.errors import reading_covariance
+from balancing.solvers.regularised import STRENGTHS, cross_validated, ridge, truncated
 from rotorid.regression import stretch, unstretch
 
 SHAPES = [(7, 3), (4, 4), (3, 4), (5, 1)]

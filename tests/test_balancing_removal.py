@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from balancing.mounting import combine, round_to, rounded, trim, two_positions
-from balancing.removal import Drill, drill_holes, grind, opposite, row_factor
+from balancing.mounting.hand_mounting import combine, round_to, rounded, trim, two_positions
+from balancing.mounting.removal import Drill, drill_holes, grind, opposite, row_factor
 
 STEEL = 7850.0
 

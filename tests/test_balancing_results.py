@@ -10,7 +10,8 @@ import pytest
 from balancing_data import bruel_kjaer, feese_grazier, synthetic
 from matplotlib.figure import Figure
 
-from balancing import Labels, ReadingErrors, correct, estimate_influence, plots
+from balancing import Labels, ReadingErrors, correct, estimate_influence
+from balancing.plots import polar as plots
 
 ERRORS = ReadingErrors(0.02, np.deg2rad(1))
 KEYS = {

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal
 
-from balancing.propagation import correction_covariance
-from balancing.sampling import sampled_covariance
+from balancing.solvers.error_propagation import correction_covariance
+from balancing.solvers.sampling import sampled_covariance
 from rotorid.regression import gain
 
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from balancing.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
-from balancing.limits import Limits
-from balancing.sectors import allowed_sectors, solve_sectors, stands_in
-from balancing.solve import solve
+from balancing.data.limits import Limits
+from balancing.solvers.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
+from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
+from balancing.solvers.solve import solve
 
 TURN = 2 * np.pi
 seeds = st.integers(0, 2**32 - 1)

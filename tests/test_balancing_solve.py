@@ -6,12 +6,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from balancing.cone import InfeasibleError, problem
-from balancing.determined import UndeterminedError
-from balancing.infeasible import relax
-from balancing.limits import Limits
-from balancing.sectors import allowed_sectors
-from balancing.solve import solve
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.data.limits import Limits
+from balancing.solvers.cone import InfeasibleError, problem
+from balancing.solvers.infeasible import relax
+from balancing.solvers.sectors import allowed_sectors
+from balancing.solvers.solve import solve
 
 METHODS = ("least-squares", "minmax")
 seeds = st.integers(0, 2**32 - 1)

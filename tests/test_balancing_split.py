@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from balancing.holes import WIDEST, equal_holes, from_list
-from balancing.labels import Labels
-from balancing.split import fewer_pieces, percent, split
+from balancing.data.conventions import Labels
+from balancing.mounting.holes import WIDEST, equal_holes, from_list
+from balancing.mounting.split import fewer_pieces, percent, split
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 

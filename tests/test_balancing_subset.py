@@ -8,8 +8,8 @@ import pytest
 from balancing_data import complex_normal
 
 from balancing import Labels, UndeterminedError
-from balancing.cone import minmax_cone
-from balancing.subset import best_subsets
+from balancing.correction.subsets import best_subsets
+from balancing.solvers.cone import minmax_cone
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)
@@ -103,7 +103,7 @@ def test_choices_with_planes_that_act_alike_are_left_out_and_counted():
 def test_many_choices_in_batches_are_the_same(monkeypatch):
     W, Y, _ = case(N=20, P=10)
     whole = best_subsets(W, Y, NAMES[:10], 4, show=210)
-    monkeypatch.setattr("balancing.subset._BATCH", 7 * 4 * 10)
+    monkeypatch.setattr("balancing.correction.subsets._BATCH", 7 * 4 * 10)
     parts = best_subsets(W, Y, NAMES[:10], 4, show=210)
     assert whole.choices == 210
     assert parts.planes == whole.planes

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from balancing.tolerance import GRADES, parse_grade, tolerance
+from balancing.iso21940 import GRADES, parse_grade, tolerance
 
 RPM3000 = 100 * pi
 TOTAL = 1000 * 2.5 * 500 / RPM3000  # g·mm, 3978.87

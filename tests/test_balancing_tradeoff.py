@@ -7,8 +7,8 @@ import pytest
 from balancing_data import complex_normal
 
 from balancing import Labels, UndeterminedError
-from balancing.cone import minmax_cone, weight_budget_cone
-from balancing.tradeoff import knee, trade_off
+from balancing.correction.trade_off import knee, trade_off
+from balancing.solvers.cone import minmax_cone, weight_budget_cone
 
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)
 

@@ -9,8 +9,8 @@ from fem_rotors import rotor23
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct
-from balancing.errors import reading_covariance
-from balancing.modelled import modal_shapes, model_influence
+from balancing.coefficients.from_model import modal_shapes, model_influence
+from balancing.data.errors import reading_covariance
 from balancing.unbalance import estimate_unbalance, unbalance_of_run
 
 THREE = {"a": 4, "b": 12, "c": 20}

@@ -7,8 +7,8 @@ import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, synthetic
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.errors import error_model, reading_covariance
-from balancing.propagation import correction_jacobian, prediction_covariance
+from balancing.data.errors import error_model, reading_covariance
+from balancing.solvers.error_propagation import correction_jacobian, prediction_covariance
 from rotorid.regression import stretch
 from rotorid.samples import sample_data
 from rotorid.tables import read_job

@@ -8,10 +8,10 @@ import pytest
 from balancing_data import complex_normal, synthetic
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.judgement import judge, judge_unbalance
-from balancing.limits import Limits
-from balancing.tolerance import tolerance
-from balancing.verdict import verdict_of_check, verdict_of_prediction
+from balancing.correction.judgement import judge, judge_unbalance
+from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
+from balancing.data.limits import Limits
+from balancing.iso21940 import tolerance
 
 RADIUS = 2.447746830680816  # √χ²(2, 0.95)
 ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from balancing import correct, estimate_influence
-from balancing.mounted import mount
+from balancing.mounting.mounted import mount
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 

@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from balancing.holes import equal_holes, from_list, mounting
-from balancing.labels import Labels
-from balancing.plots_discs import disc, discs, seen_from
+from balancing.data.conventions import Labels
+from balancing.mounting.holes import equal_holes, from_list, mounting
+from balancing.plots.discs import disc, discs, seen_from
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 AGAINST = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")

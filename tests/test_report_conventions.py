@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from balancing.labels import Labels
+from balancing.data.conventions import Labels
 from rotorid.report import conventions
 from rotorid.report.balance_figures import ROWS_SHOWN, residual_figure
 

@@ -9,7 +9,7 @@ from tables_data import complaints, replaced, the_only, write_csv
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, correct, estimate_influence
-from balancing.modelled import model_influence
+from balancing.coefficients.from_model import model_influence
 from rotorid.tables import influence_frame, job_from_files, read_influence, write_influence, write_table
 
 ERRORS = ReadingErrors(amplitude=0.03, phase=np.radians(2.0), floor=1e-7)

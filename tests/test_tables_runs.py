@@ -10,7 +10,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 
 from balancing import UndeterminedError, estimate_influence
-from balancing.trials import ReadingErrors
+from balancing.data.trials import ReadingErrors
 from rotorid.tables import StatedErrors, read_trials
 
 

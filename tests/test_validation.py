@@ -260,8 +260,8 @@ def unstretched(function):
         ("rotorid.validation.lessons.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
         ("rotorid.timedomain.quasilinearization._heun", lambda f: times(f, 1.01), "time_records", 100),
         ("rotorid.timedomain.matrix_exponential._pade", lambda f: scaled(f, 1.0001), "time_records", 50),
-        ("balancing.influence.gain", lambda f: times(f, np.exp(0.05j)), "balancing", 4),
-        ("balancing.solve._closed_form", lambda f: times(f, np.exp(0.05j)), "balancing", 8),
+        ("balancing.coefficients.influence.gain", lambda f: times(f, np.exp(0.05j)), "balancing", 4),
+        ("balancing.solvers.solve._closed_form", lambda f: times(f, np.exp(0.05j)), "balancing", 8),
     ],
 )
 def test_a_wrong_formula_makes_numbers_differ(monkeypatch, target, wrong, name, least):

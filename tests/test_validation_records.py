@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import balancing.correction
-import balancing.influence
+import balancing.coefficients.influence
+import balancing.correction.correct
 import rotorid.timedomain.propagation
 import rotorid.timedomain.quasilinearization
 from rotorid.validation import balancing as published
@@ -213,13 +213,13 @@ def test_what_the_reason_of_example_6_says():
 
 def test_wrong_influence_coefficients_are_noticed(monkeypatch):
     """Coefficients 1 % too large, the readings of the bare rotor right."""
-    right = balancing.influence.gain
+    right = balancing.coefficients.influence.gain
 
     def wrong(matrix):
         found = right(matrix)
         return np.concatenate((found[:1], 1.01 * found[1:]))
 
-    monkeypatch.setattr(balancing.influence, "gain", wrong)
+    monkeypatch.setattr(balancing.coefficients.influence, "gain", wrong)
     rows = published.rows()
     differs = {(r.source, r.text) for r in rows if r.status == "differs"}
     assert {text for source, text in differs if source.startswith(published.NOTE)} >= {
@@ -230,14 +230,14 @@ def test_wrong_influence_coefficients_are_noticed(monkeypatch):
 
 def test_wrong_weights_are_noticed(monkeypatch):
     """Weights on the wrong side: D = +W⁻¹Y; every angle differs."""
-    right = balancing.correction.fit_weights
+    right = balancing.correction.correct.fit_weights
 
     def wrong(*args, **options):
         fitted = right(*args, **options)
         object.__setattr__(fitted, "weights", -fitted.weights)
         return fitted
 
-    monkeypatch.setattr(balancing.correction, "fit_weights", wrong)
+    monkeypatch.setattr(balancing.correction.correct, "fit_weights", wrong)
     rows = published.rows()
     angles = [r for r in rows if r.quantity.endswith("angle, deg") and "effect" not in r.quantity]
     assert len(angles) == 2 + 1 + 2 + 2 + 4 + 4

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from balancing.labels import Labels
+from balancing.data.conventions import Labels
 from rotorid.base.text import listing
 from rotorid.tables import units
 from rotorid.tables.conventions import ANGLES, as_angles, polar

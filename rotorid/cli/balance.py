@@ -209,8 +209,8 @@ def balance(  # noqa: PLR0915
     sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
     """
     from balancing import correct
-    from balancing.check import compare_check
-    from balancing.mounted import mount
+    from balancing.correction.check import compare_check
+    from balancing.mounting.mounted import mount
     from rotorid.cli.balance_report import Report
     from rotorid.cli.balance_workbook import as_workbook, workbook, write_template
     from rotorid.cli.coefficients import choose, compare_planes

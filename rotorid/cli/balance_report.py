@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Correction, Influence
-    from balancing.check import CheckComparison
-    from balancing.history import History
-    from balancing.mounted import Mounted
-    from balancing.subset import Subsets
-    from balancing.tradeoff import TradeOff
-    from balancing.verdict import Verdict
+    from balancing.correction.check import CheckComparison
+    from balancing.correction.history import History
+    from balancing.correction.subsets import Subsets
+    from balancing.correction.trade_off import TradeOff
+    from balancing.correction.verdict import Verdict
+    from balancing.mounting.mounted import Mounted
     from rotorid.tables import Job
 
 
@@ -34,7 +34,7 @@ class Report:
 
     def add_history(self, job: Job) -> None:
         """Run by run, what was mounted and what vibrated."""
-        from balancing.history import history
+        from balancing.correction.history import history
 
         checks = () if job.check is None else (job.check,)
         mounted = None if job.check is None or job.check_mounted else self.result
@@ -45,7 +45,7 @@ class Report:
 
     def add_trade_off(self, job: Job) -> None:
         """Residual against total weight, in the planes used."""
-        from balancing.tradeoff import trade_off
+        from balancing.correction.trade_off import trade_off
 
         W, Y, rows = self._stack(job, self.result.planes)
         self.curve = trade_off(
@@ -86,7 +86,9 @@ class Report:
 
     def figure(self) -> Figure:
         """The correction, or the discs with their holes or the trade-off where they were asked for."""
-        from balancing import plots, plots_discs, plots_tradeoff
+        from balancing.plots import discs as plots_discs
+        from balancing.plots import polar as plots
+        from balancing.plots import trade_off_curve as plots_tradeoff
 
         m = self.mounted
         if m is not None:
@@ -119,8 +121,8 @@ class Report:
         """Corrections, and residual unbalance inside or outside its tolerance circles."""
         from matplotlib.figure import Figure
 
-        from balancing import plots
-        from balancing.plots_tolerance import residuals
+        from balancing.plots import polar as plots
+        from balancing.plots.tolerances import residuals
 
         figure = Figure(figsize=(11, 7.5), layout="constrained")
         plots.corrections(self.result, figure.add_subplot(1, 2, 1, projection="polar"))
@@ -129,7 +131,7 @@ class Report:
 
     def _stack(self, job: Job, planes: tuple[str, ...]) -> tuple[Any, Any, Any]:
         """W (N, P), Y (N,) and row weights (N,) of the speeds used."""
-        from balancing.baseline import match_speeds
+        from balancing.coefficients.baseline import match_speeds
 
         at = match_speeds(self.result.speeds, self.influence.speeds)
         columns = [self.influence.planes.index(p) for p in planes]

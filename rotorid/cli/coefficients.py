@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from balancing import Influence, Trials
-    from balancing.subset import Subsets
+    from balancing.correction.subsets import Subsets
     from rotorid.tables import Job
 
 
@@ -36,7 +36,7 @@ def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bo
         Where the runs do not determine the coefficients.
     """
     from balancing import estimate_influence
-    from balancing.combine import combine
+    from balancing.coefficients.combine import combine
 
     has_trials = bool(job.trials.weights.any())
     if kind is None:
@@ -63,7 +63,7 @@ def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bo
 def _refined(job: Job, kind: str) -> Chosen:
     """From trial runs and check runs together."""
     from balancing import correct, estimate_influence
-    from balancing.refine import refine
+    from balancing.correction.refine import refine
 
     if job.check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
@@ -86,8 +86,8 @@ def compare_planes(
     row_weights: FloatArray | None,
 ) -> Subsets:
     """Compare all choices of k of these planes, without limits."""
-    from balancing.baseline import match_speeds, starting_point
-    from balancing.subset import best_subsets
+    from balancing.coefficients.baseline import match_speeds, starting_point
+    from balancing.correction.subsets import best_subsets
 
     influence = chosen.influence
     if unknown := [p for p in planes if p not in influence.planes]:
@@ -116,7 +116,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     """
     from dataclasses import replace
 
-    from balancing.modelled import model_influence
+    from balancing.coefficients.from_model import model_influence
     from rotorid.tables.units import weight
 
     if job.rotor is None:

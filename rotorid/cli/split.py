@@ -176,7 +176,7 @@ def split(
 
     rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
-    from balancing.mounting import combine, trim
+    from balancing.mounting.hand_mounting import combine, trim
     from rotorid.cli import split_answers as answers
     from rotorid.cli.amounts import length_of, vectors_of
     from rotorid.cli.split_holes import read_holes

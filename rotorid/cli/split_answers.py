@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from balancing.holes import Holes, Mounting
-    from balancing.labels import Labels
-    from balancing.mounting import TwoPositions
-    from balancing.removal import Drilling
-    from balancing.split import Split
+    from balancing.data.conventions import Labels
+    from balancing.mounting.hand_mounting import TwoPositions
+    from balancing.mounting.holes import Holes, Mounting
+    from balancing.mounting.removal import Drilling
+    from balancing.mounting.split import Split
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Wanted:
 
 def on_holes(wanted: Wanted, holes: Holes, most_pieces: int | None, good_enough: float) -> Answer:
     """The nearest vector in the holes."""
-    from balancing.split import fewer_pieces, split
+    from balancing.mounting.split import fewer_pieces, split
 
     if not 0 <= good_enough <= 100:
         raise ValueError(f"--good-enough: {good_enough:g} is no error from 0 to 100 percent")
@@ -97,7 +97,7 @@ def on_holes(wanted: Wanted, holes: Holes, most_pieces: int | None, good_enough:
 
 
 def _holes_text(wanted: Wanted, found: Split, fewer: list[Split]) -> str:
-    from balancing.split import percent
+    from balancing.mounting.split import percent
 
     lines = [found.summary(wanted.labels)]
     if fewer:
@@ -110,7 +110,7 @@ def _holes_text(wanted: Wanted, found: Split, fewer: list[Split]) -> str:
 
 def at_two_angles(wanted: Wanted, two: str) -> Answer:
     """Two fixed weights at free angles."""
-    from balancing.mounting import two_positions
+    from balancing.mounting.hand_mounting import two_positions
 
     masses = weights_of(two, "--two", wanted.labels, wanted.radius)
     if len(masses) != 2:
@@ -175,7 +175,7 @@ def drilled(
     spacing: float | None,
 ) -> Answer:
     """Holes drilled opposite to the weight."""
-    from balancing.removal import Drill, drill_holes
+    from balancing.mounting.removal import Drill, drill_holes
 
     unbalance, radius = unbalance_of(wanted, "--drill")
     tool = Drill(
@@ -241,7 +241,7 @@ def _drilling_text(wanted: Wanted, found: Drilling) -> str:
 
 def ground(wanted: Wanted) -> Answer:
     """Material ground off opposite to the weight."""
-    from balancing.removal import grind
+    from balancing.mounting.removal import grind
 
     unbalance, radius = unbalance_of(wanted, "--grind")
     found = grind(unbalance, radius)
@@ -263,8 +263,8 @@ def ground(wanted: Wanted) -> Answer:
 
 def as_one(wanted: Wanted, step: str | None, angle_step: float) -> Answer:
     """One weight, rounded to what a scale and marks show."""
-    from balancing.mounting import rounded
-    from balancing.split import percent
+    from balancing.mounting.hand_mounting import rounded
+    from balancing.mounting.split import percent
 
     if not 0 <= angle_step <= 360:
         raise ValueError(f"--angle-step: {angle_step:g} is no step of an angle, 0 to 360 degrees")
@@ -304,7 +304,7 @@ def _figure(
     """A disc for each of several ways to place weights."""
     from matplotlib.figure import Figure
 
-    from balancing.plots_discs import disc, seen_from
+    from balancing.plots.discs import disc, seen_from
 
     ways = loose or ((),)
     fig = Figure(figsize=(4.6 * len(ways) + 0.4, 5.6), layout="constrained")

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from balancing.holes import Holes, equal_holes, from_list
-from balancing.labels import Labels
+from balancing.data.conventions import Labels
+from balancing.mounting.holes import Holes, equal_holes, from_list
 from rotorid.cli.amounts import degrees, inside, weight_of, weights_of
 
 _APART = 1e-3

@@ -12,7 +12,7 @@ from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targe
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from balancing.tolerance import Tolerance
+    from balancing.iso21940 import Tolerance
     from rotorid.tables.units import Unit
 
 
@@ -54,7 +54,7 @@ def tolerance(
     Example: rotorid tolerance --mass 500kg --speed 3000rpm --grade G2.5
     --planes left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm --plot tolerance.png
     """
-    from balancing.tolerance import tolerance as permissible
+    from balancing.iso21940 import tolerance as permissible
     from rotorid.tables import units
 
     check_targets(plot, output)
@@ -153,6 +153,6 @@ def two_positions(text: str) -> tuple[float, float]:
 
 
 def _figure(found: Tolerance) -> Figure:
-    from balancing.plots_tolerance import polar_figure
+    from balancing.plots.tolerances import polar_figure
 
     return polar_figure(found.plot)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from balancing.labels import Labels
+    from balancing.data.conventions import Labels
     from balancing.trial_angle import Lag
     from balancing.trial_result import TrialWeight
 
@@ -174,7 +174,7 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
     """Without a job: amount from the load, angle from the phase and the lag."""
     from math import inf, radians
 
-    from balancing.labels import Labels
+    from balancing.data.conventions import Labels
     from balancing.trial_weight import trial_from_force
     from rotorid.tables import units
     from rotorid.tables.conventions import Conventions, as_angles, as_phase
@@ -218,7 +218,7 @@ def _from_job(
     """With a job: amount and angle from its coefficients, one weight for each plane asked for."""
     from math import inf
 
-    from balancing.baseline import starting_point
+    from balancing.coefficients.baseline import starting_point
     from balancing.trial_weight import GRAVITY, trial_from_coefficients
     from rotorid.cli.coefficients import choose
     from rotorid.tables import read_job, units

@@ -84,7 +84,7 @@ def unbalance(
 def _estimate(
     job: Job, stations: str, method: str, modes: int | None, ridge: float | None, model_error: float | None
 ) -> Unbalance:
-    from balancing.modelled import modal_shapes
+    from balancing.coefficients.from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
     from rotorid.cli.coefficients import computed
 

@@ -11,9 +11,9 @@ from rotorid.cli.tolerance import plane_positions, quantity, speed_with_unit, tw
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
-    from balancing.mounted import Mounted
-    from balancing.tolerance import Tolerance
-    from balancing.verdict import Verdict
+    from balancing.correction.verdict import Verdict
+    from balancing.iso21940 import Tolerance
+    from balancing.mounting.mounted import Mounted
     from rotorid.tables import Job
 
 
@@ -36,7 +36,7 @@ def tolerance_of(
     ValueError
         For some of the options only, more than two planes, and values that cannot be.
     """
-    from balancing.tolerance import tolerance
+    from balancing.iso21940 import tolerance
     from rotorid.tables import units
 
     along = (places.positions, places.bearings, places.centre)
@@ -66,7 +66,7 @@ def judge(
     result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
-    from balancing.verdict import verdict_of_check, verdict_of_prediction
+    from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
     from rotorid.tables.units import weight
 
     limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from balancing import Correction, Influence
-    from balancing.mounted import Mounted
-    from balancing.verdict import Verdict
+    from balancing.correction.verdict import Verdict
+    from balancing.mounting.mounted import Mounted
     from rotorid.tables import Job
 
 RUNS_ABREAST = 4

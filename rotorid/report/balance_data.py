@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction import region_radius
-from balancing.sheet import HELD
+from balancing.correction.correct import region_radius
+from balancing.correction.correction_text import HELD
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
 from rotorid.base.units import rpm
@@ -16,8 +16,8 @@ from rotorid.tables import units
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
-    from balancing.mounted import Mounted
-    from balancing.trials import Trials
+    from balancing.data.trials import Trials
+    from balancing.mounting.mounted import Mounted
     from rotorid.tables import Job
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Correction
-    from balancing.holes import Holes
-    from balancing.mounted import Mounted
+    from balancing.mounting.holes import Holes
+    from balancing.mounting.mounted import Mounted
 
 ROWS_SHOWN = 60
 """Readings in one figure; beyond that the largest ones are shown."""
@@ -50,7 +50,7 @@ def plane_figure(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from balancing.plots_discs import disc
+    from balancing.plots.discs import disc
 
     p = result.planes.index(plane)
     labels = replace(result.labels, weight_unit=weight_words(result.labels.weight_unit))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from balancing.labels import Labels
+    from balancing.data.conventions import Labels
 
 _SAMPLE = 60.0
 """Angle, degrees, of the weight and of the phase that the figures show."""

@@ -8,10 +8,10 @@ from typing import cast
 
 import numpy as np
 
-from balancing.labels import Angles as Angles
-from balancing.labels import Labels, Rotation, View, check_turning
-from balancing.labels import Phase as Phase
-from balancing.trials import ReadingErrors
+from balancing.data.conventions import Angles as Angles
+from balancing.data.conventions import Labels, Rotation, View, check_turning
+from balancing.data.conventions import Phase as Phase
+from balancing.data.trials import ReadingErrors
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from balancing.influence import Influence
-from balancing.labels import Labels
-from balancing.trials import Trials
+from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
+from balancing.data.trials import Trials
 from fem.sensors import label
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean

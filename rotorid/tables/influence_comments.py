@@ -8,10 +8,10 @@ from typing import NamedTuple, get_args
 
 import numpy as np
 
-from balancing.errors import Source
-from balancing.influence import Influence
-from balancing.labels import Labels
-from balancing.trials import ReadingErrors
+from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
+from balancing.data.errors import Source
+from balancing.data.trials import ReadingErrors
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.columns import Table

@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from balancing.influence import Influence
-from balancing.labels import Labels
+from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.tables.columns import Column, Table, must_be
 from rotorid.tables.grid import Grid, show

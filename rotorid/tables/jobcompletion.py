@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.trials import Trials
+from balancing.data.trials import Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables import units

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from balancing.holes import Holes
-from balancing.influence import Influence
-from balancing.limits import Limits
-from balancing.trials import Trials
+from balancing.coefficients.influence import Influence
+from balancing.data.limits import Limits
+from balancing.data.trials import Trials
+from balancing.mounting.holes import Holes
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.tables.conventions import Conventions
 from rotorid.tables.grid import Grid

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.holes import Holes, from_list
-from balancing.labels import Labels
-from balancing.limits import Arc, Limits
+from balancing.data.conventions import Labels
+from balancing.data.limits import Arc, Limits
+from balancing.mounting.holes import Holes, from_list
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables import units
 from rotorid.tables.jobquantity import (

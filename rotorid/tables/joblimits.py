@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.limits import Arc, Limits
-from balancing.trials import Trials
+from balancing.data.limits import Arc, Limits
+from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

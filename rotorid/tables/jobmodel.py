@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.trials import Trials
+from balancing.data.trials import Trials
 from fem.sensors import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

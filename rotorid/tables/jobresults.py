@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
-from balancing.influence import Influence
+from balancing.coefficients.influence import Influence
 from rotorid.tables.grid import Cell
 from rotorid.tables.influence import influence_frame, labels_of
 from rotorid.tables.influence_comments import PHASE_MEANING

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from balancing.labels import Angles, Phase
+from balancing.data.conventions import Angles, Phase
 from rotorid.tables.conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from balancing.labels import Labels
-from balancing.trials import ReadingErrors, Trials
+from balancing.data.conventions import Labels
+from balancing.data.trials import ReadingErrors, Trials
 from rotorid.tables.conventions import DEFAULT_TOLERANCE, Angles, Conventions, Phase, StatedErrors
 from rotorid.tables.grid import Grid
 from rotorid.tables.problems import Problems

@@ -1,0 +1,138 @@
+"""Whether runs that should show the same vibration do: runs with the same weights mounted."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from balancing.data.errors import ErrorModel, reading_covariance
+from balancing.data.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+
+LEVEL = 0.99
+NOTICEABLE_AMPLITUDE, NOTICEABLE_PHASE = 0.10, np.deg2rad(10)
+"""Without known errors, readings of one state of the rotor that differ by more deserve a question."""
+
+
+class Difference(NamedTuple):
+    """Two runs that should agree and do not: names, and how large the difference is, in words."""
+
+    first: str
+    second: str
+    words: str
+
+
+def same_state(weights: ComplexArray) -> list[list[int]]:
+    """Groups of two or more runs with the same weights mounted; weights (R, P)."""
+    scale = np.abs(weights).max(initial=0.0) or 1.0
+    groups: dict[tuple[complex, ...], list[int]] = defaultdict(list)
+    for r, row in enumerate(np.round(weights / scale, 9) + 0.0):
+        groups[tuple(row)].append(r)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def differences(trials: Trials, model: ErrorModel, largest: bool = False) -> list[Difference]:
+    """Runs with the same weights mounted whose readings differ, the worst pair of each group.
+
+    Parameters
+    ----------
+    trials
+        The runs.
+    model
+        Errors of a reading: where they are known, a χ² test (F where they are estimated) at 99 %.
+    largest
+        Without known errors: compare with the largest reading of all (10 %), instead of each with its own
+        (10 % of its amplitude or 10°, for readings of at least a tenth of the group's largest at a speed).
+    """
+    found = []
+    for group in same_state(trials.weights):
+        pair = (
+            _beyond_errors(trials, group, model)
+            if model.errors is not None
+            else _noticeable(trials, group, largest=largest)
+        )
+        if pair is not None:
+            found.append(pair)
+    return found
+
+
+def describe(found: Sequence[Difference]) -> tuple[str, ...]:
+    """The question to ask about each difference."""
+    return tuple(
+        f"runs {d.first!r} and {d.second!r} have the same weights mounted but differ by {d.words}; "
+        "is a row missing in the weights table?"
+        for d in found
+    )
+
+
+def _noticeable(trials: Trials, group: list[int], *, largest: bool) -> Difference | None:
+    Y = trials.mean
+    worst, pair = 0.0, None
+    top = np.abs(Y).max() if largest else np.abs(Y[group]).max(axis=(0, 2))[:, None]
+    for k, a in enumerate(group):
+        for b in group[k + 1 :]:
+            larger = np.maximum(np.abs(Y[a]), np.abs(Y[b]))
+            change = np.abs(Y[a] - Y[b])
+            if largest:
+                share = change / (top or 1.0)
+                counts = share > NOTICEABLE_AMPLITUDE
+            else:
+                share = change / np.where(larger > 0, larger, 1.0)
+                amplitude = np.abs(np.abs(Y[a]) - np.abs(Y[b])) > NOTICEABLE_AMPLITUDE * larger
+                phase = np.abs(np.angle(Y[a] * np.conj(Y[b]))) > NOTICEABLE_PHASE
+                counts = (amplitude | phase) & (larger > 0.1 * top)
+            if counts.any() and share[counts].max() > worst:
+                worst, pair = float(share[counts].max()), (a, b)
+    if pair is None:
+        return None
+    of = " of the largest reading" if largest else ""
+    return Difference(trials.runs[pair[0]], trials.runs[pair[1]], f"{100 * worst:.2g} %{of}")
+
+
+def _beyond_errors(trials: Trials, group: list[int], model: ErrorModel) -> Difference | None:
+    """χ² of the readings around their mean, with the mean covariance of the group."""
+    assert model.errors is not None
+    Y, repeats = trials.mean[group], trials.repeats[group]
+    each = reading_covariance(Y, both_directions(model.errors))
+    root = _inverse_root(each.mean(axis=0))  # (S, C, 2, 2), zero where every reading is
+    mean = np.sum(Y * repeats, axis=0) / repeats.sum(axis=0)
+    deviation = Y - mean
+    vector = np.stack((deviation.real, deviation.imag), axis=-1) * np.sqrt(repeats)[..., None]
+    squares = np.sum(np.einsum("scij,rscj->rsci", root, vector) ** 2, axis=-1)
+    dof = 2 * (len(group) - 1) * int(np.count_nonzero(root.any(axis=(-2, -1))))
+    chi_square = float(squares.sum())
+    if dof == 0 or tail(chi_square, dof, model.dof) > 1 - LEVEL:
+        return None
+    worst, pair = -1.0, (0, 1)
+    for a in range(len(group)):
+        for b in range(a + 1, len(group)):
+            change = np.stack(((Y[a] - Y[b]).real, (Y[a] - Y[b]).imag), axis=-1)
+            share = 1 / (1 / repeats[a] + 1 / repeats[b])
+            size = float(np.sum(np.einsum("scij,scj->sci", root, change) ** 2 * share[..., None]))
+            if size > worst:
+                worst, pair = size, (a, b)
+    words = f"{np.sqrt(chi_square / dof):.2g} times the errors of the readings"
+    return Difference(trials.runs[group[pair[0]]], trials.runs[group[pair[1]]], words)
+
+
+def both_directions(errors: ReadingErrors) -> ReadingErrors:
+    """The errors with one for each direction: an error that is not stated is hardly zero."""
+    return replace(errors, amplitude=errors.amplitude or errors.phase, phase=errors.phase or errors.amplitude)
+
+
+def tail(chi_square: float, n: int, dof: int | None) -> float:
+    """Probability of a larger χ² with n degrees of freedom; of F where the errors have `dof` themselves."""
+    from scipy.special import chdtrc, fdtrc
+
+    return float(chdtrc(n, chi_square) if dof is None else fdtrc(n, dof, chi_square / n))
+
+
+def _inverse_root(covariance: FloatArray) -> FloatArray:
+    """A with Aᵀ A = C⁻¹ for 2 × 2 blocks, zero where C is."""
+    values, vectors = np.linalg.eigh(covariance)
+    inverse = np.where(values > 0, 1 / np.sqrt(np.where(values > 0, values, 1.0)), 0.0)
+    return np.asarray(inverse[..., :, None] * np.swapaxes(vectors, -1, -2))

@@ -1,0 +1,134 @@
+"""Whether the trial weights did enough, and whether the runs agree with each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.data.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import stretch
+
+LEVEL = 0.95
+ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)
+"""A good trial weight changes a reading by 30 % of its amplitude or by 30°."""
+
+_UNCHANGED = 1e-9
+
+
+def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None) -> None:
+    """Refuse a trial weight that changed nothing.
+
+    Parameters
+    ----------
+    trials
+        The runs.
+    W
+        Coefficients (S, C, P).
+    covariance
+        Of (Y₀, W₁, …) of each channel, shape (S, C, 2P + 2, 2P + 2), or None.
+
+    Raises
+    ------
+    UndeterminedError
+        Naming plane and run, where every reading is unchanged (1e-9), or where the changes lie within the
+        errors: at 95 % over all sensors and speeds, and at 99 % for each of them (with as many chances as
+        there are readings). Estimated errors count like stated ones here: a few repeats must not refuse a job
+        that would pass without them.
+    """
+    size = np.abs(trials.mean).max(axis=0)
+    for p, plane in enumerate(trials.planes):
+        run = int(np.argmax(np.abs(trials.weights[:, p])))
+        words = f"the trial weight in plane {plane!r} (run {trials.runs[run]!r})"
+        change = np.abs(W[..., p] * trials.weights[run, p])
+        if (change <= _UNCHANGED * size).all():
+            raise UndeterminedError(
+                f"{words} changed no reading: its effect is not determined; "
+                "check that it was mounted and that the run was measured anew"
+            )
+        own = slice(2 + 2 * p, 4 + 2 * p)
+        if covariance is not None and not _significant(W[..., p], covariance[..., own, own]):
+            raise UndeterminedError(
+                f"{words} changed the readings by no more than their errors explain: its effect is not "
+                "determined; repeat the run with a larger trial weight"
+            )
+
+
+def _significant(w: ComplexArray, covariance: FloatArray) -> bool:
+    block = covariance.reshape(-1, 2, 2)
+    v = stretch(w.ravel()).reshape(-1, 2)
+    trace = np.trace(block, axis1=1, axis2=2)
+    known = trace > 0
+    if not known.any():
+        return True
+    # errors in one direction only make a block singular
+    block = block[known] + 1e-9 * trace[known, None, None] * np.eye(2)
+    each = np.einsum("ni,nij,nj->n", v[known], np.linalg.inv(block), v[known])
+    n = len(each)
+    if _tail(float(each.sum()), 2 * n) < 1 - LEVEL:
+        return True
+    return n * _tail(float(each.max()), 2) < 0.01
+
+
+def _tail(chi_square: float, n: int) -> float:
+    """Probability of a larger value of χ² with n degrees of freedom."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(n, chi_square))
+
+
+def weak_trials(trials: Trials, W: ComplexArray) -> tuple[str, ...]:
+    """Warn of planes whose trial weights changed no reading by 30 % or by 30°, the engineers' rule."""
+    warnings = []
+    for p, plane in enumerate(trials.planes):
+        runs = np.flatnonzero(trials.weights[:, p])
+        amplitude, phase = 0.0, 0.0
+        for r in runs:
+            change = W[..., p] * trials.weights[r, p]
+            reading = trials.mean[r]
+            before = reading - change
+            seen = np.abs(before) > _UNCHANGED * np.abs(change)
+            if not seen.all():
+                amplitude = np.inf  # from rest to something
+            ratio = reading[seen] / before[seen]
+            amplitude = max(amplitude, float(np.max(np.abs(np.abs(ratio) - 1), initial=0.0)))
+            phase = max(phase, float(np.max(np.abs(np.angle(ratio)), initial=0.0)))
+        if amplitude < ENGINEERS_AMPLITUDE and phase < ENGINEERS_PHASE:
+            warnings.append(
+                f"the trial weight in plane {plane!r} changed no reading by 30 % or 30° "
+                f"(at most {100 * amplitude:.2g} % and {np.degrees(phase):.2g}°): a larger one would make "
+                "the corrections more certain"
+            )
+    return tuple(warnings)
+
+
+def check_consistency(
+    trials: Trials, A: ComplexArray, theta: ComplexArray, covariance: FloatArray
+) -> tuple[str, ...]:
+    """Warn where runs disagree with each other by more than the stated errors explain (χ², 99 %).
+
+    Parameters
+    ----------
+    trials
+        The runs, more than baseline and planes need.
+    A
+        (1 T), shape (R, P + 1).
+    theta
+        (Y₀, W₁, …), shape (S, C, P + 1).
+    covariance
+        Of the mean readings, shape (R, S, C, 2, 2).
+    """
+    residual = trials.mean - np.einsum("rp,scp->rsc", A, theta)
+    variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
+    known = variance > 0
+    R, n = A.shape
+    dof = 2 * (R - n) * int(np.count_nonzero(known.any(axis=0)))
+    chi_square = float(np.sum(np.abs(residual[known]) ** 2 / variance[known]))
+    if dof == 0 or _tail(chi_square, dof) > 0.01:
+        return ()
+    worst = np.sum(np.abs(residual) ** 2 / np.where(known, variance, np.inf), axis=(1, 2))
+    return (
+        f"the runs disagree by {np.sqrt(chi_square / dof):.2g} times the stated errors, most of all in run "
+        f"{trials.runs[int(np.argmax(worst))]!r}: the rotor does not repeat itself or is not linear, "
+        "or the errors are larger than stated",
+    )

@@ -1,0 +1,328 @@
+"""Whether a check run shows what was predicted: the difference against the errors of both.
+
+A reading in a check run with weights T mounted is predicted as Y₀ + W T. It differs from that by the errors
+of the prediction, dY₀ + dW T, and by its own, which repeated readings reduce. At given T these errors are
+independent from reading to reading (`balancing.solvers.error_propagation`); two check runs share those of the
+prediction, so all runs of one sensor and speed have one common covariance
+
+    V = B Σ Bᵀ + diag(own covariances),    B = rows (1, T_run) stretched, Σ = covariance of (Y₀, W),
+
+and χ² = Σ dᵀ V⁻¹ d over sensors and speeds has 2 × runs × sensors × speeds degrees of freedom. Where the
+errors are estimates with ν degrees of freedom, χ²/n is compared with Fisher's F(n, ν).
+
+Existing unbalance, wherever it sits, is in Y₀ and explains no difference in a linear rotor. A difference
+that the errors do not explain means that something changed or is not linear; what a change of the weights
+in the correction planes explains is found by fitting d = W δ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.coefficients.baseline import match_speeds, starting_point
+from balancing.coefficients.influence import Influence
+from balancing.coefficients.repeatability import both_directions, tail
+from balancing.correction.correct import Correction
+from balancing.data.conventions import Labels
+from balancing.data.errors import error_model, reading_covariance, symmetric
+from balancing.data.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+LEVEL = 0.95
+"""A difference whose χ² would be exceeded by errors alone in less than 5 % of all jobs is not explained."""
+
+_EXACT = 1e-9
+"""Nothing is known better than this share of the largest reading."""
+
+
+@dataclass(frozen=True, eq=False)
+class CheckComparison:
+    """Readings of R check runs beside their prediction.
+
+    Attributes
+    ----------
+    runs, sensors, planes
+        Names, lengths R, C and P.
+    speeds
+        rad/s, shape (S,), those of the check runs.
+    weights
+        What was mounted, for the bare rotor, shape (R, P).
+    as_proposed
+        Whether these are the proposed corrections (the check runs do not say what was mounted).
+    before, predicted, achieved
+        Vibration of the bare rotor (S, C), and with `weights` mounted: predicted and read (mean of the
+        repeats), shape (R, S, C).
+    covariance
+        Of achieved − predicted, real and imaginary part, (R, S, C, 2, 2); None where errors are unknown.
+    distance
+        Of each difference from zero in its standard deviations (a radius in two dimensions: 95 % of all lie
+        below 2.45 where errors are stated), (R, S, C); None where errors are unknown.
+    chi_square, n
+        Of all differences, and its degrees of freedom; chi_square None where errors are unknown.
+    dof
+        Degrees of freedom of the errors; None for stated ones.
+    probability
+        That errors alone make a larger χ²; None where they are unknown.
+    explained
+        Whether the errors explain the differences at 95 %; None where they are unknown.
+    change
+        Weights (P,) in the correction planes that would cause the differences, within the errors, in
+        addition to `weights`; None where the differences are explained, or no such weights explain them.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    runs: tuple[str, ...]
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    speeds: FloatArray
+    weights: ComplexArray
+    as_proposed: bool
+    before: ComplexArray
+    predicted: ComplexArray
+    achieved: ComplexArray
+    covariance: FloatArray | None
+    distance: FloatArray | None
+    chi_square: float | None
+    n: int
+    dof: int | None
+    probability: float | None
+    explained: bool | None
+    change: ComplexArray | None
+    labels: Labels
+    warnings: tuple[str, ...]
+
+    @property
+    def difference(self) -> ComplexArray:
+        """Achieved − predicted, shape (R, S, C)."""
+        return np.asarray(self.achieved - self.predicted)
+
+    @property
+    def improvement_predicted(self) -> float | None:
+        """Rms before by rms predicted; None where nothing should be left."""
+        return _factor(self.before, self.predicted)
+
+    @property
+    def improvement_achieved(self) -> float | None:
+        """Rms before by rms achieved; None where nothing was left."""
+        return _factor(self.before, self.achieved)
+
+    @property
+    def worst(self) -> tuple[int, int, int]:
+        """Run, speed and sensor of the reading that differs most: in its errors, or in size without them."""
+        size = np.abs(self.difference) if self.distance is None else self.distance
+        r, s, c = np.unravel_index(int(np.argmax(size)), size.shape)
+        return int(r), int(s), int(c)
+
+    @property
+    def verdict(self) -> str:
+        """One or two sentences: whether the errors explain the differences, and what else may."""
+        from balancing.correction.check_text import verdict
+
+        return verdict(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        from balancing.correction.check_text import check_dict
+
+        return check_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.to_dict()["readings"]).drop(columns="covariance")
+        return frame.astype({"distance": float})
+
+    def summary(self) -> str:
+        """Text of 80 columns: warnings, verdict, readings beside the prediction, improvement."""
+        from balancing.correction.check_text import summary
+
+        return summary(self)
+
+
+def compare_check(
+    correction: Correction,
+    check: Trials,
+    influence: Influence,
+    baseline: Trials | ArrayLike | None = None,
+) -> CheckComparison:
+    """Compare check runs with what the influence coefficients predict for them.
+
+    Parameters
+    ----------
+    correction
+        The proposed weights. They count as mounted, and nothing else, if the check runs have no planes.
+    check
+        Readings, of some or all sensors and speeds of the coefficients; its weights, if it has planes, are
+        all that was mounted in each run.
+    influence, baseline
+        As they were given to `balancing.correct`.
+
+    Returns
+    -------
+    CheckComparison
+        Without a verdict where the errors of the readings are unknown.
+
+    Raises
+    ------
+    ValueError
+        For sensors, speeds or planes without coefficients, and a baseline that does not fit.
+    """
+    start = starting_point(influence, baseline)
+    at = match_speeds(check.speeds, influence.speeds)
+    sensors = [_index(name, influence.sensors, "sensor") for name in check.sensors]
+    pick = np.ix_(at, sensors)
+    T, planes = _mounted(correction, check, influence)
+    W, before = influence.W[pick], start.readings[pick]  # (S, C, P), (S, C)
+    predicted = before + np.einsum("scp,rp->rsc", W, T)
+    achieved = check.mean
+    own = error_model(check)
+    # repeats of the check runs themselves tell most about their errors
+    by_repeats = own.source in ("repeats", "stated, enlarged by repeats")
+    errors, dof = start.model.errors, start.model.dof
+    warnings = check.warnings + (own.warnings if by_repeats else ())
+    covariance = distance = chi_square = probability = explained = change = None
+    if errors is not None and start.covariance is not None:
+        degrees = [d for d in (dof, own.dof if by_repeats else None) if d is not None]
+        dof = min(degrees, default=None)
+        used = own.errors if by_repeats and own.errors is not None else errors
+        V = _joint_covariance(T, start.covariance[pick], predicted, check, used, np.abs(before).max())
+        R = len(check.runs)
+        blocks = V.reshape(*V.shape[:2], R, 2, R, 2)
+        covariance = np.moveaxis(np.einsum("scrarb->scrab", blocks), 2, 0)
+        d = _vectors(achieved - predicted)
+        distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, _solve(covariance, d)))
+        stacked = np.moveaxis(d, 0, 2).reshape(*V.shape[:2], 2 * R)
+        chi_square = float(np.sum(stacked * _solve(V, stacked)))
+        probability = tail(chi_square, stacked.size, dof)
+        explained = probability >= 1 - LEVEL
+        change = None if explained else _change(W, stacked, V, dof)
+        if influence.covariance is None:
+            warnings += (
+                "the errors of the influence coefficients are not known: the prediction is less certain "
+                "than it seems here",
+            )
+    return CheckComparison(
+        runs=check.runs,
+        sensors=check.sensors,
+        planes=planes,
+        speeds=influence.speeds[at],
+        weights=T,
+        as_proposed=not check.planes,
+        before=before,
+        predicted=predicted,
+        achieved=achieved,
+        covariance=covariance,
+        distance=distance,
+        chi_square=chi_square,
+        n=2 * achieved.size,
+        dof=dof,
+        probability=probability,
+        explained=explained,
+        change=change,
+        labels=start.labels,
+        warnings=warnings,
+    )
+
+
+def _mounted(
+    correction: Correction, check: Trials, influence: Influence
+) -> tuple[ComplexArray, tuple[str, ...]]:
+    """Weights (R, P) in the planes of the coefficients during the check runs, and the names of the planes."""
+    T = np.zeros((len(check.runs), len(influence.planes)), dtype=complex)
+    if check.planes:
+        for p, plane in enumerate(check.planes):
+            if plane not in influence.planes and not check.weights[:, p].any():
+                continue
+            T[:, _index(plane, influence.planes, "plane")] = check.weights[:, p]
+    else:
+        for plane, weight in zip(correction.planes, correction.weights, strict=True):
+            T[:, _index(plane, influence.planes, "plane")] = weight
+    return T, influence.planes
+
+
+def _index(name: str, names: tuple[str, ...], what: str) -> int:
+    if name not in names:
+        raise ValueError(
+            f"there are no coefficients of {what} {name!r}, which the check run has; there are some of "
+            f"{', '.join(map(repr, names))}"
+        )
+    return names.index(name)
+
+
+def _joint_covariance(
+    T: ComplexArray,
+    channels: FloatArray,
+    predicted: ComplexArray,
+    check: Trials,
+    errors: ReadingErrors,
+    largest: float,
+) -> FloatArray:
+    """Covariance (S, C, 2R, 2R) of all differences of each sensor and speed."""
+    R, S, C = predicted.shape
+    factors = np.column_stack((np.ones(R), T))
+    B = np.empty((R, 2, factors.shape[1], 2))
+    B[:, 0, :, 0] = B[:, 1, :, 1] = factors.real
+    B[:, 0, :, 1] = -factors.imag
+    B[:, 1, :, 0] = factors.imag
+    rows = B.reshape(2 * R, -1)
+    V = np.asarray(rows @ channels @ rows.T)
+    own = reading_covariance(predicted, both_directions(errors)) / check.repeats[..., None, None]
+    own += (_EXACT * largest) ** 2 * np.eye(2)
+    blocks = V.reshape(S, C, R, 2, R, 2)
+    for r in range(R):
+        blocks[:, :, r, :, r, :] += own[r]
+    return symmetric(V)
+
+
+def _change(W: ComplexArray, d: FloatArray, V: FloatArray, dof: int | None) -> ComplexArray | None:
+    """Weights δ (P,), the same in all runs, for which W δ explains the differences; None if none do.
+
+    Generalised least squares over the stretched channels: minimises Σ (d − A δ)ᵀ V⁻¹ (d − A δ) with A the
+    stretched row of W repeated for every run.
+    """
+    S, C, P = W.shape
+    n = d.shape[-1]
+    rows = d.size - 2 * P
+    if rows <= 0:
+        return None
+    A = np.empty((S, C, 2, P, 2))
+    A[..., 0, :, 0] = A[..., 1, :, 1] = W.real
+    A[..., 0, :, 1] = -W.imag
+    A[..., 1, :, 0] = W.imag
+    stacked = np.tile(A.reshape(S, C, 2, 2 * P), (1, 1, n // 2, 1))
+    root = np.linalg.cholesky(V)
+    white = np.linalg.solve(root, stacked).reshape(-1, 2 * P)
+    target = np.linalg.solve(root, d[..., None]).ravel()
+    scale = np.linalg.norm(white, axis=0)
+    scale[scale == 0] = 1.0
+    solution = np.linalg.lstsq(white / scale, target, rcond=1e-10)[0] / scale
+    chi_square = float(np.sum((target - white @ solution) ** 2))
+    if tail(chi_square, rows, dof) < 1 - LEVEL:
+        return None
+    return np.asarray(solution[::2] + 1j * solution[1::2])
+
+
+def _solve(covariance: FloatArray, vectors: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.solve(covariance, vectors[..., None])[..., 0])
+
+
+def _vectors(z: ComplexArray) -> FloatArray:
+    return np.stack((z.real, z.imag), axis=-1)
+
+
+def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
+    """Ratio of root mean squares; None where nothing but rounding is left."""
+    old, new = (float(np.sqrt(np.mean(np.abs(z) ** 2))) for z in (before, after))
+    return None if new <= 1e-12 * old else old / new

@@ -1,0 +1,379 @@
+"""Correction weights: D minimises |Y₀ + W D| over all sensors and speeds ([S] (28)–(40), Den Hartog)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.coefficients.baseline import match_speeds, starting_point
+from balancing.coefficients.identifiability import check_planes, check_resolution
+from balancing.coefficients.influence import Influence
+from balancing.correction.choice import coefficients_of, plane_indices, rows_of
+from balancing.correction.correction_warnings import (
+    EMPTY,
+    amplitude_words,
+    binding,
+    cautions,
+    left_out,
+    reading_names,
+    weight_words,
+)
+from balancing.correction.region_coverage import optimism
+from balancing.data.conventions import Labels
+from balancing.data.errors import Source, reading_covariance
+from balancing.data.limits import Limits
+from balancing.data.trials import ReadingErrors, Trials
+from balancing.solvers.conditioning import conditioning
+from balancing.solvers.error_propagation import prediction_covariance
+from balancing.solvers.methods import Stack, fit_weights
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import coverage_factor
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """Weights to mount, and the vibration they should leave.
+
+    Attributes
+    ----------
+    speeds, sensors, planes
+        rad/s (S,), names (C) and (P).
+    weights
+        Total correction weights for the bare rotor (every weight of the runs removed), angle with the
+        rotation, shape (P,).
+    before, after
+        Vibration of the bare rotor and its prediction with the corrections mounted, shape (S, C).
+    covariance
+        Of (Re D₁, Im D₁, …), shape (2P, 2P); None where errors are unknown.
+    after_covariance
+        Of a reading in a check run around its prediction, shape (S, C, 2, 2); None where errors are unknown.
+    dof
+        Degrees of freedom of the errors; None for stated ones.
+    errors, error_source
+        Of a single reading, and where they come from.
+    condition_number
+        Of the stacked, column-scaled W.
+    rank
+        Number of planes whose weights the readings determine (all, or `correct` raises).
+    method
+        "least-squares", "weighted", "minmax", "ridge" or "truncated".
+    mounted
+        Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    singular_values
+        Of the stacked, column-scaled W, largest first.
+    gap
+        Certified relative distance of the objective from its optimum; None for a closed form.
+    chi_square, fit_dof
+        Of the method "weighted": how well weights in these planes explain the readings.
+    limits, active
+        What the correction had to keep to, and the limits that bind, in words.
+    remove
+        Planes where material is taken away, opposite to the weight that would be added.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    weights: ComplexArray
+    before: ComplexArray
+    after: ComplexArray
+    covariance: FloatArray | None
+    after_covariance: FloatArray | None
+    dof: int | None
+    errors: ReadingErrors | None
+    error_source: Source
+    condition_number: float
+    rank: int
+    method: str
+    mounted: tuple[str, tuple[str, ...], ComplexArray] | None
+    labels: Labels
+    warnings: tuple[str, ...]
+    singular_values: FloatArray
+    gap: float | None = None
+    chi_square: float | None = None
+    fit_dof: int | None = None
+    limits: Limits | None = None
+    active: tuple[str, ...] = ()
+    remove: tuple[str, ...] = ()
+
+    @property
+    def plane_covariance(self) -> FloatArray | None:
+        """Covariance (P, 2, 2) of each plane's weight; None where errors are unknown."""
+        if self.covariance is None:
+            return None
+        P = len(self.planes)
+        return np.asarray(np.einsum("papb->pab", self.covariance.reshape(P, 2, P, 2)))
+
+    @property
+    def mass_std(self) -> FloatArray | None:
+        """Standard deviation (P,) of the weights' sizes; None where errors are unknown."""
+        return self._along(1.0)
+
+    @property
+    def angle_std(self) -> FloatArray | None:
+        """Standard deviation (P,) of the weights' angles, rad; NaN for a weight within its own error.
+
+        Within its own error is a weight whose 95 % region contains zero: its angle is not determined.
+        """
+        across, covariance = self._along(1j), self.plane_covariance
+        if across is None or covariance is None:
+            return None
+        vector = np.stack((self.weights.real, self.weights.imag), axis=-1)
+        regular = covariance + 1e-12 * np.trace(covariance, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        regular[~regular.any(axis=(1, 2))] = np.eye(2) * np.finfo(float).tiny
+        distance = np.einsum("pi,pi->p", vector, np.linalg.solve(regular, vector[..., None])[..., 0])
+        clear = (distance > region_radius(self.dof) ** 2) & (np.abs(self.weights) > 0)
+        return np.where(clear, across / np.where(clear, np.abs(self.weights), 1.0), np.nan)
+
+    def _along(self, turn: complex) -> FloatArray | None:
+        covariance = self.plane_covariance
+        if covariance is None:
+            return None
+        size = np.abs(self.weights)
+        unit = turn * np.where(size > 0, self.weights, 1.0) / np.where(size > 0, size, 1.0)
+        u = np.stack((unit.real, unit.imag), axis=-1)
+        return np.asarray(np.sqrt(np.maximum(np.einsum("pi,pij,pj->p", u, covariance, u), 0.0)))
+
+    @property
+    def coverage_factor(self) -> float | None:
+        """Half width of a 95 % interval in standard deviations; None where errors are unknown."""
+        return None if self.covariance is None else coverage_factor(self.dof)
+
+    @property
+    def to_add(self) -> ComplexArray | None:
+        """What to add to the weights mounted in the last run, one per plane of `mounted`; None without it."""
+        if self.mounted is None:
+            return None
+        _, planes, weights = self.mounted
+        total = dict(zip(self.planes, self.weights, strict=True))
+        return np.array([total.get(p, 0.0) for p in planes], dtype=complex) - weights
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        from balancing.correction.correction_text import correction_dict
+
+        return correction_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown).
+
+        Where material is taken away from a plane, `action` says so, `angle_deg` is the place to work at, and
+        `equivalent_added_deg` the angle of the added weight that would do the same.
+        """
+        import pandas as pd
+
+        left_out = ("covariance", "action", "remove_at_deg")
+        rows = [{k: v for k, v in row.items() if k not in left_out} for row in self.to_dict()["corrections"]]
+        frame = pd.DataFrame(rows)
+        if self.remove:
+            known = self.to_dict()["corrections"]
+            frame.insert(1, "action", [row["action"] for row in known])
+            frame["equivalent_added_deg"] = frame["angle_deg"]
+            frame["angle_deg"] = [
+                row["angle_deg"] if row["remove_at_deg"] is None else row["remove_at_deg"] for row in known
+            ]
+        return frame.astype({"mass_std": float, "angle_std_deg": float})
+
+    def residuals_frame(self) -> pd.DataFrame:
+        """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.to_dict()["residuals"]).drop(columns="after_covariance")
+        return frame.astype({"after_phase_deg": float})
+
+    def summary(self) -> str:
+        """Text for an engineer, 80 columns: warnings, corrections with 95 %, vibration before and after."""
+        from balancing.correction.correction_text import summary
+
+        return summary(self)
+
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
+        """Draw the corrections and the vibration before and after.
+
+        Parameters
+        ----------
+        ax
+            None: a new figure with all pictures. Polar axes: the corrections only. Other axes: the amplitudes
+            before and after only.
+
+        Returns
+        -------
+        The new figure, or `ax`.
+        """
+        from balancing.plots import polar as plots
+
+        if ax is None:
+            return plots.overview(self)
+        if ax.name == "polar":
+            return plots.corrections(self, ax)
+        return plots.amplitudes(self, ax)
+
+
+def correct(  # noqa: PLR0913
+    influence: Influence,
+    baseline: Trials | ArrayLike | None = None,
+    planes: Sequence[str] | None = None,
+    speeds: ArrayLike | None = None,
+    *,
+    refuse: bool = True,
+    method: str = "least-squares",
+    limits: Limits | None = None,
+    row_weights: ArrayLike | None = None,
+    strength: float | str | None = None,
+    keep: float | None = None,
+    remove: Sequence[str] = (),
+) -> Correction:
+    """Correction weights over all chosen sensors and speeds.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, from `estimate_influence` or stored.
+    baseline
+        Vibration to correct, where it is not that of the trial runs: new runs (what is mounted in them is
+        taken into account), or complex amplitudes of the bare rotor (S, C).
+    planes
+        Names of the planes to use; default all. The others stay empty.
+    speeds
+        rad/s, to use; default all.
+    refuse
+        Whether to refuse planes that the measured coefficients tell apart only by their errors; else that is
+        a warning. Planes that act alike exactly are always refused.
+    method
+        "least-squares"; "weighted": each reading counts by the inverse of its error, that of the coefficients
+        included (`balancing.solvers.effective_variance`); "minmax": the smallest largest amplitude.
+    limits
+        Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
+        influence coefficients.
+    row_weights
+        How much each reading counts, (S, C); default all alike.
+    strength
+        Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …), or "auto".
+    keep
+        Truncation instead: how many combinations of planes to keep (1, 2, …), or the smallest singular value
+        relative to the largest (below 1).
+    remove
+        Planes where material is taken away instead of added.
+
+    Returns
+    -------
+    Correction
+        With errors through both W and Y₀ where errors are known: of first order in closed form
+        (`balancing.solvers.error_propagation`), or from sampled readings where limits or a maximum decide.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
+        at 95 % (`balancing.coefficients.resolution`); for coefficients from runs with unknown errors above a
+        condition number of 1000, which no instrument supports.
+    ValueError
+        For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
+    """
+    start = starting_point(influence, baseline)
+    chosen = plane_indices(influence, planes)
+    used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
+    names = tuple(influence.planes[p] for p in chosen)
+    W = influence.W[used][..., chosen].reshape(-1, len(chosen))
+    Y = start.readings[used]
+    if not Y.any():
+        raise ValueError(
+            "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
+        )
+    soft = strength is not None or keep is not None
+    unclear: tuple[str, ...] = ()
+    unclear_regions: tuple[str, ...] = ()
+    if not soft:
+        check_planes(W, names)
+        coefficients = coefficients_of(influence, used, chosen)
+        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
+        if coefficients is not None and start.covariance is not None and not unclear:
+            small = optimism(W, coefficients, names, method=method)
+            unclear_regions = (small,) if small else ()
+    planes_told = conditioning(W, names)
+    errors, channels = start.model.errors, None
+    if start.covariance is not None and errors is not None:
+        index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
+        channels = start.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
+    kept = None if limits is None else limits.pick(used, chosen)
+    stack = Stack(
+        W,
+        Y.ravel(),
+        channels,
+        rows_of(row_weights, influence.W.shape[:2], used),
+        kept if kept is not None and kept.any else None,
+        names,
+        reading_names(influence.sensors, influence.speeds[used]),
+        partial(amplitude_words, start.labels),
+        partial(weight_words, start.labels),
+    )
+    fitted = fit_weights(stack, method, strength=strength, keep=keep)
+    D = fitted.weights
+    if stack.limits is not None:
+        D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
+    after = Y + influence.W[used][..., chosen] @ D
+    after_covariance = None
+    if channels is not None and errors is not None:
+        own = reading_covariance(after, errors)
+        after_covariance = own + prediction_covariance(D, channels).reshape(own.shape)
+    result = Correction(
+        speeds=influence.speeds[used],
+        sensors=influence.sensors,
+        planes=names,
+        weights=D,
+        before=Y,
+        after=after,
+        covariance=fitted.covariance,
+        after_covariance=after_covariance,
+        dof=start.model.dof,
+        errors=errors,
+        error_source=start.model.source,
+        condition_number=planes_told.condition_number,
+        rank=planes_told.rank,
+        method=method if not soft else "ridge" if strength is not None else "truncated",
+        mounted=start.mounted,
+        labels=start.labels,
+        warnings=(),
+        singular_values=planes_told.singular_values,
+        gap=fitted.gap,
+        chi_square=fitted.chi_square,
+        fit_dof=fitted.dof,
+        limits=stack.limits,
+        active=binding(stack, fitted),
+        remove=tuple(name for name in names if name in remove),
+    )
+    warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
+    warnings += cautions(result, W, alike=not unclear)
+    warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
+    return _with_warnings(result, warnings)
+
+
+def region_radius(dof: int | None) -> float:
+    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
+    from scipy.special import chdtri, fdtri
+
+    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+
+def _with_warnings(result: Correction, warnings: tuple[str, ...]) -> Correction:
+    from dataclasses import replace
+
+    for name in ("weights", "before", "after", "covariance", "after_covariance"):
+        array = getattr(result, name)
+        if array is not None:
+            array.flags.writeable = False
+    return replace(result, warnings=warnings)

@@ -1,0 +1,279 @@
+"""A correction as people read it, in the job's own units: text of 80 columns, and JSON types."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from balancing.coefficients.baseline import describe_errors
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import finite
+from rotorid.base.text import capital, figures, table, wrap
+from rotorid.base.units import rpm
+
+if TYPE_CHECKING:
+    from balancing.correction.correct import Correction
+
+
+HELD = 1e-5
+"""Relative scatter of a weight below which a limit holds it."""
+DUST = 1e-12
+"""Predicted amplitudes below this share of the largest one before are rounding."""
+
+_METHODS = {
+    "least-squares": "Least squares: the sum of squared amplitudes is the smallest possible.",
+    "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
+    "minmax": "Min–max: the largest amplitude is the smallest possible.",
+    "ridge": "Ridge: small weights where planes act alike.",
+    "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
+}
+_SOURCES = {
+    "stated": "as stated in the job",
+    "repeats": "from repeated readings",
+    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
+    "residuals": "from the disagreement of the runs",
+}
+
+
+def correction_dict(c: Correction) -> dict[str, Any]:
+    """`Correction.to_dict`: the keys of INTERFACE.md for `rotorid balance`, and a few more."""
+    mass, angle = c.labels.weight(c.weights)
+    old, old_phase = c.labels.vibration(c.before)
+    new, new_phase = c.labels.vibration(c.after)
+    # what an exact solution leaves is rounding, whose direction means nothing
+    new_phase = np.where(new > DUST * old.max(), new_phase, np.nan)
+    new = np.where(new > DUST * old.max(), new, 0.0)
+    covariance = None if c.plane_covariance is None else c.labels.weight_covariance(c.plane_covariance)
+    after_covariance = c.after_covariance
+    if after_covariance is not None:
+        after_covariance = c.labels.vibration_covariance(after_covariance)
+    mass_std, angle_std = c.mass_std, c.angle_std
+    unit = c.labels.weight_unit
+    return {
+        "method": c.method,
+        "conventions": c.labels.conventions(),
+        "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
+        "corrections": [
+            {
+                "plane": plane,
+                "mass": float(mass[p]),
+                "unit": unit,
+                "angle_deg": float(angle[p]),
+                "mass_std": None if mass_std is None else float(mass_std[p] * c.labels.weight_scale),
+                "angle_std_deg": None if angle_std is None else finite(np.degrees(angle_std[p])),
+                "covariance": None if covariance is None else covariance[p].tolist(),
+                "action": "remove" if plane in c.remove else "add",
+                "remove_at_deg": float((angle[p] + 180) % 360) if plane in c.remove else None,
+            }
+            for p, plane in enumerate(c.planes)
+        ],
+        **_mounted(c),
+        "residuals": [
+            {
+                "speed_rpm": rpm(speed),
+                "sensor": sensor,
+                "before": float(old[s, k]),
+                "before_phase_deg": float(old_phase[s, k]),
+                "after": float(new[s, k]),
+                "after_phase_deg": finite(new_phase[s, k]),
+                "after_covariance": None if after_covariance is None else after_covariance[s, k].tolist(),
+            }
+            for s, speed in enumerate(c.speeds)
+            for k, sensor in enumerate(c.sensors)
+        ],
+        "rms_before": float(np.sqrt(np.mean(old**2))),
+        "rms_after": float(np.sqrt(np.mean(new**2))),
+        "max_before": float(old.max()),
+        "max_after": float(new.max()),
+        "condition_number": finite(c.condition_number),
+        "rank": c.rank,
+        "singular_values": c.singular_values.tolist(),
+        "duality_gap": c.gap,
+        "chi_square": c.chi_square,
+        "chi_square_dof": c.fit_dof,
+        "limits": _limits(c),
+        "limits_that_bind": list(c.active),
+        "errors": _errors(c),
+        "warnings": list(c.warnings),
+    }
+
+
+def summary(c: Correction) -> str:
+    """`Correction.summary`."""
+    blocks = [
+        *(wrap(f"Warning: {w}", "  ") for w in c.warnings),
+        _corrections(c),
+        _add(c),
+        _vibration(c),
+        _quality(c),
+    ]
+    return "\n\n".join(b for b in blocks if b)
+
+
+def _corrections(c: Correction) -> str:
+    mass, angle = c.labels.weight(c.weights)
+    unit, factor = c.labels.weight_unit, c.coverage_factor
+    rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
+    mass_std, angle_std = c.mass_std, c.angle_std
+    for p, plane in enumerate(c.planes):
+        gone = plane in c.remove
+        row = [f"{plane} (remove)" if gone else plane, figures(mass[p]), _degrees(angle[p] + 180 * gone)]
+        if factor and mass_std is not None and angle_std is not None:
+            width = factor * mass_std[p]
+            held = width < HELD * abs(c.weights[p])
+            row.append("at its limit" if held else f"± {figures(width * c.labels.weight_scale, 2)} {unit}")
+            half = factor * np.degrees(angle_std[p])
+            if np.isnan(half):
+                row.append("angle not determined")
+            else:
+                row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
+        rows.append(row)
+    head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
+    foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}.", "")
+    return f"{head}\n{table(rows)}\n{foot}"
+
+
+def _add(c: Correction) -> str:
+    if c.mounted is None or c.to_add is None:
+        return ""
+    run, planes, weights = c.mounted
+    mass, angle = c.labels.weight(weights)
+    more, more_angle = c.labels.weight(c.to_add)
+    unit = c.labels.weight_unit
+    rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
+    for p, plane in enumerate(planes):
+        gone = plane in c.remove
+        name = f"{plane} (remove)" if gone else plane
+        more_at = _degrees(more_angle[p] + 180 * gone)
+        rows.append([name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at])
+    head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
+    foot = ""
+    if any(plane in c.remove for plane in planes):
+        foot = "\nWhere material is removed, the last columns say how much and where."
+    return f"{head}\n{table(rows)}{foot}"
+
+
+def _vibration(c: Correction) -> str:
+    from balancing.correction.correct import region_radius
+
+    old, old_phase = c.labels.vibration(c.before)
+    new, new_phase = c.labels.vibration(c.after)
+    rows = [["rpm", "sensor", "before", "phase", "after", "phase"]]
+    bound: FloatArray | None = None
+    if c.after_covariance is not None:
+        largest = np.sqrt(np.linalg.eigvalsh(c.after_covariance)[..., -1]) * c.labels.vibration_scale
+        bound = region_radius(c.dof) * largest
+        rows[0].append("95 % within")
+    for s, speed in enumerate(c.speeds):
+        for k, sensor in enumerate(c.sensors):
+            row = [f"{rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
+            shown = small(new[s, k], old.max())
+            row += [shown, "" if shown == "0" else _degrees(new_phase[s, k], 0)]
+            if bound is not None:
+                row.append(f"± {figures(bound[s, k], 2)}")
+            rows.append(row)
+    unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
+    last = [
+        f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)} → "
+        f"{small(float(np.sqrt(np.mean(new**2))), old.max())}, "
+        f"largest {figures(old.max(), 3)} → {small(new.max(), old.max())}"
+    ]
+    return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), *last])
+
+
+def _quality(c: Correction) -> str:
+    n = len(c.planes)
+    planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
+    unit, scale = c.labels.vibration_unit, c.labels.vibration_scale
+    numbers = f"rank {c.rank} of {n}, condition number {c.condition_number:.3g}"
+    lines = [_METHODS[c.method]]
+    if c.gap is not None:
+        lines[0] += f" The optimum is certified: at most {max(c.gap, 0.0):.1e} better is possible."
+    if c.active:
+        lines.append(f"Limits that bind: {'; '.join(c.active)}.")
+    soft = c.method in ("ridge", "truncated")
+    if not soft:
+        lines.append(f"{planes.capitalize()} determined ({numbers}).")
+    elif c.singular_values.size:
+        shown = ", ".join(f"{s:.3g}" for s in c.singular_values)
+        lines.append(f"{numbers.capitalize()}, singular values {shown}.")
+    if c.chi_square is not None and c.fit_dof:
+        lines.append(
+            f"What is left of the vibration is {np.sqrt(c.chi_square / c.fit_dof):.2g} times what the "
+            f"errors of the readings explain (χ² {c.chi_square:.1f} with {c.fit_dof} degrees of freedom)."
+        )
+    if c.covariance is None:
+        lines.append(
+            "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
+            if c.errors is None
+            else "No intervals: the errors of the readings are not known."
+        )
+    else:
+        dof = "" if c.dof is None else f", {c.dof} degrees of freedom"
+        lines.append(
+            f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
+            f"({_SOURCES[c.error_source]}{dof})."
+        )
+    return "\n".join(wrap(line, "") for line in lines)
+
+
+def _mounted(c: Correction) -> dict[str, Any]:
+    if c.mounted is None or c.to_add is None:
+        return {"mounted_in_last_run": None, "add_to_mounted": None}
+    run, planes, weights = c.mounted
+    return {
+        "mounted_in_last_run": {"run": run, "weights": _weights(c, planes, weights)},
+        "add_to_mounted": _weights(c, planes, c.to_add),
+    }
+
+
+def _weights(c: Correction, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
+    mass, angle = c.labels.weight(weights)
+    return [
+        {"plane": p, "mass": float(mass[i]), "unit": c.labels.weight_unit, "angle_deg": float(angle[i])}
+        for i, p in enumerate(planes)
+    ]
+
+
+def _errors(c: Correction) -> dict[str, Any]:
+    e = c.errors
+    return {
+        "source": c.error_source,
+        "amplitude_percent": None if e is None else 100 * e.amplitude,
+        "phase_deg": None if e is None else float(np.degrees(e.phase)),
+        "floor": None if e is None else e.floor * c.labels.vibration_scale,
+        "degrees_of_freedom": c.dof,
+    }
+
+
+def _limits(c: Correction) -> dict[str, Any] | None:
+    """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
+    if c.limits is None:
+        return None
+    weight = c.limits.max_weight * c.labels.weight_scale
+    amplitude = c.limits.residual.ravel() * c.labels.vibration_scale
+    return {
+        "max_weight": {p: finite(w) for p, w in zip(c.planes, weight, strict=True)},
+        "amplitude": [finite(a) for a in amplitude],
+        "forbidden_deg": {
+            p: [_degrees_of(c, arc, 180.0 if p in c.remove else 0.0) for arc in arcs]
+            for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
+            if arcs
+        },
+    }
+
+
+def _degrees_of(c: Correction, arc: tuple[float, float], turn: float) -> list[float]:
+    """From and to of an arc, in the job's direction; turned to where material is taken away."""
+    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign + turn
+    return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
+
+
+def small(value: float, scale: float) -> str:
+    """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
+    return "0" if value <= 1e-9 * scale else figures(value, 3)
+
+
+def _degrees(angle: float, places: int = 1) -> str:
+    return f"{round(angle, places) % 360:.{places}f}°"

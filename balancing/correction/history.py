@@ -1,0 +1,239 @@
+"""The history of a job: run by run what was mounted and how the rotor vibrated, against the limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from balancing.coefficients.baseline import match_speeds
+from balancing.correction.refine import different, mounted_in
+from balancing.data.conventions import Labels
+from balancing.data.limits import Limits
+from balancing.data.trials import Trials
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.text import figures, table, wrap
+from rotorid.base.units import rpm
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from balancing.correction.correct import Correction
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """All runs of a job in their order.
+
+    Attributes
+    ----------
+    runs, speeds, sensors, planes
+        Names (R), rad/s (S,), names (C) and (P).
+    checks
+        Whether each run is a check run, length R.
+    weights
+        Mounted in each run, kg or kg·m, angle with the rotation, shape (R, P).
+    readings
+        Mean of the repeats, complex, NaN where a run was not read there, shape (R, S, C).
+    limits
+        Largest amplitude of each reading, infinite for none, (S, C); None where there are none at all.
+    labels
+        Units and conventions to print in.
+    """
+
+    runs: tuple[str, ...]
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    checks: tuple[bool, ...]
+    weights: ComplexArray
+    readings: ComplexArray
+    limits: FloatArray | None
+    labels: Labels
+
+    @property
+    def largest(self) -> FloatArray:
+        """Largest amplitude of all sensors, inside units, NaN where a run was not read, shape (R, S)."""
+        size = np.where(self._read, np.abs(self.readings), -1.0).max(axis=-1)
+        return np.asarray(np.where(size >= 0, size, np.nan))
+
+    @property
+    def rms(self) -> FloatArray:
+        """Root mean square of the amplitudes of the sensors read, shape (R, S); NaN as for `largest`."""
+        count = self._read.sum(axis=-1)
+        square = np.where(self._read, np.abs(self.readings) ** 2, 0.0).sum(axis=-1)
+        return np.asarray(np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), np.nan))
+
+    @property
+    def of_limit(self) -> FloatArray | None:
+        """Largest amplitude by its limit, (R, S); NaN where nothing limited was read; None without limits."""
+        if self.limits is None:
+            return None
+        finite = self._read & np.isfinite(self.limits)
+        divisor = np.where(finite, np.maximum(self.limits, 1e-30), 1.0)
+        share = np.where(finite, np.abs(np.where(finite, self.readings, 0.0)) / divisor, -1.0).max(axis=-1)
+        return np.asarray(np.where(share >= 0, share, np.nan))
+
+    @property
+    def _read(self) -> BoolArray:
+        return ~np.isnan(self.readings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        mass, angle = self.labels.weight(self.weights)
+        return {
+            "conventions": self.labels.conventions(),
+            "runs": [
+                {
+                    "run": run,
+                    "kind": _kind(self.checks[r]),
+                    "weights": [
+                        {
+                            "plane": plane,
+                            "mass": float(mass[r, p]),
+                            "unit": self.labels.weight_unit,
+                            "angle_deg": float(angle[r, p]),
+                        }
+                        for p, plane in enumerate(self.planes)
+                        if self.weights[r, p] != 0
+                    ],
+                    "speeds": self._speeds(r),
+                }
+                for r, run in enumerate(self.runs)
+            ],
+        }
+
+    def _speeds(self, r: int) -> list[dict[str, Any]]:
+        scale, share = self.labels.vibration_scale, self.of_limit
+        size = np.where(self._read[r], np.abs(self.readings[r]), -1.0)
+        return [
+            {
+                "speed_rpm": rpm(speed),
+                "largest": float(self.largest[r, s] * scale),
+                "sensor": self.sensors[int(np.argmax(size[s]))],
+                "rms": float(self.rms[r, s] * scale),
+                "of_limit": None if share is None or np.isnan(share[r, s]) else float(share[r, s]),
+                "within_limits": None if share is None or np.isnan(share[r, s]) else bool(share[r, s] <= 1),
+            }
+            for s, speed in enumerate(self.speeds)
+            if self._read[r, s].any()
+        ]
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per run and speed: weights of each plane, largest and rms amplitude, share of the limit.
+
+        Columns run, kind, `PLANE weight` and `PLANE angle_deg` (NaN where nothing was mounted), speed_rpm,
+        largest, sensor, rms, of_limit (NaN without a limit), within_limits (None without).
+        """
+        import pandas as pd
+
+        rows = []
+        for run in self.to_dict()["runs"]:
+            mounted = {weight["plane"]: weight for weight in run["weights"]}
+            for row in run["speeds"]:
+                own = {"run": run["run"], "kind": run["kind"]}
+                for plane in self.planes:
+                    weight = mounted.get(plane)
+                    own[f"{plane} weight"] = weight["mass"] if weight else np.nan
+                    own[f"{plane} angle_deg"] = weight["angle_deg"] if weight else np.nan
+                rows.append({**own, **row})
+        return pd.DataFrame(rows).astype({"of_limit": float, "within_limits": object})
+
+    def summary(self) -> str:
+        """One table of 80 columns: runs, what was mounted, vibration at each speed, share of the limit."""
+        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
+        head = ["run", f"mounted {self.labels.weight_unit}".rstrip(), "rpm", "largest", "rms"]
+        limited = self.of_limit is not None
+        rows = [[*head, "of limit"] if limited else head]
+        for run in self.to_dict()["runs"]:
+            weights = [
+                f"{figures(weight['mass'])} at {round(weight['angle_deg']) % 360}° {weight['plane']}"
+                for weight in run["weights"]
+            ] or ["nothing"]
+            for k in range(max(len(weights), len(run["speeds"]))):
+                cells = [run["run"] if k == 0 else "", weights[k] if k < len(weights) else ""]
+                cells += (
+                    _vibration(run["speeds"][k], limited=limited) if k < len(run["speeds"]) else ["", "", ""]
+                )
+                rows.append(cells + [""] * (len(rows[0]) - len(cells)))
+        turn = self.labels.turning_in_words()
+        foot = f"Vibration{unit}: the largest of the sensors, and the root mean square of them; {turn}."
+        return f"History of the job\n{table(rows, left=2)}\n{wrap(foot)}"
+
+
+def history(
+    trials: Trials,
+    *checks: Trials,
+    corrections: Correction | Mapping[str, complex] | None = None,
+    limits: Limits | None = None,
+) -> History:
+    """Trial runs and check runs one after the other.
+
+    Parameters
+    ----------
+    trials
+        Trial runs, or the baseline alone.
+    checks
+        Check runs in their order, of all or some of the sensors and speeds of the trial runs.
+    corrections
+        What was mounted in check runs that have no planes: a correction, or weights by plane.
+    limits
+        Of the amplitudes (those of weights do not matter here), at the speeds and sensors of the trial runs.
+
+    Raises
+    ------
+    ValueError
+        For check runs of other sensors or speeds, and where nobody says what was mounted in them.
+    """
+    mounted = [mounted_in(check, corrections) for check in checks]
+    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
+    planes = tuple(dict.fromkeys((*trials.planes, *later)))
+    names, blocks = list(trials.runs), [trials.mean]
+    weights = [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
+    weights[0][:, : len(trials.planes)] = trials.weights
+    for check, own in zip(checks, mounted, strict=True):
+        for name in check.runs:
+            names.append(different(name, names))
+        for name in check.sensors:
+            if name not in trials.sensors:
+                known = ", ".join(map(repr, trials.sensors))
+                raise ValueError(f"the trial runs have no sensor {name!r}; they have {known}")
+        rows = match_speeds(check.speeds, trials.speeds, "trial runs")
+        columns = [trials.sensors.index(name) for name in check.sensors]
+        shape = (len(check.runs), len(trials.speeds), len(trials.sensors))
+        block = np.full(shape, complex(np.nan, np.nan))
+        block[np.ix_(range(shape[0]), rows, columns)] = check.mean
+        blocks.append(block)
+        empty = np.zeros(shape[0], dtype=complex)
+        weights.append(
+            np.column_stack([own.get(plane, empty) for plane in planes])
+            if planes
+            else np.zeros((shape[0], 0), dtype=complex)
+        )
+    largest = None if limits is None or not np.isfinite(limits.residual).any() else limits.residual
+    first = len(trials.runs)
+    return History(
+        runs=tuple(names),
+        speeds=trials.speeds,
+        sensors=trials.sensors,
+        planes=planes,
+        checks=tuple(r >= first for r in range(len(names))),
+        weights=np.concatenate(weights),
+        readings=np.concatenate(blocks),
+        limits=largest,
+        labels=trials.labels,
+    )
+
+
+def _kind(check: bool) -> str:
+    return "check run" if check else "trial run"
+
+
+def _vibration(row: dict[str, Any], *, limited: bool) -> list[str]:
+    cells = [f"{row['speed_rpm']:.6g}", figures(row["largest"], 3), figures(row["rms"], 3)]
+    if limited:
+        share = row["of_limit"]
+        cells.append("" if share is None else f"{figures(100 * share, 3)} %{'' if share <= 1 else ' !'}")
+    return cells

@@ -1,0 +1,344 @@
+"""Check runs refine the influence coefficients: least squares over all runs, and what moved by it.
+
+A check run with the weights T mounted obeys the relation of every trial run, Y_run = Y₀ + W T_run
+(`balancing.coefficients.influence`): it is one more run of the same fit, rows weighted by the variance of
+their readings where that is known. With it the fit is over-determined, so that runs which disagree show.
+
+A coefficient that moves far against the one from the trial runs alone says that the rotor did not repeat
+itself, is not linear, or that something else was mounted than is written; it is named.
+
+What to add to the weights of the last check run (trim) is the correction by the refined coefficients less
+what is mounted: D_refined − T_last. The correction itself stays the total for the bare rotor, so that limits
+of the total hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from balancing.coefficients.baseline import match_speeds
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.influence import Influence, estimate_influence
+from balancing.data.trials import Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.units import rpm_text
+
+if TYPE_CHECKING:
+    from balancing.correction.correct import Correction
+
+
+MOVED_AMPLITUDE = 0.5
+"""Relative change of the size of a coefficient above which it is named."""
+MOVED_ANGLE = np.deg2rad(45)
+"""Change of its phase, rad, above which it is named."""
+
+_DUST = 1e-9
+"""Coefficients below this share of the plane's largest one are none."""
+_TIMES = 10.0
+_NAMED = 3
+_REGION = 5.991464547107979
+"""χ² of two degrees of freedom that errors alone exceed with 5 %."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trim:
+    """What to add to what is mounted.
+
+    Attributes
+    ----------
+    planes
+        Names (P,), of the correction and of what is mounted.
+    mounted, target, add
+        Weights in the last run, wanted on the bare rotor, and the difference to mount; angle with the
+        rotation, kg or kg·m, shape (P,).
+    run
+        Name of the last run; None where nothing is mounted.
+    """
+
+    planes: tuple[str, ...]
+    mounted: ComplexArray
+    target: ComplexArray
+    add: ComplexArray
+    run: str | None
+
+
+def refine(
+    trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
+) -> Influence:
+    """Influence coefficients from trial runs and check runs together.
+
+    Parameters
+    ----------
+    trials
+        Trial runs, as for `estimate_influence`.
+    checks
+        Check runs in their order, of all or some of the sensors and speeds of the trial runs (speeds within
+        0.5 % count as one). Weights of their planes are all that was mounted in them.
+    corrections
+        What was mounted in check runs that have no planes: a correction, or weights by plane.
+
+    Returns
+    -------
+    Influence
+        Its last run is the last check run, so that `correct` proposes what to add to it (`trim`). Where
+        check runs do not cover a sensor or speed, its coefficients are those of the trial runs alone.
+        Warnings name every coefficient that moved by more than 50 % or 45°.
+
+    Raises
+    ------
+    UndeterminedError
+        Where all runs together do not determine the coefficients.
+    ValueError
+        Without check runs; for sensors and speeds that the trial runs do not have, and where nobody says
+        what was mounted.
+    """
+    if not checks:
+        raise ValueError("there is no check run: give one or more beside the trial runs")
+    at = [match_speeds(check.speeds, trials.speeds, "trial runs") for check in checks]
+    rows = [s for s in range(len(trials.speeds)) if all(s in speeds for speeds in at)]
+    sensors = [_sensors(check, trials) for check in checks]
+    columns = [c for c in range(len(trials.sensors)) if all(c in own for own in sensors)]
+    alone, notes = _alone(trials)
+    everywhere = len(rows) == len(trials.speeds) and len(columns) == len(trials.sensors)
+    if everywhere:
+        refined = estimate_influence(_joined(trials, checks, corrections, rows, columns))
+    else:
+        refined = _partly(trials, checks, corrections, rows, columns, alone)
+    words = notes if alone is None else _moved(alone, refined)
+    return replace(refined, warnings=refined.warnings + words)
+
+
+def trim(correction: Correction) -> Trim:
+    """What to add to the weights mounted in the last run, so that they become the correction.
+
+    Parameters
+    ----------
+    correction
+        By refined coefficients: `correct(refine(trials, check))`. Planes that it does not use but that hold
+        a weight are emptied.
+    """
+    if correction.mounted is None:
+        nothing = np.zeros(len(correction.planes), dtype=complex)
+        return Trim(correction.planes, nothing, correction.weights, correction.weights, None)
+    run, planes, mounted = correction.mounted
+    total = dict(zip(correction.planes, correction.weights.tolist(), strict=True))
+    target = np.array([total.get(plane, 0j) for plane in planes], dtype=complex)
+    return Trim(planes, mounted, target, target - mounted, run)
+
+
+def mounted_in(
+    check: Trials, corrections: Correction | Mapping[str, complex] | None = None
+) -> dict[str, ComplexArray]:
+    """Weights of each run of a check by plane, shape (R,): those it has itself, else the corrections.
+
+    Raises
+    ------
+    ValueError
+        Where nobody says what was mounted.
+    """
+    R = len(check.runs)
+    if check.planes:
+        return {plane: check.weights[:, p] for p, plane in enumerate(check.planes)}
+    if corrections is None:
+        raise ValueError(
+            f"what was mounted in the check run {check.runs[0]!r} is not known: give its weights table, or "
+            "the corrections that were mounted"
+        )
+    if isinstance(corrections, Mapping):
+        return {plane: np.full(R, weight, dtype=complex) for plane, weight in corrections.items()}
+    pairs = zip(corrections.planes, corrections.weights.tolist(), strict=True)
+    return {plane: np.full(R, weight, dtype=complex) for plane, weight in pairs}
+
+
+def different(name: str, names: Sequence[str]) -> str:
+    """The name, marked where there is such a run already."""
+    new, k = name, 1
+    while new in names:
+        new = f"{name} (check)" if k == 1 else f"{name} (check {k})"
+        k += 1
+    return new
+
+
+def _sensors(check: Trials, trials: Trials) -> list[int]:
+    """Where the sensors of a check run stand among those of the trial runs."""
+    for name in check.sensors:
+        if name not in trials.sensors:
+            raise ValueError(
+                f"the check run has readings of sensor {name!r}, which the trial runs do not have; they have "
+                f"those of {', '.join(map(repr, trials.sensors))}"
+            )
+    return [trials.sensors.index(name) for name in check.sensors]
+
+
+def _joined(
+    trials: Trials,
+    checks: Sequence[Trials],
+    corrections: Correction | Mapping[str, complex] | None,
+    rows: list[int],
+    columns: list[int],
+) -> Trials:
+    """Trial and check runs as one table, at speeds and sensors (indices of the trial runs') that all have."""
+    mounted = [mounted_in(check, corrections) for check in checks]
+    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
+    planes = tuple(dict.fromkeys((*trials.planes, *later)))
+    names, weights = list(trials.runs), [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
+    weights[0][:, : len(trials.planes)] = trials.weights
+    blocks = [trials.readings[:, :, rows][..., columns]]
+    for check, own in zip(checks, mounted, strict=True):
+        for name in check.runs:
+            names.append(different(name, names))
+        empty = np.zeros(len(check.runs), dtype=complex)
+        weights.append(np.column_stack([own.get(plane, empty) for plane in planes]))
+        speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
+        sensors = _sensors(check, trials)
+        block = check.readings[:, :, [speeds.index(s) for s in rows]]
+        blocks.append(block[..., [sensors.index(c) for c in columns]])
+    most = max(len(block) for block in blocks)
+    gap = complex(np.nan, np.nan)
+    padded = [
+        np.concatenate((block, np.full((most - len(block), *block.shape[1:]), gap))) for block in blocks
+    ]
+    return Trials(
+        runs=tuple(names),
+        speeds=trials.speeds[rows],
+        sensors=tuple(trials.sensors[c] for c in columns),
+        planes=planes,
+        readings=np.concatenate(padded, axis=1),
+        weights=np.concatenate(weights),
+        errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
+        labels=trials.labels,
+        warnings=tuple(dict.fromkeys(word for each in (trials, *checks) for word in each.warnings)),
+    )
+
+
+def _alone(trials: Trials) -> tuple[Influence | None, tuple[str, ...]]:
+    """Coefficients of the trial runs alone, or None and why there are none."""
+    try:
+        return estimate_influence(trials), ()
+    except UndeterminedError as error:
+        reason = str(error).partition("\n")[0]
+        return None, (
+            "the trial runs alone do not determine the coefficients, so that nothing can be said about how "
+            f"far the check runs moved them: {reason}",
+        )
+
+
+def _partly(
+    trials: Trials,
+    checks: Sequence[Trials],
+    corrections: Correction | Mapping[str, complex] | None,
+    rows: list[int],
+    columns: list[int],
+    alone: Influence | None,
+) -> Influence:
+    """Refined where all check runs were read; elsewhere the coefficients of the trial runs alone.
+
+    Sensors and speeds are independent of each other: only the errors of a reading are common to all.
+    """
+    if alone is None:
+        alone = estimate_influence(trials)  # raises, and says why
+    if not (rows and columns):
+        raise ValueError(
+            "the check runs have no sensor and speed in common: give those together that were read alike"
+        )
+    joint = _joined(trials, checks, corrections, rows, columns)
+    if joint.errors is None and alone.errors is not None:
+        joint = replace(joint, errors=alone.errors)
+    unknown = [plane for plane in joint.planes if plane not in alone.planes]
+    if unknown:
+        raise UndeterminedError(
+            f"only check runs have a weight in plane {unknown[0]!r}, and not every sensor was read in them "
+            "at every speed: read all of them, or leave the weight out"
+        )
+    part = estimate_influence(joint)
+    at = np.ix_(rows, columns)
+    assert alone.baseline is not None
+    assert part.baseline is not None
+    W, baseline = alone.W.copy(), alone.baseline.copy()
+    W[at], baseline[at] = part.W, part.baseline
+    errors = alone if part.errors is None else part
+    covariance = None
+    if part.covariance is not None and part.errors is not None:
+        known = alone.covariance
+        if known is None:  # the trial runs alone do not tell their errors, all runs do
+            known = _covariance(replace(trials, errors=part.errors))
+        if known is not None:
+            covariance = known.copy()
+            covariance[at] = part.covariance
+    lacking = [
+        f"{name!r} at {rpm_text(speed)}"
+        for s, speed in enumerate(trials.speeds)
+        for c, name in enumerate(trials.sensors)
+        if s not in rows or c not in columns
+    ]
+    more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
+    words = (
+        f"not every check run has a reading of sensor {', '.join(lacking[:_NAMED])}{more}: the coefficients "
+        "there are those of the trial runs alone"
+    )
+    return replace(
+        part,
+        speeds=alone.speeds,
+        sensors=alone.sensors,
+        W=W,
+        baseline=baseline,
+        covariance=covariance,
+        errors=errors.errors,
+        dof=min((d for d in (alone.dof, part.dof) if d is not None), default=None),
+        error_source=errors.error_source,
+        warnings=tuple(dict.fromkeys((*alone.warnings, *part.warnings, words))),
+    )
+
+
+def _covariance(trials: Trials) -> FloatArray | None:
+    """Of the coefficients of the trial runs alone; None where they do not tell them from zero."""
+    try:
+        return estimate_influence(trials).covariance
+    except UndeterminedError:
+        return None
+
+
+def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
+    """A sentence for each coefficient that moved by more than 50 % or 45°."""
+    words = []
+    for p, plane in enumerate(alone.planes):
+        old, new = alone.W[..., p], refined.W[..., refined.planes.index(plane)]
+        dust = _DUST * max(float(np.abs(old).max()), float(np.abs(new).max()))
+        for s, c in np.argwhere((np.abs(old) > dust) | (np.abs(new) > dust)):
+            change = abs(new[s, c]) / max(abs(old[s, c]), dust) - 1.0
+            both = min(abs(old[s, c]), abs(new[s, c])) > dust
+            turn = float(np.angle(new[s, c] * np.conj(old[s, c]))) if both else 0.0
+            if abs(change) <= MOVED_AMPLITUDE and abs(turn) <= MOVED_ANGLE:
+                continue
+            unclear = _unclear(alone, int(s), int(c), p)
+            within = " (which the trial runs alone do not tell from zero)" if unclear else ""
+            words.append(
+                f"the check runs move the coefficient of plane {plane!r} on sensor {alone.sensors[c]!r} at "
+                f"{rpm_text(alone.speeds[s])}{within} by {_percent(change)} and "
+                f"{round(np.degrees(turn)):+d}°"
+            )
+    if words:
+        words.append(
+            "coefficients that move by more than 50 % or 45° are not repeatable: check what was mounted in "
+            "each run, and where; else the rotor does not repeat itself or is not linear"
+        )
+    return tuple(words)
+
+
+def _unclear(influence: Influence, s: int, c: int, p: int) -> bool:
+    """Whether a coefficient lies within its errors at 95 %."""
+    if influence.covariance is None:
+        return False
+    own = slice(2 + 2 * p, 4 + 2 * p)
+    block = influence.covariance[s, c, own, own]
+    regular = block + 1e-12 * np.trace(block) * np.eye(2)
+    w = np.array([influence.W[s, c, p].real, influence.W[s, c, p].imag])
+    return bool(np.trace(block) > 0 and w @ np.linalg.solve(regular, w) < _REGION)
+
+
+def _percent(change: float) -> str:
+    return f"{round(100 * change):+d} %" if change < _TIMES else f"more than {_TIMES:g} times"

@@ -1,0 +1,282 @@
+"""The best k planes of many: every choice tried, ranked by what it leaves of the vibration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.data.conventions import Labels
+from balancing.solvers.conditioning import check_stack, scaled_columns
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.text import figures, table
+from rotorid.regression import RCOND, gain
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Criterion = Literal["rms", "max"]
+
+MOST = 20_000
+"""More choices of planes than this are not tried."""
+
+_BATCH = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Subsets:
+    """Choices of k planes, the best first, each with its own best weights.
+
+    Attributes
+    ----------
+    planes
+        Names of each choice, M tuples of k.
+    weights
+        Shape (M, k).
+    rms, largest
+        Of the predicted readings, shape (M,).
+    objective
+        What they are ranked by: rms or largest of the readings times their row weights, shape (M,).
+    condition_number
+        Of each choice, shape (M,).
+    criterion
+        "rms": least squares; "max": the largest reading made as small as it can be.
+    rms_before, largest_before
+        Of the readings without weights.
+    choices
+        How many were compared.
+    dependent
+        How many more were not: their planes act alike exactly, so that the weights are not determined.
+    labels
+        Units and conventions to print in.
+    """
+
+    planes: tuple[tuple[str, ...], ...]
+    weights: ComplexArray
+    rms: FloatArray
+    largest: FloatArray
+    objective: FloatArray
+    condition_number: FloatArray
+    criterion: Criterion
+    rms_before: float
+    largest_before: float
+    choices: int
+    dependent: int
+    labels: Labels
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions."""
+        mass, angle = self.labels.weight(self.weights)
+        scale = self.labels.vibration_scale
+        return {
+            "criterion": self.criterion,
+            "conventions": self.labels.conventions(),
+            "rms_before": self.rms_before * scale,
+            "max_before": self.largest_before * scale,
+            "choices": self.choices,
+            "dependent_choices": self.dependent,
+            "rows": [
+                {
+                    "planes": list(names),
+                    "rms_after": float(self.rms[m] * scale),
+                    "max_after": float(self.largest[m] * scale),
+                    "largest_weight": float(mass[m].max()),
+                    "condition_number": float(self.condition_number[m]),
+                    "weights": [
+                        {
+                            "plane": name,
+                            "mass": float(mass[m, p]),
+                            "unit": self.labels.weight_unit,
+                            "angle_deg": float(angle[m, p]),
+                        }
+                        for p, name in enumerate(names)
+                    ],
+                }
+                for m, names in enumerate(self.planes)
+            ],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per choice: planes ("A, C"), rms_after, max_after, largest_weight, condition_number."""
+        import pandas as pd
+
+        rows = [{k: v for k, v in row.items() if k != "weights"} for row in self.to_dict()["rows"]]
+        return pd.DataFrame([{**row, "planes": ", ".join(row["planes"])} for row in rows])
+
+    def summary(self) -> str:
+        """Table of 80 columns, the best choice first."""
+        found = self.to_dict()
+        by = "rms" if self.criterion == "rms" else "largest amplitude"
+        units = self.labels.weight_unit, self.labels.vibration_unit
+        rows = [
+            ["planes", "rms", "largest", f"largest weight{f', {units[0]}' if units[0] else ''}", "condition"]
+        ]
+        rows.append(["(none)", figures(found["rms_before"], 3), figures(found["max_before"], 3), "", ""])
+        for row in found["rows"]:
+            numbers = row["rms_after"], row["max_after"], row["largest_weight"], row["condition_number"]
+            rows.append([", ".join(row["planes"]), *(figures(n, 3) for n in numbers)])
+        k = self.weights.shape[1]
+        head = (
+            f"The best of {self.choices} choices of {k} plane{'s' if k > 1 else ''}, by {by} after correction"
+        )
+        lines = [head + (f" ({units[1]})" if units[1] else ""), table(rows)]
+        if self.dependent:
+            lines.append(
+                f"{self.dependent} more choices have planes that act alike: no weights are determined."
+            )
+        return "\n".join(lines)
+
+
+def best_subsets(
+    W: ArrayLike,
+    Y: ArrayLike,
+    planes: Sequence[str],
+    k: int,
+    *,
+    criterion: Criterion = "rms",
+    row_weights: ArrayLike | None = None,
+    show: int = 10,
+    labels: Labels | None = None,
+) -> Subsets:
+    """Compare all choices of k planes, each with its own best weights.
+
+    Parameters
+    ----------
+    W, Y
+        Stacked influence coefficients (N, P) and vibration (N,).
+    planes
+        Names, P.
+    k
+        How many to use, 1 … P, at most N.
+    criterion
+        "rms": least squares; "max": the smallest largest amplitude (a cone program for every choice that can
+        still be among the best).
+    row_weights
+        How much each reading counts, (N,), ≥ 0; default all alike.
+    show
+        How many of the best to return.
+    labels
+        Units to print in.
+
+    Raises
+    ------
+    ValueError
+        For k out of range, more than `MOST` choices, an unknown criterion, NaN, shapes that do not fit.
+    UndeterminedError
+        If the planes of every choice act alike.
+
+    Notes
+    -----
+    With the QR factorisation of diag(w) W the residual of every choice follows from P rows instead of N. The
+    largest amplitude a choice can reach is at least its least rms: choices are looked at in this order, until
+    no further one can be among the best `show`. So the ranking is exact for both criteria.
+    """
+    K, y, w = check_stack(W, Y, row_weights)
+    N, P = K.shape
+    _check(planes, P, N, k, criterion, show)
+    chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
+    rows, right, outside = _reduced(w[:, None] * K, w * y)
+    D, misfit, condition = _least_squares(rows, right, chosen)
+    solid = np.isfinite(condition)
+    if not solid.any():
+        raise UndeterminedError(
+            f"the planes of every choice of {k} act alike: choose fewer, or add readings or speeds"
+        )
+    rms = np.sqrt((misfit + outside) / N)
+    order = np.flatnonzero(solid)[np.argsort(rms[solid], kind="stable")]
+    if criterion == "max":
+        order, D = _by_maximum(K, y, w, chosen, order, rms, D, show)
+    order = order[:show]
+    after = y + np.einsum("nmk,mk->mn", K[:, chosen[order]], D[order])
+    weighted = np.abs(after) * w
+    return Subsets(
+        planes=tuple(tuple(planes[p] for p in chosen[m]) for m in order),
+        weights=D[order],
+        rms=np.sqrt(np.mean(np.abs(after) ** 2, axis=1)),
+        largest=np.abs(after).max(axis=1),
+        objective=weighted.max(axis=1) if criterion == "max" else np.sqrt(np.mean(weighted**2, axis=1)),
+        condition_number=condition[order],
+        criterion=criterion,
+        rms_before=float(np.sqrt(np.mean(np.abs(y) ** 2))),
+        largest_before=float(np.abs(y).max()),
+        choices=int(np.count_nonzero(solid)),
+        dependent=int(np.count_nonzero(~solid)),
+        labels=labels or Labels(),
+    )
+
+
+def _check(planes: Sequence[str], P: int, N: int, k: int, criterion: str, show: int) -> None:
+    if len(planes) != P or len(set(planes)) != P:
+        raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
+    if criterion not in ("rms", "max"):
+        raise ValueError(f"planes are chosen by 'rms' or by 'max', not by {criterion!r}")
+    if not 1 <= k <= P:
+        raise ValueError(f"choose between 1 and {P} planes; got {k}")
+    if k > N:
+        raise ValueError(
+            f"{k} planes need at least {k} readings (sensors × speeds); there are {N}: choose fewer planes"
+        )
+    if show < 1:
+        raise ValueError(f"show at least one choice; got {show}")
+    if comb(P, k) > MOST:
+        raise ValueError(
+            f"there are {comb(P, k)} choices of {k} out of {P} planes, more than the {MOST} that are tried: "
+            "leave planes out first, or choose fewer (or nearly all) of them"
+        )
+
+
+def _reduced(A: ComplexArray, y: ComplexArray) -> tuple[ComplexArray, ComplexArray, float]:
+    """R (K, P) and right side (K,) with |y + A D|² = |right + R D|² + outside."""
+    Q, R = np.linalg.qr(A)
+    right = Q.conj().T @ y
+    return np.asarray(R), np.asarray(right), float(np.linalg.norm(y - Q @ right) ** 2)
+
+
+def _least_squares(
+    R: ComplexArray, right: ComplexArray, chosen: IntArray
+) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Weights (M, k), squared residual (M,) and condition number (M,; infinite: dependent planes)."""
+    M, k = chosen.shape
+    B = scaled_columns(R)[0]
+    D, misfit, condition = np.zeros((M, k), dtype=complex), np.zeros(M), np.full(M, np.inf)
+    size = max(_BATCH // (R.shape[0] * k), 1)
+    for start in range(0, M, size):
+        part = slice(start, start + size)
+        s = np.linalg.svd(np.moveaxis(B[:, chosen[part]], 1, 0), compute_uv=False)
+        solid = s[:, -1] > RCOND * s[:, 0]
+        index = np.arange(M)[part][solid]
+        columns = np.moveaxis(R[:, chosen[index]], 1, 0)
+        D[index] = -gain(columns) @ right
+        misfit[index] = np.linalg.norm(right + np.einsum("mrk,mk->mr", columns, D[index]), axis=1) ** 2
+        condition[index] = s[solid, 0] / s[solid, -1]
+    return D, misfit, condition
+
+
+def _by_maximum(
+    K: ComplexArray,
+    y: ComplexArray,
+    w: FloatArray,
+    chosen: IntArray,
+    order: IntArray,
+    bound: FloatArray,
+    D: ComplexArray,
+    show: int,
+) -> tuple[IntArray, ComplexArray]:
+    """The best choices by the largest weighted reading, and the weights (M, k) with theirs replaced."""
+    from balancing.solvers.cone import minmax_cone
+
+    D = D.copy()
+    best: list[tuple[float, int]] = []
+    for m in order:
+        if len(best) == show and bound[m] >= best[-1][0]:
+            break
+        found = minmax_cone(K[:, chosen[m]], y, row_weights=w)
+        D[m] = found.weights
+        best = sorted([*best, (found.objective, int(m))])[:show]
+    return np.array([m for _, m in best], dtype=np.int64), D

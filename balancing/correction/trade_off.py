@@ -1,0 +1,275 @@
+"""How much vibration how much weight takes away: the residual over the total weight of all planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.coefficients.identifiability import check_planes
+from balancing.data.conventions import Labels
+from balancing.solvers.conditioning import check_stack
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import figures, table
+from rotorid.regression import gain
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Criterion = Literal["rms", "max"]
+
+KNEE = 3.0
+"""A point is a knee where weight does on average at least so many times as much before it as behind it."""
+DUST = 1e-6
+"""A weight below this share of the total is what the solver leaves of zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class TradeOff:
+    """The least vibration that a total weight can leave, from no weight to the best correction.
+
+    Attributes
+    ----------
+    planes
+        Names, P.
+    totals
+        Σ |D_p|, shape (K,), rising from zero.
+    weights
+        Shape (K, P).
+    rms, largest
+        Of the predicted readings, shape (K,).
+    objective
+        What is minimised: rms or largest of the readings times their row weights, shape (K,), falling.
+    criterion
+        "rms" or "max".
+    knee
+        Index of the point behind which more weight pays little: where the curve lies farthest below the
+        straight line between its ends, both axes counted from end to end as 0 … 1, if weight does on average
+        at least `KNEE` times as much before it as behind it. None: no such point.
+    labels
+        Units and conventions to print in.
+    """
+
+    planes: tuple[str, ...]
+    totals: FloatArray
+    weights: ComplexArray
+    rms: FloatArray
+    largest: FloatArray
+    objective: FloatArray
+    criterion: Criterion
+    knee: int | None
+    labels: Labels
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions."""
+        mass, angle = self.labels.weight(self.weights)
+        scale = self.labels.vibration_scale
+        return {
+            "criterion": self.criterion,
+            "conventions": self.labels.conventions(),
+            "knee": self.knee,
+            "points": [
+                {
+                    "total": float(self.totals[k] * self.labels.weight_scale),
+                    "rms_after": float(self.rms[k] * scale),
+                    "max_after": float(self.largest[k] * scale),
+                    "weights": [
+                        {
+                            "plane": name,
+                            "mass": float(mass[k, p]),
+                            "unit": self.labels.weight_unit,
+                            "angle_deg": float(angle[k, p]),
+                        }
+                        for p, name in enumerate(self.planes)
+                    ],
+                }
+                for k in range(len(self.totals))
+            ],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per point: total, rms_after, max_after, knee, and mass and angle of each plane.
+
+        The columns of a plane NAME are `NAME_mass` and `NAME_angle_deg`.
+        """
+        import pandas as pd
+
+        rows = [
+            {
+                **{name: point[name] for name in ("total", "rms_after", "max_after")},
+                "knee": k == self.knee,
+                **{
+                    f"{w['plane']}_{kind}": w[kind]
+                    for w in point["weights"]
+                    for kind in ("mass", "angle_deg")
+                },
+            }
+            for k, point in enumerate(self.to_dict()["points"])
+        ]
+        return pd.DataFrame(rows)
+
+    def summary(self) -> str:
+        """Table of 80 columns, the knee marked."""
+        unit, vibration = self.labels.weight_unit, self.labels.vibration_unit
+        rows = [[f"total{f', {unit}' if unit else ''}", "rms", "largest", "of the whole effect", ""]]
+        gained = self.objective[0] - self.objective[-1]
+        for k, point in enumerate(self.to_dict()["points"]):
+            share = (self.objective[0] - self.objective[k]) / gained if gained > 0 else 0.0
+            numbers = [figures(point[name], 3) for name in ("total", "rms_after", "max_after")]
+            rows.append([*numbers, f"{100 * share:.0f} %", "← knee" if k == self.knee else ""])
+        what = "rms" if self.criterion == "rms" else "largest amplitude"
+        head = f"The least {what} that a total weight leaves{f' ({vibration})' if vibration else ''}"
+        return f"{head}\n{table(rows, left=0)}\n{self._words()}"
+
+    def _words(self) -> str:
+
+        if self.knee is None:
+            if len(self.totals) == 1:
+                return "There is nothing to take away."
+            return "The curve has no clear knee: the last weights pay nearly as well as the first."
+        unit, scale = self.labels.weight_unit, self.labels.weight_scale
+        gain_there = (self.objective[0] - self.objective[self.knee]) / (
+            self.objective[0] - self.objective[-1]
+        )
+        return (
+            f"The knee: {figures(self.totals[self.knee] * scale, 3)} {unit} of "
+            f"{figures(self.totals[-1] * scale, 3)} {unit} bring {100 * gain_there:.0f} % of the effect."
+        )
+
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
+        """Draw the curve; without `ax` a new figure that also holds the weights of the planes.
+
+        Returns
+        -------
+        The new figure, or `ax`.
+        """
+        from balancing.plots import trade_off_curve as plots_tradeoff
+
+        return plots_tradeoff.overview(self) if ax is None else plots_tradeoff.curve(self, ax)
+
+
+def trade_off(
+    W: ArrayLike,
+    Y: ArrayLike,
+    planes: Sequence[str],
+    *,
+    criterion: Criterion = "rms",
+    points: int = 15,
+    row_weights: ArrayLike | None = None,
+    labels: Labels | None = None,
+) -> TradeOff:
+    """Minimise the residual for total weights Σ |D_p| from zero to that of the best correction.
+
+    Parameters
+    ----------
+    W, Y
+        Stacked influence coefficients (N, P) and vibration (N,).
+    planes
+        Names, P.
+    criterion
+        Whether the rms or the largest amplitude is made small.
+    points
+        Of the curve, at least 3, placed where it is long: each halves, in total weight, the longest piece of
+        the curve so far (both axes counted from end to end as 0 … 1).
+    row_weights
+        How much each reading counts, (N,), ≥ 0; default all alike.
+    labels
+        Units to print in.
+
+    Raises
+    ------
+    ValueError
+        For too few points, an unknown criterion, NaN, shapes that do not fit.
+    UndeterminedError
+        For planes that act alike exactly: there is no best correction to end at.
+
+    Notes
+    -----
+    Each point is a cone program (`balancing.solvers.cone.weight_budget_cone`). The curve is convex.
+    """
+    from balancing.solvers.cone import minmax_cone, weight_budget_cone
+
+    K, y, w = check_stack(W, Y, row_weights)
+    if len(planes) != K.shape[1] or len(set(planes)) != K.shape[1]:
+        raise ValueError(f"{K.shape[1]} different names of planes are needed; got {list(planes)}")
+    if criterion not in ("rms", "max"):
+        raise ValueError(f"a trade-off is of 'rms' or of 'max', not of {criterion!r}")
+    if points < 3:
+        raise ValueError(f"a curve has at least 3 points; got {points}")
+    A = w[:, None] * K
+    check_planes(A[w > 0], planes)
+
+    def objective(D: ComplexArray) -> float:
+        size = np.abs(w * (y + K @ D))
+        return float(size.max() if criterion == "max" else np.sqrt(np.mean(size**2)))
+
+    best = minmax_cone(K, y, row_weights=w).weights if criterion == "max" else -gain(A) @ (w * y)
+    found = [(0.0, objective(np.zeros_like(best)), np.zeros_like(best))]
+    total = float(np.abs(best).sum())
+    if total > 0:
+        found.append((total, objective(best), best))
+    while 1 < len(found) < points:
+        place, budget = _longest([t for t, _, _ in found], [v for _, v, _ in found])
+        D = weight_budget_cone(K, y, budget, minmax=criterion == "max", row_weights=w).weights
+        D = np.where(np.abs(D) > DUST * budget, D, 0.0)
+        found.insert(place, (budget, objective(D), D))
+    return _result(planes, K, y, found, criterion, labels or Labels())
+
+
+def _longest(totals: list[float], values: list[float]) -> tuple[int, float]:
+    """Where to insert a point, and its total: in the middle of the longest piece."""
+    across = np.diff(totals) / totals[-1]
+    down = np.diff(values) / max(values[0] - values[-1], np.finfo(float).tiny)
+    place = int(np.argmax(np.hypot(across, down)))
+    return place + 1, (totals[place] + totals[place + 1]) / 2
+
+
+def _result(
+    planes: Sequence[str],
+    K: ComplexArray,
+    y: ComplexArray,
+    found: list[tuple[float, float, ComplexArray]],
+    criterion: Criterion,
+    labels: Labels,
+) -> TradeOff:
+    weights = np.array([D for _, _, D in found])
+    totals = np.abs(weights).sum(axis=1)
+    values = np.array([v for _, v, _ in found])
+    size = np.abs(y + weights @ K.T)
+    return TradeOff(
+        planes=tuple(planes),
+        totals=totals,
+        weights=weights,
+        rms=np.sqrt(np.mean(size**2, axis=1)),
+        largest=size.max(axis=1),
+        objective=values,
+        criterion=criterion,
+        knee=knee(totals, values),
+        labels=labels,
+    )
+
+
+def knee(totals: FloatArray, values: FloatArray) -> int | None:
+    """Index of the point farthest below the straight line between the ends of a falling curve (K,).
+
+    Both axes are counted from end to end as 0 … 1. None: on average the curve falls less than `KNEE` times as
+    steeply before that point as behind it, or nothing falls.
+
+    Examples
+    --------
+    >>> knee(np.array([0.0, 1, 2, 10]), np.array([10.0, 4, 3, 2]))
+    2
+    """
+    across, down = totals[-1] - totals[0], values[0] - values[-1]
+    if not (across > 0 and down > 0):
+        return None
+    x, y = (totals - totals[0]) / across, (values - values[-1]) / down
+    place = int(np.argmax(1 - x - y))
+    # slopes: (1 − y) / x before, y / (1 − x) behind
+    clear = (1 - y[place]) * (1 - x[place]) >= KNEE * x[place] * y[place]
+    return place if clear and 0 < place < len(x) - 1 else None

@@ -1,0 +1,306 @@
+"""Verdict of a balance per plane and sensor: pass, fail, or not decidable with these readings.
+
+One value with errors against one limit: `balancing.correction.judgement`.
+
+Residual unbalance from a check run: with the coefficients W of the planes, the vibration Y that is left is
+that of the weights û with W û = Y in the least-squares sense, û = W⁺ Y; what would have to be added is −û.
+Errors of Y and W both count (`balancing.solvers.error_propagation` with D = −û, residual r = Y + W D).
+Predicted: what is mounted, M, less what the readings ask for, D; û = M − D with the covariance of D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.coefficients.baseline import match_speeds, starting_point
+from balancing.coefficients.identifiability import check_planes
+from balancing.coefficients.influence import Influence
+from balancing.coefficients.repeatability import tail
+from balancing.correction.choice import plane_indices
+from balancing.correction.correct import Correction
+from balancing.correction.correction_warnings import POOR
+from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
+from balancing.data.conventions import Labels
+from balancing.data.limits import Limits
+from balancing.data.trials import Trials
+from balancing.iso21940 import Tolerance
+from balancing.solvers.error_propagation import correction_covariance, prediction_covariance
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import wrap
+from rotorid.base.units import RPM
+from rotorid.regression import gain
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+_GRAM_MM = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """All judgements of a balance.
+
+    Attributes
+    ----------
+    rows
+        Planes, tolerance planes and sensors.
+    source
+        "check run NAME" or "prediction".
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    rows: tuple[Judgement, ...]
+    source: str
+    labels: Labels = field(default_factory=Labels)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def overall(self) -> Word:
+        """Fail if anything fails, pass if everything passes."""
+        words = {row.verdict for row in self.rows}
+        if "fail" in words:
+            return "fail"
+        return "pass" if words == {"pass"} else "not decidable"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units (tolerance planes in g_mm); what is unknown is None."""
+        return {
+            "source": self.source,
+            "verdict": self.overall,
+            "rows": [self._row(row) for row in self.rows],
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per judgement: the keys of `to_dict`."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.to_dict()["rows"])
+        return frame.astype({name: float for name in ("speed_rpm", "low", "high") if name in frame})
+
+    def summary(self) -> str:
+        """Text of 80 columns."""
+        rows = self.to_dict()["rows"]
+        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
+        lines.append(f"Verdict ({self.source}): {self.overall}")
+        for row in rows:
+            at = "" if row["speed_rpm"] is None else f" at {row['speed_rpm']:.6g} rpm"
+            within = (
+                "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
+            )
+            line = (
+                f"  {row['kind']} {row['name']}{at}: {row['size']:.4g} {row['unit']}".rstrip()
+                + f" ({within}), limit {row['limit']:.4g}: {row['verdict']}"
+            )
+            lines.append(wrap(line, "    "))
+        if any(row["verdict"] == "not decidable" for row in rows):
+            words = (
+                "Not decidable: the 95 % region of the value lies on both sides of the limit, or the errors "
+                "are unknown; repeated readings or stated errors would tell."
+            )
+            lines.append(wrap(words))
+        return "\n".join(lines)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Residual unbalance of the planes with regions and tolerance circles, in polar axes."""
+        from balancing.plots.tolerances import residuals
+
+        return residuals(self, ax)
+
+    def _row(self, row: Judgement) -> dict[str, Any]:
+        size_of = {
+            "plane": (self.labels.weight_scale, self.labels.weight_unit),
+            "bearing": (_GRAM_MM, "g_mm"),
+            "sensor": (self.labels.vibration_scale, self.labels.vibration_unit),
+        }
+        scale, unit = size_of[row.kind]
+        angle = (
+            self.labels.vibration(row.value)[1] if row.kind == "sensor" else self.labels.weight(row.value)[1]
+        )
+        return {
+            "kind": row.kind,
+            "name": row.name,
+            "speed_rpm": None if row.speed is None else round(row.speed * RPM, 9),
+            "size": row.size * scale,
+            "angle_deg": float(angle) if row.size else None,
+            "low": None if row.low is None else row.low * scale,
+            "high": None if row.high is None else row.high * scale,
+            "limit": row.limit * scale,
+            "unit": unit,
+            "verdict": row.verdict,
+        }
+
+
+def verdict_of_prediction(
+    correction: Correction,
+    *,
+    tolerance: Tolerance | None = None,
+    radii: Mapping[str, float] | None = None,
+    mounted: ArrayLike | None = None,
+    after: ArrayLike | None = None,
+) -> Verdict:
+    """Judge what is expected before a check run: its limits, and a tolerance if there is one.
+
+    Parameters
+    ----------
+    correction
+        With its limits of readings.
+    tolerance, radii
+        As of `judge_unbalance`, for the planes of the correction.
+    mounted
+        Weights (P,) that are mounted in place of the proposed ones (pieces, rounding); None: those.
+    after
+        Predicted readings (S, C) with these mounted; None: the correction's own.
+
+    Raises
+    ------
+    ValueError
+        Where nothing is given to judge by, and as `judge_unbalance`.
+    """
+    c = correction
+    D = c.weights if mounted is None else np.asarray(mounted, dtype=complex)
+    rows: list[Judgement] = []
+    if tolerance is not None:
+        u = D - c.weights
+        rows += judge_unbalance(u, c.covariance, tolerance, c.planes, radii=radii, dof=c.dof)
+    readings = c.after if after is None else np.asarray(after, dtype=complex)
+    limit = None if c.limits is None else c.limits.residual
+    rows += _readings(c.sensors, c.speeds, readings, c.after_covariance, limit, c.dof)
+    return _verdict(rows, "prediction", c.labels)
+
+
+def verdict_of_check(
+    influence: Influence,
+    check: Trials,
+    *,
+    run: int = -1,
+    tolerance: Tolerance | None = None,
+    radii: Mapping[str, float] | None = None,
+    limits: Limits | None = None,
+    planes: Sequence[str] | None = None,
+) -> Verdict:
+    """Judge one check run, everything mounted that shall stay.
+
+    Parameters
+    ----------
+    influence
+        Coefficients, at the speeds and for the sensors of the check run (there may be more).
+    check
+        Check runs; what was mounted in them does not matter here.
+    run
+        Which of them, by index; default the last.
+    tolerance, radii
+        As of `judge_unbalance`.
+    limits
+        Of readings, in the order of the coefficients' speeds and sensors.
+    planes
+        Use these planes only; None: those of the tolerance, or all.
+
+    Raises
+    ------
+    UndeterminedError
+        Where the readings do not tell the planes apart.
+    ValueError
+        Where nothing is given to judge by, for unknown planes, sensors or speeds, and as `judge_unbalance`.
+    """
+    at = match_speeds(check.speeds, influence.speeds)
+    unknown = [name for name in check.sensors if name not in influence.sensors]
+    if unknown:
+        raise ValueError(f"there are no coefficients of sensor {unknown[0]!r}, which the check run has")
+    pick = np.ix_(at, [influence.sensors.index(name) for name in check.sensors])
+    known = replace(
+        influence,
+        speeds=influence.speeds[at],
+        sensors=check.sensors,
+        W=influence.W[pick],
+        baseline=None,
+        covariance=None if influence.covariance is None else influence.covariance[pick],
+    )
+    name = check.runs[run]
+    one = check.readings[:, [range(len(check.runs))[run]]]
+    bare = replace(check, runs=(name,), readings=one, planes=(), weights=np.zeros((1, 0), dtype=complex))
+    start = starting_point(known, bare)
+    warnings = start.warnings
+    rows: list[Judgement] = []
+    if tolerance is not None:
+        chosen = plane_indices(known, planes or tolerance.planes)
+        used = [known.planes[p] for p in chosen]
+        W, Y = known.W[..., chosen].reshape(-1, len(chosen)), start.readings.ravel()
+        check_planes(W, used)
+        D = -(gain(W) @ Y)
+        covariance = None
+        if start.covariance is not None:
+            columns = [0, 1, *(k for p in chosen for k in (2 + 2 * p, 3 + 2 * p))]
+            own = start.covariance[..., columns, :][..., columns].reshape(len(Y), len(columns), len(columns))
+            covariance = correction_covariance(W, D, Y + W @ D, own)
+            warnings += _unexplained(
+                Y + W @ D, prediction_covariance(D, own), 2 * len(chosen), start.model.dof
+            )
+        rows += judge_unbalance(-D, covariance, tolerance, used, radii=radii, dof=start.model.dof)
+    own_errors = None if start.covariance is None else start.covariance[..., :2, :2]
+    limit = None if limits is None else limits.residual[pick]
+    rows += _readings(check.sensors, known.speeds, start.readings, own_errors, limit, start.model.dof)
+    return _verdict(rows, f"check run {name}", start.labels, warnings)
+
+
+def _unexplained(r: ComplexArray, covariance: FloatArray, fitted: int, dof: int | None) -> tuple[str, ...]:
+    """Warn where weights in the planes do not explain the readings: χ² of what is left, r (N,)."""
+    vector = np.stack((r.real, r.imag), axis=-1)
+    trace = np.trace(covariance, axis1=1, axis2=2)
+    known = trace > 0
+    n = 2 * int(np.count_nonzero(known)) - fitted
+    if n <= 0:
+        return ()
+    # errors in one direction only make a block singular
+    regular = covariance[known] + 1e-9 * trace[known, None, None] * np.eye(2)
+    each = np.linalg.solve(regular, vector[known][..., None])[..., 0]
+    if tail(float(np.sum(vector[known] * each)), n, dof) >= POOR:
+        return ()
+    return (
+        "unbalance in these planes does not explain the readings within their errors: there is more, "
+        "elsewhere on the rotor or not from unbalance; the residual is less certain than it seems",
+    )
+
+
+def _readings(
+    sensors: Sequence[str],
+    speeds: FloatArray,
+    readings: ComplexArray,
+    covariance: FloatArray | None,
+    limit: FloatArray | None,
+    dof: int | None,
+) -> list[Judgement]:
+    if limit is None:
+        return []
+    return [
+        judge(
+            "sensor",
+            name,
+            readings[s, c],
+            limit[s, c],
+            None if covariance is None else covariance[s, c],
+            dof,
+            w,
+        )
+        for s, w in enumerate(speeds.tolist())
+        for c, name in enumerate(sensors)
+        if np.isfinite(limit[s, c])
+    ]
+
+
+def _verdict(
+    rows: Sequence[Judgement], source: str, labels: Labels, warnings: tuple[str, ...] = ()
+) -> Verdict:
+    if not rows:
+        raise ValueError("there is nothing to judge by: give a tolerance, or limits of sensors")
+    return Verdict(tuple(rows), source, labels, warnings)

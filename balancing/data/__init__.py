@@ -1,0 +1,1 @@
+"""What a job says: runs and weights, units and conventions, errors, limits."""

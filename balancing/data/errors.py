@@ -1,0 +1,175 @@
+"""How well a reading is known: stated errors, repeated readings, and how the two combine.
+
+A reading Y has a standard deviation `amplitude`·|Y| along itself (radial), `phase`·|Y| across it
+(tangential), and `floor` in both directions, added in quadrature.
+
+Rules:
+
+1. Stated errors hold as they are (normal intervals), unless repeated readings contradict them: where the
+   repeats scatter more than the stated errors explain (χ² test, 99 %), the stated errors are multiplied by
+   the ratio found, the intervals become Student's with the degrees of freedom of the repeats, and a warning
+   says so. An amplitude or phase error that was not stated (zero) is taken from the repeats, if they show
+   one. Repeats that scatter *less* change nothing: they do not show what they have in common
+   (calibration, rounding, the phase mark).
+2. Without stated errors repeated readings give them: relative radial and tangential scatter, pooled over all
+   repeated groups, Student's with the degrees of freedom of one direction.
+3. Without both, the residuals of over-determined runs give one relative error, alike in both directions
+   (`balancing.coefficients.influence`).
+4. Otherwise errors are unknown, and so are all standard deviations.
+
+The mean of n repeats has 1/n of the variance of one reading.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.data.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+
+Source = Literal["stated", "repeats", "stated, enlarged by repeats", "residuals", "unknown"]
+
+CONTRADICTION = 0.99
+"""Level of the test by which repeated readings overrule stated errors."""
+
+EQUAL = 1e-12
+"""Relative differences below this are rounding of the arithmetic, not errors of readings."""
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """Errors of a single reading and where they come from.
+
+    Attributes
+    ----------
+    errors
+        None: unknown.
+    dof
+        Degrees of freedom of the estimated errors; None for stated errors (taken as known).
+    source
+        In words.
+    warnings
+        What the user should know.
+    """
+
+    errors: ReadingErrors | None = None
+    dof: int | None = None
+    source: Source = "unknown"
+    warnings: tuple[str, ...] = field(default=())
+
+
+def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray:
+    """Covariance of real and imaginary part of single readings.
+
+    Parameters
+    ----------
+    readings
+        Complex, any shape.
+    errors
+        One standard deviation of a reading.
+
+    Returns
+    -------
+    Shape (…, 2, 2).
+    """
+    z = np.asarray(readings, dtype=complex)
+    size = np.abs(z)
+    unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
+    radial = (errors.amplitude * size) ** 2 + errors.floor**2
+    tangential = (errors.phase * size) ** 2 + errors.floor**2
+    c, s = unit.real, unit.imag
+    out = np.empty((*z.shape, 2, 2))
+    out[..., 0, 0] = radial * c**2 + tangential * s**2
+    out[..., 1, 1] = radial * s**2 + tangential * c**2
+    out[..., 0, 1] = out[..., 1, 0] = (radial - tangential) * c * s
+    return out
+
+
+def symmetric(covariance: FloatArray) -> FloatArray:
+    """Covariances (…, n, n) without the rounding that makes them differ from their transposes."""
+    return np.asarray((covariance + np.swapaxes(covariance, -1, -2)) / 2)
+
+
+def mean_covariance(trials: Trials, errors: ReadingErrors) -> FloatArray:
+    """Covariance (R, S, C, 2, 2) of the means of repeated readings."""
+    return reading_covariance(trials.mean, errors) / trials.repeats[..., None, None]
+
+
+def error_model(trials: Trials) -> ErrorModel:
+    """Apply rules 1, 2 and 4 of this module to the stated errors and the repeated readings of a job."""
+    stated = trials.errors
+    if stated is not None:
+        return _checked_by_repeats(trials, stated)
+    scatter = _scatter(trials)
+    if scatter is None:
+        return ErrorModel()
+    radial, tangential, dof = scatter
+    if max(radial, tangential) < EQUAL:
+        words = "all repeated readings are equal to the last digit: they say nothing about the errors"
+        return ErrorModel(warnings=(words,))
+    said: tuple[str, ...] = ()
+    if min(radial, tangential) < EQUAL:  # read in whole degrees, say
+        equal, other = ("amplitudes", "phases") if radial < EQUAL else ("phases", "amplitudes")
+        said = (f"all repeated {equal} are equal: their error is taken to be that of the {other}",)
+        radial = tangential = max(radial, tangential)
+    return ErrorModel(ReadingErrors(amplitude=radial, phase=tangential), dof, "repeats", said)
+
+
+def _groups(trials: Trials) -> tuple[ComplexArray, ComplexArray, IntArray]:
+    """Deviations (K, G) of repeated readings from their means (NaN where none), means (G,), counts (G,)."""
+    many = trials.repeats > 1
+    mean = trials.mean[many]
+    return trials.readings[:, many] - mean, mean, trials.repeats[many]
+
+
+def _scatter(trials: Trials) -> tuple[float, float, int] | None:
+    """Pooled relative radial and tangential standard deviation and their degrees of freedom."""
+    deviation, mean, count = _groups(trials)
+    used = np.abs(mean) > 0
+    deviation, mean, count = deviation[:, used], mean[used], count[used]
+    dof = int(np.sum(count - 1))
+    if dof == 0:
+        return None
+    relative = deviation / mean
+    radial = np.sqrt(np.nansum(relative.real**2) / dof)
+    tangential = np.sqrt(np.nansum(relative.imag**2) / dof)
+    return float(radial), float(tangential), dof
+
+
+def _checked_by_repeats(trials: Trials, stated: ReadingErrors) -> ErrorModel:
+    from scipy.special import chdtri
+
+    deviation, mean, count = _groups(trials)
+    size = np.abs(mean)
+    along = deviation / (np.where(size > 0, mean, 1.0) / np.where(size > 0, size, 1.0))
+    covariance = reading_covariance(size, stated)
+    chi_square, dof = 0.0, 0
+    for part, variance in ((along.real, covariance[..., 0, 0]), (along.imag, covariance[..., 1, 1])):
+        known = variance > 0
+        chi_square += float(np.nansum(part[:, known] ** 2 / variance[known]))
+        dof += int(np.sum(count[known] - 1))
+    errors, degrees, warnings = stated, None, []
+    if dof > 0 and chi_square > float(chdtri(dof, 1 - CONTRADICTION)):
+        ratio = float(np.sqrt(chi_square / dof))
+        errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)
+        degrees = dof
+        warnings.append(
+            f"repeated readings scatter {ratio:.2g} times as much as the stated errors: "
+            "the errors were enlarged accordingly"
+        )
+    scatter = _scatter(trials)
+    if scatter is not None and stated.floor == 0:
+        # an error that was left out is not zero if the repeats show it
+        for kind, found in (("amplitude", scatter[0]), ("phase", scatter[1])):
+            if getattr(stated, kind) == 0 and found > EQUAL:
+                errors, degrees = replace(errors, **{kind: found}), min(scatter[2], degrees or scatter[2])
+                shown = f"{100 * found:.2g} %" if kind == "amplitude" else f"{np.degrees(found):.2g}°"
+                warnings.append(
+                    f"no {kind} error is stated; repeated readings scatter by {shown}, which is used"
+                )
+    source: Source = "stated" if degrees is None else "stated, enlarged by repeats"
+    return ErrorModel(errors, degrees, source, tuple(warnings))

@@ -1,0 +1,311 @@
+"""Permissible residual unbalance by the balance quality grades of ISO 21940-11, and its share per plane.
+
+The standard (before: ISO 1940-1) limits the velocity e·ω of the centre of mass of a rigid rotor. With the
+grade G in mm/s, the mass m in kg and the service speed ω in rad/s
+
+    e_per = G/ω         (m with G in m/s; 1000 G/ω in µm, or g·mm per kg),
+    U_per = m e_per     (kg·m; 1000 G m/ω in g·mm).
+
+How it is shared by two planes: `balancing.allocation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.allocation import bearing_limits, safe_pair, transfer
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import wrap
+from rotorid.base.units import rpm, rpm_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+
+GRADES = (0.4, 1.0, 2.5, 6.3, 16.0, 40.0, 100.0, 250.0, 630.0, 1600.0, 4000.0)
+"""Balance quality grades of the standard, mm/s."""
+
+_GRAM_MM = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Tolerance:
+    """Permissible residual unbalance of a rotor, and where it may be.
+
+    Attributes
+    ----------
+    grade
+        mm/s.
+    mass, speed
+        kg and rad/s.
+    planes
+        Names of the correction planes, length P (0, 1 or 2).
+    positions
+        Along the shaft, m, shape (P,); None where no distances are known.
+    bearings
+        Positions of the tolerance planes, m; None where nothing is allocated to them.
+    centre
+        Position of the centre of mass, m; None as before.
+    bearing_limits
+        U_A and U_B, kg·m, shape (2,); None as before.
+    limits
+        Of each correction plane, kg·m, shape (P,).
+    rule
+        How it was allocated, in words.
+    warnings
+        What the user should know.
+    """
+
+    grade: float
+    mass: float
+    speed: float
+    planes: tuple[str, ...]
+    positions: FloatArray | None
+    bearings: tuple[float, float] | None
+    centre: float | None
+    bearing_limits: FloatArray | None
+    limits: FloatArray
+    rule: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def eccentricity(self) -> float:
+        """Permissible specific unbalance e_per, m."""
+        return self.grade * 1e-3 / self.speed
+
+    @property
+    def total(self) -> float:
+        """U_per, kg·m."""
+        return self.mass * self.eccentricity
+
+    @property
+    def transfer(self) -> FloatArray | None:
+        """T (2, P): unbalance at the bearings per unbalance in the planes; None without distances."""
+        if self.bearings is None or self.positions is None:
+            return None
+        return transfer(self.positions, self.bearings)
+
+    def at_bearings(self, residual: ArrayLike) -> ComplexArray:
+        """Unbalance at the two bearings, kg·m, equivalent to residuals (P,), kg·m, in the planes.
+
+        Raises
+        ------
+        ValueError
+            Where the distances are not known, or for another number of residuals than planes.
+        """
+        T = self.transfer
+        u = np.asarray(residual, dtype=complex)
+        if T is None:
+            raise ValueError(
+                "the positions of planes and bearings are not known: give them with the tolerance"
+            )
+        if u.shape != (len(self.planes),):
+            raise ValueError(
+                f"there must be one residual for each of {len(self.planes)} planes; got {u.shape}"
+            )
+        return np.asarray(T @ u)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""
+        positions = [None] * len(self.planes) if self.positions is None else self.positions.tolist()
+        bearings = None
+        if self.bearings is not None and self.bearing_limits is not None:
+            bearings = [
+                {"position_m": z, "limit_kg_m": float(u), "limit_g_mm": float(u * _GRAM_MM)}
+                for z, u in zip(self.bearings, self.bearing_limits, strict=True)
+            ]
+        return {
+            "grade": f"G{self.grade:g}",
+            "mass_kg": self.mass,
+            "speed_rad_s": self.speed,
+            "speed_rpm": rpm(self.speed),
+            "permissible_kg_m": self.total,
+            "permissible_g_mm": self.total * _GRAM_MM,
+            "specific_um": self.eccentricity * 1e6,
+            "centre_of_mass_m": self.centre,
+            "bearings": bearings,
+            "planes": [
+                {"plane": name, "position_m": z, "limit_kg_m": float(u), "limit_g_mm": float(u * _GRAM_MM)}
+                for name, z, u in zip(self.planes, positions, self.limits, strict=True)
+            ],
+            "rule": self.rule,
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row for the rotor, each bearing and each plane: place, position_mm, limit_g_mm."""
+        import pandas as pd
+
+        rows: list[tuple[str, float, float]] = [("whole rotor", math.nan, self.total)]
+        if self.bearings is not None and self.bearing_limits is not None:
+            ends = zip(("bearing A", "bearing B"), self.bearings, self.bearing_limits, strict=True)
+            rows += [(name, z, float(u)) for name, z, u in ends]
+        at = np.full(len(self.planes), math.nan) if self.positions is None else self.positions
+        rows += [
+            (f"plane {n}", float(z), float(u)) for n, z, u in zip(self.planes, at, self.limits, strict=True)
+        ]
+        frame = pd.DataFrame(rows, columns=["place", "position_mm", "limit_g_mm"])
+        return frame.assign(position_mm=frame.position_mm * 1e3, limit_g_mm=frame.limit_g_mm * _GRAM_MM)
+
+    def summary(self) -> str:
+        """Text of 80 columns."""
+        head = (
+            f"G{self.grade:g} for {self.mass:.6g} kg at {rpm_text(self.speed)}: permissible "
+            f"residual unbalance {self.total * _GRAM_MM:.4g} g·mm "
+            f"({self.eccentricity * 1e6:.3g} g·mm/kg)"
+        )
+        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
+        lines += [wrap(head), ""]
+        for place, z, limit in self.to_frame().to_numpy().tolist():
+            where = "" if math.isnan(z) else f"at {z:.6g} mm"
+            lines.append(f"{place:24} {where:>16} {limit:14.4g} g·mm")
+        return "\n".join([*lines, "", wrap(self.rule)])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Polar picture with the tolerance circles of the planes, in g·mm."""
+        from balancing.plots.tolerances import tolerance_circles
+
+        return tolerance_circles(self, ax)
+
+
+def parse_grade(text: str | float) -> float:
+    """Read "G2.5", "g 2.5", "2,5" or 2.5 as a grade, mm/s.
+
+    Raises
+    ------
+    ValueError
+        For a grade that the standard does not have, with its neighbours.
+    """
+    body = str(text).strip().removeprefix("G").removeprefix("g").strip().replace(",", ".")
+    try:
+        value = float(body)
+    except ValueError:
+        value = math.nan
+    if value in GRADES:
+        return value
+    known = ", ".join(f"G{g:g}" for g in GRADES)
+    near = [g for g in GRADES if g < value][-1:] + [g for g in GRADES if g > value][:1]
+    hint = f"the nearest are {' and '.join(f'G{g:g}' for g in near)}; " if near else ""
+    raise ValueError(f"there is no balance quality grade {str(text)!r}: {hint}the grades are {known}")
+
+
+def tolerance(
+    mass: float,
+    speed: float,
+    grade: str | float,
+    *,
+    planes: Mapping[str, float | None] | None = None,
+    bearings: tuple[float, float] | None = None,
+    centre: float | None = None,
+) -> Tolerance:
+    """Permissible residual unbalance, allocated to one or two planes.
+
+    Parameters
+    ----------
+    mass
+        Of the rotor, kg.
+    speed
+        Highest service speed, rad/s.
+    grade
+        "G2.5", or mm/s.
+    planes
+        Position, m, of each correction plane (one or two), from any origin; None: without positions. Without
+        any position two planes have half each (a symmetric rotor), one plane has all.
+    bearings
+        Positions of both bearings, m. Without them the two correction planes are the tolerance planes (a
+        component without a shaft).
+    centre
+        Position of the centre of mass, m; needed with positions.
+
+    Returns
+    -------
+    Tolerance
+
+    Raises
+    ------
+    ValueError
+        For a mass or speed that is not positive, a grade that does not exist, and positions that are missing,
+        equal or too many.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> found = tolerance(500, 100 * pi, "G2.5")
+    >>> f"{found.total * 1e6:.0f} g·mm, {found.eccentricity * 1e6:.2f} µm"
+    '3979 g·mm, 7.96 µm'
+    """
+    for what, value in (("mass of the rotor", mass), ("service speed", speed)):
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"the {what} must be a finite number above 0, not {value:g}")
+    G = parse_grade(grade)
+    total = mass * G * 1e-3 / speed
+    named = dict(planes or {})
+    positions = _positions(named, bearings, centre)
+    ends = bearings
+    if ends is None and positions is not None and len(positions) == 2:
+        ends = (float(positions[0]), float(positions[1]))
+    at: FloatArray | None = None
+    rule = ""
+    warnings: tuple[str, ...] = ()
+    if ends is not None and centre is not None:
+        at, rule, warnings = bearing_limits(total, ends, centre)
+    if len(named) < 2:
+        limits = np.full(len(named), total)
+        rule += "One plane (a disc) has the whole of it." if named else ""
+    elif at is None or ends is None or positions is None:
+        limits = np.full(2, total / 2)
+        rule = "Half in each plane, as for a symmetric rotor."
+    elif bearings is None:
+        limits = at.copy()
+        rule += "The correction planes are the tolerance planes."
+    else:
+        limits = safe_pair(np.abs(transfer(positions, ends)), at)
+        rule += "In the planes: safe at the bearings whatever the angles of the residuals are."
+    return Tolerance(
+        grade=G,
+        mass=float(mass),
+        speed=float(speed),
+        planes=tuple(named),
+        positions=positions,
+        bearings=None if at is None else ends,
+        centre=None if at is None else centre,
+        bearing_limits=at,
+        limits=limits,
+        rule=rule.strip() or "Nothing is allocated to planes.",
+        warnings=warnings,
+    )
+
+
+def _positions(
+    planes: Mapping[str, float | None], bearings: tuple[float, float] | None, centre: float | None
+) -> FloatArray | None:
+    """Positions (P,) of the planes, checked against everything else; None where there are none."""
+    if len(planes) > 2:
+        raise ValueError(
+            f"the tolerance of a rigid rotor is shared by one or two planes, not {len(planes)}: choose two"
+        )
+    given = [z for z in planes.values() if z is not None]
+    if any(not math.isfinite(z) for z in (*given, *(bearings or ()), *(() if centre is None else (centre,)))):
+        raise ValueError("positions of planes, bearings and the centre of mass must be finite numbers")
+    if 0 < len(given) < len(planes):
+        raise ValueError("give the position of both planes, or of none")
+    if bearings is not None and bearings[0] == bearings[1]:
+        raise ValueError("both bearings are at the same place: give two different positions")
+    if len(given) == 2 and given[0] == given[1]:
+        raise ValueError("both planes are at the same place: give two different positions, or one plane")
+    if bearings is not None and len(planes) == 2 and not given:
+        raise ValueError("with the positions of the bearings, give those of the planes, too")
+    if centre is None and (bearings is not None or len(given) == 2):
+        raise ValueError("the share of each plane needs the position of the centre of mass: give that, too")
+    if centre is not None and bearings is None and len(given) < 2:
+        raise ValueError(
+            "the position of the centre of mass says nothing without those of bearings or two planes"
+        )
+    return np.array(given, dtype=np.float64) if given else None

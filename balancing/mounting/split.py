@@ -1,0 +1,231 @@
+"""One given weight on the holes of one plane: the nearest vector that can be mounted.
+
+The vector Σ_h a_h e^{iφ_h} nearest to a target, where a_h is what can stand in hole h, is found exactly: the
+free holes are dealt in turn to two halves, all sums of each half are listed (equal ones once, with the fewest
+pieces), and for every sum of one half a tree finds the nearest partner in the other. Where even the halves
+are too many (some thirty holes at odd angles with several sizes of pieces), only so many holes vary about the
+rounded answer of the continuous problem, and `bound`, the error with free amounts up to the largest content
+of each hole, says how much better anything could be.
+
+This minimises the error of one weight. What is left of the vibration is minimised over all planes together in
+`balancing.mounting.discrete`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.data.conventions import Labels
+from balancing.mounting.holes import Holes, Mounting, mounting
+from balancing.mounting.split_amounts import nearest_amounts
+from balancing.mounting.split_pieces import nearest_pieces
+
+_PROVEN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """A weight split on holes.
+
+    Attributes
+    ----------
+    target
+        Wanted, kg or kg·m.
+    holes
+        What can be mounted.
+    mounting
+        What is to be mounted.
+    error
+        Mounted vector minus target.
+    relative_error
+        |error| by the size of the target (a target of 0: by what is mounted, or 0).
+    bound
+        No other choice has a smaller |error| than this.
+    proven
+        Whether nothing better exists: `bound` is |error|.
+    """
+
+    target: complex
+    holes: Holes
+    mounting: Mounting
+    error: complex
+    relative_error: float
+    bound: float
+    proven: bool
+
+    @property
+    def pieces(self) -> int:
+        """Number of pieces mounted; where amounts are free, of holes in use."""
+        counts = self.mounting.counts
+        return int(counts.sum()) if counts.shape[1] else int(np.count_nonzero(self.mounting.amounts))
+
+    def lines(self, labels: Labels) -> list[str]:
+        """What goes where, hole by hole, such as "2 × 10 g in hole 7 (at 120°)"."""
+        out = []
+        for h in np.flatnonzero(self.mounting.amounts):
+            angle = float(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            out.append(
+                f"{self._content(int(h), labels)} in hole {self.holes.names[h]} (at {_degrees(angle)})"
+            )
+        return out or ["nothing is mounted: nothing that fits these holes is nearer to the wanted weight"]
+
+    def _content(self, h: int, labels: Labels) -> str:
+        unit = labels.weight_unit
+        if self.holes.free_amounts:
+            return f"{self.mounting.amounts[h] * labels.weight_scale:.6g} {unit}"
+        return " + ".join(
+            f"{n} × {piece * labels.weight_scale:.6g} {unit}"
+            for n, piece in zip(self.mounting.counts[h], self.holes.pieces, strict=True)
+            if n
+        )
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, in the labels' unit and angles."""
+        (wanted, got, off), (to, at, error_at) = labels.weight(
+            [self.target, self.mounting.vector, self.error]
+        )
+        rows = []
+        for h in np.flatnonzero(self.mounting.amounts):
+            angle = _plain(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            counts = self.mounting.counts[h]
+            rows.append(
+                {
+                    "hole": self.holes.names[h],
+                    "angle_deg": angle,
+                    "mass": _plain(self.mounting.amounts[h] * labels.weight_scale),
+                    "pieces": [
+                        {"count": int(n), "mass": _plain(piece * labels.weight_scale)}
+                        for n, piece in zip(counts, self.holes.pieces, strict=bool(counts.size))
+                        if n
+                    ],
+                }
+            )
+        return {
+            "unit": labels.weight_unit,
+            "angles": labels.angles,
+            "target": {"mass": _plain(wanted), "angle_deg": _plain(to)},
+            "holes": rows,
+            "mounted": {"mass": _plain(got), "angle_deg": _plain(at)},
+            "error": {"mass": _plain(off), "angle_deg": _plain(error_at)},
+            "relative_error": self.relative_error,
+            "bound": self.bound * labels.weight_scale,
+            "proven": self.proven,
+            "number_of_pieces": self.pieces,
+        }
+
+    def summary(self, labels: Labels) -> str:
+        """Text: hole by hole, what they make together, and what is missing."""
+        sizes, angles = labels.weight([self.target, self.mounting.vector, self.error])
+        unit, what = labels.weight_unit, ("wanted", "mounted", "error")
+        lines = [*self.lines(labels), ""]
+        for name, size, angle in zip(what, sizes, angles, strict=True):
+            share = f"   ({percent(self.relative_error)} %)" if name == "error" else ""
+            lines.append(f"{name:<8} {size:>10.5g} {unit} at {angle:5.1f}°{share}")
+        if not self.proven:
+            lines.append(
+                f"these holes have more combinations than can be tried: nothing better than an error of "
+                f"{self.bound * labels.weight_scale:.2g} {unit} exists"
+            )
+        return "\n".join(lines)
+
+
+def split(
+    target: complex, holes: Holes, *, most_pieces: int | None = None, good_enough: float = 0.0
+) -> Split:
+    """Mount what makes the vector nearest to a target, with the fewest pieces among equally near ones.
+
+    Parameters
+    ----------
+    target
+        Wanted in addition to what is taken, kg or kg·m.
+    holes
+        What can be mounted.
+    most_pieces
+        At most so many pieces altogether; None: as many as help. Has no meaning for free amounts.
+    good_enough
+        Relative error that needs no more pieces: the nearest vector of the fewest pieces that keep to it; 0:
+        the nearest of all. Has no meaning for free amounts.
+
+    Raises
+    ------
+    ValueError
+        For a target that is not finite, a number of pieces below 1, a negative error, or where
+        nothing admissible exists, not even mounting nothing.
+
+    Examples
+    --------
+    >>> from balancing.mounting.holes import equal_holes, from_list
+    >>> found = split(0.035j, from_list(equal_holes(12), [0.01, 0.02]), most_pieces=2)
+    >>> found.lines(Labels(weight_unit="g", weight_scale=1e3))
+    ['1 × 20 g in hole 3 (at 60°)', '1 × 20 g in hole 5 (at 120°)']
+    """
+    if not np.isfinite(target):
+        raise ValueError(f"the weight to be split must be finite, not {target!r}")
+    if most_pieces is not None and most_pieces < 1:
+        raise ValueError(f"the number of pieces must be 1 or more, not {most_pieces!r}")
+    if not good_enough >= 0:
+        raise ValueError(f"the relative error that is good enough must not be negative, not {good_enough!r}")
+    nearest = _nearest(complex(target), holes, most_pieces)
+    if nearest.relative_error > good_enough or holes.free_amounts or nearest.pieces == 0:
+        return nearest
+    for n in range(1, nearest.pieces):
+        one = _nearest(nearest.target, holes, n)
+        if one.relative_error <= good_enough:
+            return one
+    return nearest
+
+
+def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
+    if holes.free_amounts:
+        amounts = nearest_amounts(target, holes)
+        mounted, bound = mounting(holes, amounts=amounts), np.inf
+    else:
+        counts, bound = nearest_pieces(target, holes, most_pieces)
+        mounted = mounting(holes, counts=counts)
+    error = mounted.vector - target
+    size = abs(error)
+    bound = min(bound, size)
+    against = abs(target) or abs(mounted.vector)
+    scale = max(abs(target), float(holes.pieces.max(initial=0.0)))
+    return Split(
+        target=target,
+        holes=holes,
+        mounting=mounted,
+        error=error,
+        relative_error=size / against if against > 0 else 0.0,
+        bound=bound,
+        proven=bool(size - bound <= _PROVEN * scale),
+    )
+
+
+def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
+    """The nearest vectors with 1, 2, … `most` pieces, as long as these are fewer than `found` has.
+
+    Each is listed only where it is nearer to the target than those with fewer pieces; empty for free amounts.
+    """
+    out: list[Split] = []
+    if found.holes.free_amounts:
+        return out
+    for n in range(1, min(most, found.pieces - 1) + 1):
+        one = split(found.target, found.holes, most_pieces=n)
+        if one.pieces == n:
+            out.append(one)
+    return out
+
+
+def percent(share: float) -> str:
+    """A relative error in percent, two digits, never as 1e+02."""
+    return f"{100 * share:.0f}" if share >= 0.0995 else f"{100 * share:.2g}"
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(angle, 2) % 360:g}°"
+
+
+def _plain(value: ArrayLike) -> float:
+    """Without the last digits, in which conversions of units and angles show."""
+    return float(f"{float(np.asarray(value)):.12g}")

@@ -1,0 +1,1 @@
+"""From coefficients and readings to correction weights: the methods, their certificates and errors."""

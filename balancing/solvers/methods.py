@@ -1,0 +1,278 @@
+"""The ways to weights: which method solves the stacked equations, and what its answer is worth.
+
+Every method gets the same stack `Y + W D` and gives weights, their covariance and what it can certify.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.resolution import HOPELESS
+from balancing.data.limits import Limits
+from balancing.solvers.effective_variance import FLOOR, effective_variance
+from balancing.solvers.error_propagation import correction_covariance
+from balancing.solvers.regularised import ridge, truncated
+from balancing.solvers.sampling import sampled_covariance
+from balancing.solvers.sectors import allowed_sectors, stands_in
+from balancing.solvers.solve import Method, Solution, solve
+from balancing.solvers.weighted_limits import STEPS, limited_fit
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+
+NO_EFFECT = 1e-6
+"""Share of the largest singular value below which a combination of planes has no effect."""
+METHODS = ("least-squares", "weighted", "minmax")
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """The equations of all chosen readings, one below the other.
+
+    Attributes
+    ----------
+    W, Y
+        Influence coefficients (N, P) and vibration of the bare rotor (N,).
+    channels
+        Covariance of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2); None: unknown.
+    row_weights
+        How much each reading counts, (N,); None: all alike.
+    limits
+        Of weights and amplitudes; None: no limits.
+    planes, readings
+        Names of the planes, and what to call each reading.
+    amplitude, weight
+        Write an amplitude or a weight with its unit.
+    """
+
+    W: ComplexArray
+    Y: ComplexArray
+    channels: FloatArray | None
+    row_weights: FloatArray | None
+    limits: Limits | None
+    planes: tuple[str, ...]
+    readings: tuple[str, ...]
+    amplitude: Callable[[float], str]
+    weight: Callable[[float], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Weights of one method.
+
+    Attributes
+    ----------
+    weights
+        Shape (P,).
+    covariance
+        (2P, 2P); None where errors are unknown.
+    gap
+        Certified relative distance from the optimum; None for a closed form.
+    chi_square, dof
+        Of the weighted fit: how well weights in these planes explain the readings.
+    active_weights, active_residuals
+        Limits that bind, (P,) and (N,).
+    warnings
+        What the user should know.
+    """
+
+    weights: ComplexArray
+    covariance: FloatArray | None
+    gap: float | None = None
+    chi_square: float | None = None
+    dof: int | None = None
+    active_weights: BoolArray | None = None
+    active_residuals: BoolArray | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def fit_weights(
+    stack: Stack, method: str, *, strength: float | str | None = None, keep: float | None = None
+) -> Fitted:
+    """Weights by one of the methods.
+
+    Parameters
+    ----------
+    stack
+        Equations, errors, limits.
+    method
+        "least-squares", "weighted" (readings count by the inverse of their errors, those of the coefficients
+        included) or "minmax".
+    strength
+        Ridge: how strongly large weights are avoided, relative; "auto".
+    keep
+        Truncation: number of combinations of planes to keep, or the smallest singular value relative to the
+        largest.
+
+    Raises
+    ------
+    ValueError
+        For an unknown method, combinations that are not offered, limits that cannot be met.
+    UndeterminedError
+        Where the readings do not tell the planes apart and neither ridge nor truncation is asked for.
+    """
+    if method not in METHODS:
+        hint = did_you_mean(method, METHODS)
+        raise ValueError(f"there is no method {method!r}{hint}; methods are {', '.join(METHODS)}")
+    if strength is not None or keep is not None:
+        return _regularised(stack, method, strength, keep)
+    if method == "weighted":
+        return _weighted(stack)
+    return _plain(stack, "minmax" if method == "minmax" else "least-squares")
+
+
+def _plain(stack: Stack, method: Method) -> Fitted:
+    found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
+    bound = found.gap is not None  # limits that do not bind leave the closed form
+    covariance: FloatArray | None = None
+    words: tuple[str, ...] = ()
+    if stack.channels is not None and method == "least-squares" and not bound:
+        covariance = _propagated(stack, found.weights, stack.row_weights)
+    elif stack.channels is not None:
+        covariance, words = _sampled(
+            stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
+        )
+    return Fitted(
+        found.weights,
+        covariance,
+        found.gap,
+        active_weights=found.active_weights,
+        active_residuals=found.active_residuals,
+        warnings=words,
+    )
+
+
+def _solve(
+    stack: Stack, method: Method, W: ComplexArray, Y: ComplexArray, row_weights: FloatArray | None
+) -> Solution:
+    return solve(
+        W,
+        Y,
+        method=method,
+        row_weights=row_weights,
+        limits=stack.limits,
+        names=stack.planes,
+        readings=stack.readings,
+        amplitude=stack.amplitude,
+        weight=stack.weight,
+    )
+
+
+def _propagated(stack: Stack, D: ComplexArray, row_weights: FloatArray | None) -> FloatArray:
+    """First-order covariance of least squares with row weights: those of the scaled rows."""
+    assert stack.channels is not None
+    w = np.ones(len(stack.Y)) if row_weights is None else row_weights
+    W, r = w[:, None] * stack.W, w * (stack.Y + stack.W @ D)
+    return correction_covariance(W, D, r, w[:, None, None] ** 2 * stack.channels)
+
+
+def _weighted(stack: Stack) -> Fitted:
+    if stack.channels is None:
+        if stack.row_weights is None:
+            raise ValueError(
+                "the method weighted needs errors of the readings ([errors], --amplitude-error, "
+                "--phase-error or repeated readings), or weights of sensors or speeds"
+            )
+        note = "the errors of the readings are unknown: they count by the weights of sensors and speeds alone"
+        plain = _plain(stack, "least-squares")
+        return replace(plain, warnings=(note,))
+    free = effective_variance(stack.W, stack.Y, stack.channels, row_weights=stack.row_weights)
+    if not free.converged:
+        raise UndeterminedError(
+            "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
+            "bound; use larger trial weights, fewer planes or another method"
+        )
+    if stack.limits is None or _kept(stack.limits, free.weights, free.residual):
+        return Fitted(free.weights, free.covariance, chi_square=free.chi_square, dof=free.dof)
+    limits, channels = stack.limits, _regular(stack.channels, free.model_error)
+
+    def search(W: ComplexArray, Y: ComplexArray, rows: FloatArray, within: Limits) -> Solution:
+        names = (*(f"row {i + 1}" for i in range(len(stack.planes))), *stack.readings)
+        return solve(
+            W,
+            Y,
+            row_weights=rows,
+            limits=within,
+            names=stack.planes,
+            readings=names,
+            amplitude=stack.amplitude,
+            weight=stack.weight,
+        )
+
+    def limited(W: ComplexArray, Y: ComplexArray, start: ComplexArray, steps: int) -> Solution:
+        return limited_fit(W, Y, channels, stack.row_weights, limits, start, search, steps=steps)
+
+    found = limited(stack.W, stack.Y, free.weights, STEPS)
+    # drawn from the errors of the readings alone: what explains the residuals is the same in every job
+    covariance, words = _sampled(
+        stack, lambda W, Y: limited(W, Y, found.weights, 1).weights, _regular(stack.channels, 0.0)
+    )
+    return Fitted(
+        found.weights,
+        covariance,
+        found.gap,
+        free.chi_square,
+        free.dof,
+        active_weights=found.active_weights,
+        active_residuals=found.active_residuals,
+        warnings=words,
+    )
+
+
+def _regular(channels: FloatArray, model_error: float) -> FloatArray:
+    """Errors of the readings with the further one that explains the residuals, and none that is exactly 0."""
+    wider = channels.copy()
+    least = FLOOR**2 * float(np.trace(channels[:, :2, :2], axis1=1, axis2=2).mean()) / 2
+    wider[:, [0, 1], [0, 1]] += model_error**2 + least
+    return wider
+
+
+def _sampled(
+    stack: Stack, solver: Callable[[ComplexArray, ComplexArray], ComplexArray], channels: FloatArray
+) -> tuple[FloatArray | None, tuple[str, ...]]:
+    """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
+    try:
+        return sampled_covariance(solver, stack.W, stack.Y, channels), ()
+    except ValueError as error:
+        return None, (str(error),)
+
+
+def _kept(limits: Limits, D: ComplexArray, r: ComplexArray) -> bool:
+    return bool(
+        (np.abs(D) <= limits.max_weight * (1 + 1e-9)).all()
+        and (np.abs(r) <= limits.residual.ravel() * (1 + 1e-9)).all()
+        and all(stands_in(d, allowed_sectors(arcs)) for d, arcs in zip(D, limits.forbidden, strict=True))
+    )
+
+
+def _regularised(stack: Stack, method: str, strength: float | str | None, keep: float | None) -> Fitted:
+    if strength is not None and keep is not None:
+        raise ValueError("ridge and truncation are two ways to the same end: choose one")
+    if method != "least-squares" or (stack.limits is not None and stack.limits.any):
+        raise ValueError("ridge and truncation go with least squares without limits only")
+    if strength is not None:
+        found = ridge(
+            stack.W, stack.Y, strength, stack.row_weights, channels=stack.channels, planes=stack.planes
+        )
+    else:
+        assert keep is not None
+        found = truncated(
+            stack.W, stack.Y, keep, stack.row_weights, channels=stack.channels, planes=stack.planes
+        )
+    words = [found.words]
+    if found.kept:
+        share = float(found.singular_values[found.kept - 1] / found.singular_values[0])
+        if share < NO_EFFECT:
+            raise UndeterminedError(
+                f"of the {found.kept} combinations of planes to keep, the last has no effect ({share:.1g} "
+                "of that of the first): keep fewer"
+            )
+        if share < 1 / HOPELESS:
+            words.append(
+                f"the last combination of planes that is kept has only {share:.1g} of the effect of the "
+                "first: no instrument measures that; keep fewer"
+            )
+    return Fitted(found.weights, found.covariance, warnings=tuple(words))
