@@ -7,8 +7,16 @@ import pytest
 import rotorid
 from rotorid.expressions import FUNCTIONS
 from rotorid.samples import sample_data
-from rotorid.tables import bearing, influence, jobbook, jobkeys, modes, rotor, runs, unbalance, weights
-from rotorid.tables.tomlfile import Section
+from rotorid.tables.data import modes_table as modes
+from rotorid.tables.job import keys as jobkeys
+from rotorid.tables.job import workbook_reading as jobbook
+from rotorid.tables.reader.toml_file import Section
+from rotorid.tables.rotor import bearing
+from rotorid.tables.rotor import rotor_table as rotor
+from rotorid.tables.rotor import unbalance_table as unbalance
+from rotorid.tables.runs import influence_table as influence
+from rotorid.tables.runs import runs_table as runs
+from rotorid.tables.runs import weights_table as weights
 
 TEXT = (sample_data().parent / "docs" / "files.md").read_text(encoding="utf-8")
 WORDS = {word for code in re.findall(r"`([^`]+)`", TEXT) for word in re.findall(r"\w+", code)}

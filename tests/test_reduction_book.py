@@ -6,7 +6,7 @@ import pytest
 import fem
 from rotorid import InputError, equivalent_masses, natural_frequencies, read_rotor
 from rotorid.samples import sample_data
-from rotorid.tables.modes import read_compliance, read_modes
+from rotorid.tables.data.modes_table import read_compliance, read_modes
 
 NODES = (7, 12, 18)
 # masses as the book goes on with them, and its eigenvalues λ = 1/ω², ascending in λ

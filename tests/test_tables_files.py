@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book, write_csv
 
 from rotorid.tables import InputError, TableWarning, read_job, read_rotor, read_trials
-from rotorid.tables.columns import Column, read_table
-from rotorid.tables.problems import Problems
-from rotorid.tables.units import SPEED, VIBRATION, one_of
+from rotorid.tables.reader.columns import Column, read_table
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.units import SPEED, VIBRATION, one_of
 
 FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -8,7 +8,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_c
 
 from balancing import correct, estimate_influence
 from rotorid.tables import read_job
-from rotorid.tables.joblimits import with_limits
+from rotorid.tables.job.job_limits import with_limits
 
 HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 AGAINST = 'angles = "against rotation"\n'

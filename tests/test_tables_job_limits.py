@@ -9,7 +9,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
 from rotorid.tables import job_from_files, read_job
-from rotorid.tables.joblimits import arc, with_limits
+from rotorid.tables.job.job_limits import arc, with_limits
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tables_data import complaints, csv_text, replaced, the_only, write_book, write_csv
 
 import fem
-from rotorid.tables.modes import read_compliance, read_modes
+from rotorid.tables.data.modes_table import read_compliance, read_modes
 
 MODES = [
     ["mode", "frequency_rad_s", "node", "shape"],

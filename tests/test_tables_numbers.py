@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rotorid.base.suggestions import did_you_mean, suggest
-from rotorid.tables import read_trials, units
-from rotorid.tables.number import NotANumber, parse_number, thousands_or_decimals
-from rotorid.tables.problems import InputError, Problem, Problems
+from rotorid.tables import read_trials
+from rotorid.tables.reader import units
+from rotorid.tables.reader.number import NotANumber, parse_number, thousands_or_decimals
+from rotorid.tables.reader.problems import InputError, Problem, Problems
 
 
 @pytest.mark.parametrize(

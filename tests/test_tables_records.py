@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
-from rotorid.tables.records import read_sigma
+from rotorid.tables.data.records import read_sigma
 
 FOLDER = sample_data() / "fit"
 MODEL = """

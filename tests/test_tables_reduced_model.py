@@ -18,8 +18,8 @@ from rotorid.reduction import reduce
 from rotorid.reduction.small import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
-from rotorid.tables.modelwriting import ode_model_bytes
-from rotorid.tables.motionfile import read_motion
+from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.tables.models.motion_file import read_motion
 from rotorid.timedomain import Record, simulate
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.statespace import state_space

@@ -9,7 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_boo
 from balancing import ReadingErrors, Trials, correct, estimate_influence
 from balancing.data.errors import reading_covariance
 from rotorid.tables import read_job
-from rotorid.tables.slowroll import SlowRoll, subtract_slow_roll
+from rotorid.tables.runs.slow_roll import SlowRoll, subtract_slow_roll
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 VECTORS = """[slow_roll.A]

@@ -16,10 +16,10 @@ from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, job_from_files, read_job, write_influence
-from rotorid.tables.jobbook import key_parts
-from rotorid.tables.jobcomparison import differences
-from rotorid.tables.jobsource import JobSource
-from rotorid.tables.jobworkbook import job_workbook_bytes
+from rotorid.tables.job.comparison import differences
+from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.workbook_reading import key_parts
+from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 DATA = sample_data()
 
@@ -224,7 +224,7 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
 
 
 def test_limits_of_the_command_line_come_back(folder, tmp_path):
-    from rotorid.tables.joblimits import with_limits
+    from rotorid.tables.job.job_limits import with_limits
 
     path = write_job(folder, PARTS["limits"])
     for max_mass, limit in (("2.2g", ["0.3mil_pp"]), ("1=0.07oz,2=3", ["A=7.7", "B=0.012"])):
@@ -248,7 +248,7 @@ def test_a_rotor_that_cannot_be_named_is_refused(folder, tmp_path, monkeypatch):
     def on_another_drive(*_):
         raise ValueError("path is on mount 'D:', start on mount 'C:'")
 
-    monkeypatch.setattr("rotorid.tables.jobsheets.os.path.relpath", on_another_drive)
+    monkeypatch.setattr("rotorid.tables.job.workbook_sheets.os.path.relpath", on_another_drive)
     with pytest.raises(ValueError, match="on another drive than the workbook"):
         job_workbook_bytes(read_job(path), JobSource((path,)), tmp_path / "sheet.xlsx")
 
@@ -311,6 +311,6 @@ def test_the_comparison_sees_every_part(folder):
 
 def test_too_much_for_a_workbook_is_refused(folder, tmp_path, monkeypatch):
     path = write_job(folder, "")
-    monkeypatch.setattr("rotorid.tables.jobpages.MOST_ROWS", 6)
+    monkeypatch.setattr("rotorid.tables.job.workbook_pages.MOST_ROWS", 6)
     with pytest.raises(ValueError, match="'runs' would have 7 rows, and a workbook holds 6"):
         job_workbook_bytes(read_job(path), JobSource((path,)), tmp_path / "sheet.xlsx")

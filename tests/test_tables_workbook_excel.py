@@ -14,10 +14,10 @@ from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.jobcomparison import differences
-from rotorid.tables.jobsource import JobSource
-from rotorid.tables.jobtemplate import template_bytes
-from rotorid.tables.jobworkbook import job_workbook_bytes
+from rotorid.tables.job.comparison import differences
+from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.workbook_template import template_bytes
+from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 BK = sample_data() / "bk_two_plane"
 FORM = ("runs", "weights", "planes", "sensors", "settings")

@@ -11,8 +11,8 @@ from rotorid.reduction import reduce
 from rotorid.reduction.small import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
-from rotorid.tables.modelwriting import ode_model_bytes
-from rotorid.tables.motionfile import read_motion
+from rotorid.tables.models.model_writing import ode_model_bytes
+from rotorid.tables.models.motion_file import read_motion
 from rotorid.timedomain import ode_model, second_order
 from rotorid.timedomain.statespace import state_space
 

@@ -8,11 +8,11 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from rotorid.base.text import listing
-from rotorid.tables import units
-from rotorid.tables.conventions import ANGLES, as_angles, polar
-from rotorid.tables.jobquantity import Quantity, to_job_weight
-from rotorid.tables.number import NotANumber, check_size, parse_number
-from rotorid.tables.units import Unit, UnitError
+from rotorid.tables.job.quantity import Quantity, to_job_weight
+from rotorid.tables.reader import units
+from rotorid.tables.reader.number import NotANumber, check_size, parse_number
+from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.tables.runs.conventions import ANGLES, as_angles, polar
 
 _WORD = re.compile(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d].*)?")
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")

@@ -216,9 +216,9 @@ def balance(  # noqa: PLR0915
     from rotorid.cli.coefficients import choose, compare_planes
     from rotorid.cli.verdict import Places, judge, tolerance_of
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.influence import influence_bytes
-    from rotorid.tables.joblimits import with_limits
-    from rotorid.tables.jobsource import JobSource
+    from rotorid.tables.job.job_limits import with_limits
+    from rotorid.tables.job.source import JobSource
+    from rotorid.tables.runs.influence_table import influence_bytes
 
     if template is not None:
         write_template(template, files)

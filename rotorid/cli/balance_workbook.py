@@ -13,7 +13,7 @@ from rotorid.cli.common import check_targets, provenance
 if TYPE_CHECKING:
     from rotorid.cli.balance_report import Report
     from rotorid.tables import Job
-    from rotorid.tables.jobsource import JobSource
+    from rotorid.tables.job.source import JobSource
 
 
 def write_template(path: Path, files: object) -> None:
@@ -25,8 +25,8 @@ def write_template(path: Path, files: object) -> None:
         If there is a job as well, or the name is no workbook's or one of an existing file, which may be
         filled in already.
     """
-    from rotorid.tables.jobtemplate import template_bytes
-    from rotorid.tables.writing import write_bytes
+    from rotorid.tables.job.workbook_template import template_bytes
+    from rotorid.tables.reader.writing import write_bytes
 
     if files:
         raise ValueError(
@@ -50,7 +50,7 @@ def workbook(
     job: Job, source: JobSource, output: Path | None, report: Report, options: Mapping[str, object]
 ) -> tuple[Path | None, Callable[[], bytes]]:
     """A file and its content for `emit`: the job with its results."""
-    from rotorid.tables.jobworkbook import job_workbook_bytes
+    from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
     target = as_workbook(output)
     return target, lambda: job_workbook_bytes(

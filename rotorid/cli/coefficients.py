@@ -117,7 +117,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     from dataclasses import replace
 
     from balancing.coefficients.from_model import model_influence
-    from rotorid.tables.units import weight
+    from rotorid.tables.reader.units import weight
 
     if job.rotor is None:
         raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
@@ -159,7 +159,7 @@ def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
     ValueError
         For a unit that is only a label.
     """
-    from rotorid.tables.units import vibration
+    from rotorid.tables.reader.units import vibration
 
     kinds: dict[str, Literal["displacement", "velocity", "acceleration"]] = {
         "length": "displacement",

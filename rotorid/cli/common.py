@@ -134,7 +134,7 @@ def emit(
     The sheet is made from the document and the provenance.
     """
     from rotorid.cli.verbose import note
-    from rotorid.tables.writing import table_bytes, write_files
+    from rotorid.tables.reader.writing import table_bytes, write_files
 
     note(document)
     check_inputs([t[0] for t in (figure, table, *more, report) if t and t[0]], files)

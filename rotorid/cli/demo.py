@@ -102,7 +102,7 @@ def _documents(folder: Path, sample: Sample) -> dict[str, Any]:
 def _copy(folder: Path, sample: Sample) -> list[Path]:
     """Write the files of a sample; refuse before anything is written."""
     from rotorid.samples import sample_data
-    from rotorid.tables.writing import write_files
+    from rotorid.tables.reader.writing import write_files
 
     samples = sample_data()
     sources: list[Path] = []

@@ -233,7 +233,7 @@ def _read(
 ) -> list[Record]:
     """All records, with standard deviations for all of them or for none."""
     from rotorid.tables import read_record
-    from rotorid.tables.records import STD, read_sigma
+    from rotorid.tables.data.records import STD, read_sigma
 
     deviations = read_sigma(sigma, model)
     records = [read_record(path, model, allow_missing=allow_missing, sigma=deviations) for path in paths]

@@ -280,7 +280,7 @@ def reduce(  # noqa: C901, PLR0915
             )
         from rotorid.reduction import rank_nodes
         from rotorid.reduction import reduce as reduce_rotor
-        from rotorid.tables.modes import read_modes
+        from rotorid.tables.data.modes_table import read_modes
 
         machine = read_rotor(rotor)
         files = [*rotor_files(rotor), *([measured] if measured else [])]

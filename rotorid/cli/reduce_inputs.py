@@ -15,7 +15,7 @@ from rotorid.cli.common import nodes as parse_nodes
 if TYPE_CHECKING:
     import fem
     from rotorid.reduction import InputErrors, Placement, Reduction
-    from rotorid.tables.modes import MeasuredModes
+    from rotorid.tables.data.modes_table import MeasuredModes
 
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
@@ -172,7 +172,7 @@ def from_tables(
 ) -> tuple[Reduction, list[Path]]:
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.reduction import reduce_measured
-    from rotorid.tables.modes import read_compliance, read_modes
+    from rotorid.tables.data.modes_table import read_compliance, read_modes
 
     if compliance is None or measured is None:
         raise ValueError("give a rotor, or --compliance and --measured, which take its place")

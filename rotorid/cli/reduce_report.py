@@ -178,7 +178,7 @@ class Report:
 
         Dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
         """
-        from rotorid.tables.modelwriting import ode_model_bytes
+        from rotorid.tables.models.model_writing import ode_model_bytes
 
         if (self.result.masses.solution <= 0).any():
             raise ValueError(

@@ -180,7 +180,7 @@ def split(
     from rotorid.cli import split_answers as answers
     from rotorid.cli.amounts import length_of, vectors_of
     from rotorid.cli.split_holes import read_holes
-    from rotorid.tables.units import MASS
+    from rotorid.tables.reader.units import MASS
 
     options: dict[str, object] = {
         "--holes": holes,

@@ -157,7 +157,7 @@ def _two_figure(wanted: Wanted, found: TwoPositions) -> Figure:
 
 def unbalance_of(wanted: Wanted, why: str) -> tuple[complex, float]:
     """The wanted unbalance, kg·m, and the radius, m, which is needed."""
-    from rotorid.tables.units import MASS
+    from rotorid.tables.reader.units import MASS
 
     if wanted.radius is None:
         raise ValueError(f"{why} needs --radius, such as --radius 100mm")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.iso21940 import Tolerance
-    from rotorid.tables.units import Unit
+    from rotorid.tables.reader.units import Unit
 
 
 def tolerance(
@@ -55,7 +55,7 @@ def tolerance(
     --planes left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm --plot tolerance.png
     """
     from balancing.iso21940 import tolerance as permissible
-    from rotorid.tables import units
+    from rotorid.tables.reader import units
 
     check_targets(plot, output)
     ends = None if bearings is None else two_positions(bearings)
@@ -93,8 +93,8 @@ def quantity(text: str, what: str, known: Mapping[str, Unit], example: str) -> f
     ValueError
         For no number, no unit or another one; says which there are.
     """
-    from rotorid.tables.number import NotANumber, parse_number
-    from rotorid.tables.units import spelt
+    from rotorid.tables.reader.number import NotANumber, parse_number
+    from rotorid.tables.reader.units import spelt
 
     body = text.strip()
     split = next((i for i in range(len(body), 0, -1) if body[i - 1] in "0123456789."), 0)
@@ -125,7 +125,7 @@ def speed_with_unit(text: str, what: str) -> float:
 
 def plane_positions(text: str) -> dict[str, float | None]:
     """Read "left=100mm,right=600mm" in m; None where there is no position."""
-    from rotorid.tables.units import LENGTH
+    from rotorid.tables.reader.units import LENGTH
 
     found: dict[str, float | None] = {}
     for part in text.split(","):
@@ -143,7 +143,7 @@ def plane_positions(text: str) -> dict[str, float | None]:
 
 def two_positions(text: str) -> tuple[float, float]:
     """Read "0mm,700mm" in m."""
-    from rotorid.tables.units import LENGTH
+    from rotorid.tables.reader.units import LENGTH
 
     parts = text.split(",")
     if len(parts) != 2:

@@ -176,8 +176,8 @@ def _from_force(asked: dict[str, Any], rotor: float | None, load: float | None) 
 
     from balancing.data.conventions import Labels
     from balancing.trial_weight import trial_from_force
-    from rotorid.tables import units
-    from rotorid.tables.conventions import Conventions, as_angles, as_phase
+    from rotorid.tables.reader import units
+    from rotorid.tables.runs.conventions import Conventions, as_angles, as_phase
 
     missing = [name for name in ("speed", "radius") if asked[name] is None]
     if rotor is None and load is None:
@@ -221,8 +221,9 @@ def _from_job(
     from balancing.coefficients.baseline import starting_point
     from balancing.trial_weight import GRAVITY, trial_from_coefficients
     from rotorid.cli.coefficients import choose
-    from rotorid.tables import read_job, units
-    from rotorid.tables.joblimits import with_limits
+    from rotorid.tables import read_job
+    from rotorid.tables.job.job_limits import with_limits
+    from rotorid.tables.reader import units
 
     job = read_job(path, phase=asked["phase"], angles=asked["angles"])
     if asked["max_mass"] is not None:
@@ -296,13 +297,13 @@ def _degrees(value: float, what: str) -> float:
 
 
 def _mass(text: str, what: str) -> float:
-    from rotorid.tables.units import MASS
+    from rotorid.tables.reader.units import MASS
 
     return quantity(text, what, MASS, "500kg" if what == "--rotor-mass" else "30g")
 
 
 def _weight(text: str, labels: Labels) -> float:
-    from rotorid.tables import units
+    from rotorid.tables.reader import units
 
     by_mass = labels.weight_unit in units.MASS
     known, example = (units.MASS, "30g") if by_mass else (units.UNBALANCE, "300g_mm")
@@ -310,7 +311,7 @@ def _weight(text: str, labels: Labels) -> float:
 
 
 def _force(text: str) -> float:
-    from rotorid.tables.units import Unit
+    from rotorid.tables.reader.units import Unit
 
     known = {
         "N": Unit("N", "force"),

@@ -37,7 +37,7 @@ def tolerance_of(
         For some of the options only, more than two planes, and values that cannot be.
     """
     from balancing.iso21940 import tolerance
-    from rotorid.tables import units
+    from rotorid.tables.reader import units
 
     along = (places.positions, places.bearings, places.centre)
     if grade is None and mass is None and service_speed is None and not any(along):
@@ -67,7 +67,7 @@ def judge(
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
     from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
-    from rotorid.tables.units import weight
+    from rotorid.tables.reader.units import weight
 
     limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
     if tolerance is None and not limited:

@@ -12,7 +12,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
 from rotorid.base.units import rpm
 from rotorid.regression import coverage_factor
-from rotorid.tables import units
+from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence

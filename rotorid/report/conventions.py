@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.tables import units
+from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,22 +4,22 @@ Everything behind it is plain data in SI, with positive phase = lead and angles 
 complaint about a file names the file, row and column, what was found and what was expected (`InputError`).
 """
 
-from rotorid.tables.conventions import Conventions, StatedErrors
-from rotorid.tables.harmonicfile import HarmonicFile, read_harmonic_model
-from rotorid.tables.influence import influence_frame, read_influence, write_influence
-from rotorid.tables.job import Job, job_from_files, read_job
-from rotorid.tables.measurements import read_measurements
-from rotorid.tables.modes import MeasuredModes, read_compliance, read_modes
-from rotorid.tables.motionfile import read_motion
-from rotorid.tables.odefile import read_ode_model
-from rotorid.tables.problems import InputError, Problem, TableWarning
-from rotorid.tables.records import read_record
-from rotorid.tables.rotor import read_rotor
-from rotorid.tables.rotorfile import rotor_files
-from rotorid.tables.rotorwriting import write_rotor
-from rotorid.tables.trials import read_trials
-from rotorid.tables.unbalance import read_unbalance
-from rotorid.tables.writing import write_table
+from rotorid.tables.data.measurements import read_measurements
+from rotorid.tables.data.modes_table import MeasuredModes, read_compliance, read_modes
+from rotorid.tables.data.records import read_record
+from rotorid.tables.job.job_file import Job, job_from_files, read_job
+from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_model
+from rotorid.tables.models.motion_file import read_motion
+from rotorid.tables.models.ode_file import read_ode_model
+from rotorid.tables.reader.problems import InputError, Problem, TableWarning
+from rotorid.tables.reader.writing import write_table
+from rotorid.tables.rotor.rotor_file import rotor_files
+from rotorid.tables.rotor.rotor_table import read_rotor
+from rotorid.tables.rotor.rotor_writing import write_rotor
+from rotorid.tables.rotor.unbalance_table import read_unbalance
+from rotorid.tables.runs.conventions import Conventions, StatedErrors
+from rotorid.tables.runs.influence_table import influence_frame, read_influence, write_influence
+from rotorid.tables.runs.trials import read_trials
 
 __all__ = [
     "Conventions",

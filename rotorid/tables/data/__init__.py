@@ -1,0 +1,1 @@
+"""What was measured: harmonic tests, records, natural frequencies with shapes, compliances."""

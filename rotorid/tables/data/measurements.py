@@ -1,0 +1,258 @@
+"""Measurement tables: amplitudes read in harmonic tests, and natural frequencies with shapes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.text import listing
+from rotorid.tables.data.repeats import FREQUENCIES, merge_repeats
+from rotorid.tables.models.harmonic_file import HarmonicFile
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.units import Unit, UnitError, one_of
+from rotorid.tables.runs.conventions import FULL_TURN, polar
+
+if TYPE_CHECKING:
+    from rotorid.harmonic.experiments import Experiments
+    from rotorid.harmonic.model import HarmonicModel
+
+
+_SPEED = one_of(units.SPEED)
+_FREE = "a free vibration has real amplitudes"
+
+
+def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> Experiments:
+    """Read a measurement table.
+
+    Its columns are `experiment` (optional), `frequency_rad_s` (or `_Hz`, or `speed_rpm`) and, for each
+    amplitude NAME of the model, either `NAME_amplitude` (peak, with or without a unit) and `NAME_phase_deg`
+    (positive = lead), or `NAME_re` and `NAME_im` (without `_im`: real). A blank amplitude was not measured.
+    Where inputs are absent or 0 the row is a free vibration: natural frequency and shape.
+
+    With a column `repeat`, rows of one experiment (or, without names, of one frequency and excitation) are
+    readings of the same: their mean counts, and their scatter, pooled over the table, says how large the
+    errors are unless the model file states them.
+
+    Parameters
+    ----------
+    path
+        The file; in a workbook the sheet `measurements`, or else the first one.
+    model
+        Knows the names of the amplitudes; a model file also states errors.
+
+    Returns
+    -------
+    Experiments
+        Frequencies in rad/s; NaN where nothing was measured.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+
+    Warns
+    -----
+    TableWarning
+        Where an amplitude of the model is nowhere in the table, and where few repeats tell the errors.
+    """
+    from rotorid.harmonic.experiments import Experiments
+
+    file = model if isinstance(model, HarmonicFile) else None
+    equations = model.model if isinstance(model, HarmonicFile) else model
+    problems = Problems()
+    table = read_table(path, "measurements", _columns(equations.signals), problems, first=True)
+    if table is None:
+        problems.stop()
+        raise AssertionError("no table and no problem")
+    unclear = len(problems) > 0
+    frequency = _frequency(table, problems, unclear=unclear)
+    read = {name: _amplitude(table, name, problems, unclear=unclear) for name in equations.signals}
+    if not unclear:
+        _complain_about_missing(table, equations, read, problems)
+    names = _experiments(table, problems)
+    problems.stop()
+    signals = {name: values for name, values in read.items() if values is not None}
+    free = _free(table, equations, signals, problems)
+    problems.stop()
+    nothing = np.full(len(table), complex(np.nan, np.nan))
+    for name in equations.signals:
+        if name not in signals:
+            signals[name] = np.zeros(len(table), dtype=complex) if name in equations.inputs else nothing
+    errors = None if file is None else file.errors
+    rows = Experiments(names, frequency, signals, free, errors)
+    if "repeat" in table:
+        rows = merge_repeats(table, rows, equations, problems)
+        problems.stop()
+    return rows
+
+
+def _columns(signals: tuple[str, ...]) -> tuple[Column, ...]:
+    own = [
+        column
+        for name in signals
+        for column in (
+            Column(f"{name}_amplitude", _amplitude_unit, (f"{name}_amplitude",), False, blank=True),
+            Column(f"{name}_phase", one_of(units.ANGLE), (f"{name}_phase_deg",), False, blank=True),
+            Column(f"{name}_re", _amplitude_unit, (f"{name}_re",), False, blank=True),
+            Column(f"{name}_im", _amplitude_unit, (f"{name}_im",), False, blank=True),
+        )
+    ]
+    return (
+        Column("experiment", required=False),
+        Column("frequency", _SPEED, ("frequency_rad_s", "frequency_Hz"), required=False),
+        Column("speed", _SPEED, ("speed_rpm",), required=False),
+        Column("repeat", required=False),
+        *own,
+    )
+
+
+def _amplitude_unit(name: str) -> Unit:
+    """No unit (the model's own), or a known one of vibration, which becomes SI and peak."""
+    if not name:
+        return Unit("", "model")
+    unit = units.vibration(name)
+    if unit.kind.startswith("label"):
+        raise UnitError(
+            f"no unit (amplitudes are in the units of the model) or one such as mm, um_pp, not {name!r}"
+        )
+    return unit
+
+
+def _frequency(table: Table, problems: Problems, *, unclear: bool) -> FloatArray:
+    present = [stem for stem in FREQUENCIES if stem in table]
+    if len(present) != 1:
+        if not unclear or present:
+            expected = "one column frequency_rad_s, frequency_Hz or speed_rpm"
+            name = table.fields[present[1]].name if present else "frequency_rad_s"
+            problems.add(table.source, table.header_row, name, None, expected)
+        return np.full(len(table), np.nan)
+    values = table.numbers(present[0])
+    must_be(table, present[0], values >= 0, "a frequency of 0 or more", problems)
+    return values
+
+
+def _amplitude(table: Table, name: str, problems: Problems, *, unclear: bool) -> ComplexArray | None:
+    """One amplitude of the model, NaN where a row does not have it; None if the table has no such column."""
+    size, phase, real, imag = (f"{name}_{part}" for part in ("amplitude", "phase", "re", "im"))
+    there = [stem for stem in (size, phase, real, imag) if stem in table]
+    if not there:
+        return None
+    way = {size, phase} if size in table or phase in table else {real, imag}
+    for stem in there:
+        if stem not in way:
+            expected = f"{name} either as {size} and {phase}_deg or as {real} and {imag}, not some of both"
+            problems.add(table.source, table.header_row, table.fields[stem].name, None, expected)
+            return None
+    lead, follow = (size, phase) if size in way else (real, imag)
+    if lead not in table or (follow == phase and phase not in table):
+        missing, other = (lead, there[0]) if lead not in table else (f"{phase}_deg", lead)
+        if not unclear:
+            expected = f"a column {missing}, as there is {table.fields[other].name}"
+            problems.add(table.source, table.header_row, missing, None, expected)
+        return None
+    first = table.numbers(lead)
+    second = table.numbers(follow, missing=0.0)
+    blank = [np.array([_is_blank(table, stem, i) for i in range(len(table))]) for stem in (lead, follow)]
+    if follow in table:
+        needs = blank[1] & ~blank[0] & ~((follow == phase) & (first == 0))
+        for i in np.flatnonzero(needs):
+            hint = (
+                "a number, as its amplitude is given"
+                if follow == phase
+                else "a number (0 for a real amplitude)"
+            )
+            table.complain(problems, int(i), follow, hint)
+        for i in np.flatnonzero(blank[0] & ~blank[1]):
+            expected = f"a number, or {follow} blank too where {name} was not measured"
+            table.complain(problems, int(i), lead, expected)
+        second = np.where(blank[1] & ~blank[0], 0.0, second)
+    if lead == size:
+        must_be(
+            table,
+            size,
+            (first >= 0) | blank[0],
+            f"an amplitude of 0 or more ({real} may be negative)",
+            problems,
+        )
+        allowed = (np.abs(second) <= FULL_TURN) | blank[1]
+        must_be(table, phase, allowed, "a phase from -360 to 360 degrees", problems)
+        return polar(first, np.where(blank[0], 0.0, second), 1)
+    value = np.empty(len(table), dtype=complex)
+    value.real, value.imag = first, second
+    value[blank[0]] = complex(np.nan, np.nan)
+    return value
+
+
+def _is_blank(table: Table, stem: str, index: int) -> bool:
+    return stem in table and table.fields[stem].cells[index] == ""
+
+
+def _complain_about_missing(
+    table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None], problems: Problems
+) -> None:
+    absent = [name for name in model.outputs if not _mentioned(table, name)]
+    if len(absent) == len(model.outputs):
+        forms = listing(
+            [f"{name}_amplitude and {name}_phase_deg, or {name}_re and {name}_im" for name in absent]
+        )
+        problems.add(table.source, table.header_row, None, None, f"measured amplitudes: columns {forms}")
+    elif absent and not len(problems):
+        import warnings
+
+        lost = listing(absent, "and")
+        message = f"{table.source}: the table has no {lost}: equations that need it say nothing"
+        warnings.warn(message, TableWarning, stacklevel=3)
+    for name, values in read.items():
+        if values is not None and np.isnan(values).all() and not len(problems):
+            column = next(f.name for stem, f in table.fields.items() if stem.startswith(f"{name}_"))
+            problems.add(table.source, None, column, None, "a number in at least one row, or no such column")
+
+
+def _mentioned(table: Table, name: str) -> bool:
+    return any(f"{name}_{part}" in table for part in ("amplitude", "phase", "re", "im"))
+
+
+def _experiments(table: Table, problems: Problems) -> tuple[str, ...]:
+    if "experiment" not in table:
+        return tuple(str(i + 1) for i in range(len(table)))
+    names = table.texts("experiment")
+    if "repeat" not in table:
+        first: dict[str, int] = {}
+        for i, name in enumerate(names):
+            if name and first.setdefault(name, i) != i:
+                expected = (
+                    f"another name than in row {table.rows[first[name]]}; "
+                    "repeated readings of one experiment need a column repeat"
+                )
+                table.complain(problems, i, "experiment", expected)
+    return names
+
+
+def _free(
+    table: Table, model: HarmonicModel, signals: dict[str, ComplexArray], problems: Problems
+) -> BoolArray:
+    """Which rows are free vibrations; complaints about rows without a force that are none."""
+    unforced = np.ones(len(table), dtype=bool)
+    if model.has_constant_terms:
+        return ~unforced
+    inputs = [name for name in model.inputs if name in signals]
+    for name in inputs:
+        unforced &= signals[name] == 0
+    for name in model.outputs:
+        if name not in signals:
+            continue
+        for i in np.flatnonzero(unforced & (np.abs(signals[name].imag) > 0)):
+            stem = f"{name}_im" if f"{name}_im" in table else f"{name}_phase"
+            if len(inputs) == len(model.inputs):
+                table.complain(problems, int(i), stem, f"0: nothing excites this row, and {_FREE}")
+                continue
+            lost = [name for name in model.inputs if name not in signals]
+            expected = f"a column {lost[0]}_re or {lost[0]}_amplitude: nothing excites the rows, and {_FREE}"
+            problems.add(table.source, table.header_row, f"{lost[0]}_re", None, expected)
+            return unforced
+    return unforced

@@ -1,0 +1,1 @@
+"""Balancing jobs: job files and workbooks, read, completed and written."""

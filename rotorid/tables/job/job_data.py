@@ -1,0 +1,113 @@
+"""One balancing job as it is read: readings, weights, and all that the job says about them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from balancing.coefficients.influence import Influence
+from balancing.data.limits import Limits
+from balancing.data.trials import Trials
+from balancing.mounting.holes import Holes
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.tables.reader.grid import Grid
+from rotorid.tables.runs.conventions import Conventions
+
+if TYPE_CHECKING:
+    from fem.rotor import Rotor
+    from fem.sensors import Sensor
+
+Source = Path | Grid
+"""A table of a job: a file, or the cells of a sheet."""
+
+
+def source_name(source: Source) -> str:
+    """How messages name a table."""
+    return source.source if isinstance(source, Grid) else str(source)
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """One balancing job, read completely.
+
+    Attributes
+    ----------
+    trials
+        Readings and mounted weights.
+    influence
+        Stored coefficients for the speeds and sensors of the readings, in their order, or None.
+    conventions
+        Of phases, angles and speeds.
+    files
+        All files that were read, for the provenance of a result.
+    planes
+        Names (P,): those of stored coefficients or else of the weights, then planes that only the rotor
+        model knows (named in the job, with a node).
+    limits
+        In SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`; None: none.
+    row_weights
+        Of each reading in the fit, shape (S, C): the speed's times the sensor's; None where all are 1.
+    left_out
+        Planes that the job tells not to use.
+    check
+        Check runs, in the units and at the speeds of the job, or None.
+    check_mounted
+        Whether `check.weights` say what was mounted in the check runs; else the proposed corrections were.
+    rotor
+        The model that the job names, or None.
+    plane_nodes
+        Node of each plane that has one in the model.
+    sensor_places
+        Node and direction (degrees with the rotation from the model's x) of each sensor that has a node.
+    sensor_angles
+        Direction of each sensor that the job states, degrees with the rotation from the model's x.
+    radii
+        Radius, m, of each plane that has one: it converts between masses and unbalances.
+    holes
+        What can be mounted in each plane that says so, in the unit of the weights; where material is removed
+        their angles are those of the equivalent added weights (180° from the hole).
+    remove
+        Planes in which material is taken away instead of added.
+    trial_radii
+        Radius, m, at which the weights of the weights table were mounted, of each plane where that is not the
+        correction radius; `trials.weights` are converted to the correction radius already.
+    slow_roll
+        Slow-roll vectors, (C,) for all speeds or (S, C), which are subtracted from the readings of `trials`
+        and `check` already; None: none.
+    key_phasor
+        Its direction, degrees with the rotation from the model's x.
+    """
+
+    trials: Trials
+    influence: Influence | None
+    conventions: Conventions
+    files: tuple[Path, ...]
+    planes: tuple[str, ...] = ()
+    limits: Limits | None = None
+    row_weights: FloatArray | None = None
+    left_out: tuple[str, ...] = ()
+    check: Trials | None = None
+    check_mounted: bool = False
+    rotor: Rotor | None = None
+    plane_nodes: Mapping[str, int] = field(default_factory=dict)
+    sensor_places: Mapping[str, Sensor] = field(default_factory=dict)
+    sensor_angles: Mapping[str, float] = field(default_factory=dict)
+    radii: Mapping[str, float] = field(default_factory=dict)
+    holes: Mapping[str, Holes] = field(default_factory=dict)
+    remove: frozenset[str] = frozenset()
+    trial_radii: Mapping[str, float] = field(default_factory=dict)
+    slow_roll: ComplexArray | None = None
+    key_phasor: float = 0.0
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """Planes that are not left out."""
+        return tuple(p for p in self.planes if p not in self.left_out)
+
+    def limits_of(self, planes: Sequence[str]) -> Limits | None:
+        """Limits of these planes only, in their order, at all speeds."""
+        if self.limits is None:
+            return None
+        return self.limits.pick(range(len(self.trials.speeds)), [self.planes.index(p) for p in planes])

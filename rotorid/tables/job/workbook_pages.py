@@ -1,0 +1,185 @@
+"""Pages of a workbook for people: bold headers that stay in sight, names as text, explanations, choices."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS, Line
+from rotorid.tables.reader.grid import BadCell, Cell, show
+
+LONGEST_TEXT = 32767
+MOST_ROWS = 1048576
+_LONGEST_LIST = 255
+_AS_TEXT = (*TEXT_COLUMNS, "forbidden_deg", "taken", "limit")
+_WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Values that a cell may have: some texts, or numbers from `low` to `high`."""
+
+    texts: tuple[str, ...] = ()
+    low: float = -360.0
+    high: float = 360.0
+    strict: bool = True
+
+
+@dataclass(frozen=True)
+class Page:
+    """One sheet.
+
+    Attributes
+    ----------
+    title
+        Its name.
+    lines
+        Rows of cells; rows whose first cell begins with # stand above the header.
+    explained
+        Comments on cells of the header, by name of the column.
+    choices
+        Of the cells below the header, by name of the column.
+    cell_choices
+        Of single cells, by row (from 1) and column (from 1).
+    """
+
+    title: str
+    lines: Sequence[Line]
+    explained: Mapping[str, str] = field(default_factory=dict)
+    choices: Mapping[str, Choice] = field(default_factory=dict)
+    cell_choices: Mapping[tuple[int, int], Choice] = field(default_factory=dict)
+
+
+def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
+    """A workbook (.xlsx) of these pages, opened at the one of the title `shown`.
+
+    Raises
+    ------
+    ValueError
+        For what no workbook holds: control characters, cells and sheets that are too long.
+    """
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    book.properties.creator = "rotorid"
+    for page in pages:
+        sheet = book.create_sheet(page.title)
+        _write(sheet, page)
+        sheet.sheet_view.tabSelected = page.title == shown
+    book.active = [page.title for page in pages].index(shown)
+    stream = io.BytesIO()
+    book.save(stream)
+    return stream.getvalue()
+
+
+def header_row(lines: Sequence[Line]) -> int:
+    """Row of the header, from 1: the first that is not empty and no comment; 0 without one."""
+    for number, cells in enumerate(lines, start=1):
+        if any(cell != "" for cell in cells) and not show(cells[0]).startswith("#"):
+            return number
+    return 0
+
+
+def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no types
+    from openpyxl.styles import Font, PatternFill
+    from openpyxl.utils import get_column_letter
+
+    if len(page.lines) > MOST_ROWS:
+        raise ValueError(
+            f"the sheet {page.title!r} would have {len(page.lines)} rows, and a workbook holds {MOST_ROWS}: "
+            "keep this job in CSV files"
+        )
+    top = header_row(page.lines)
+    header = page.lines[top - 1] if top else ()
+    for number, cells in enumerate(page.lines, start=1):
+        for place, value in enumerate(cells, start=1):
+            if value != "":
+                cell = sheet.cell(number, place)
+                _put(cell, value, page.title)
+                if isinstance(value, str):
+                    cell.number_format = "@"
+    for place in range(1, max((len(line) for line in page.lines), default=0) + 1):
+        sheet.column_dimensions[get_column_letter(place)].width = _width(page.lines, place)
+    for place, name in enumerate(header, start=1):
+        if name in _AS_TEXT:  # cells that are filled in later: 1 stays a name, 1.5 and 3:10 are no date
+            sheet.column_dimensions[get_column_letter(place)].number_format = "@"
+        cell = sheet.cell(top, place)
+        cell.font, cell.fill = Font(bold=True), PatternFill("solid", fgColor="FFE6E6E6")
+        if name in page.explained:
+            cell.comment = _comment(page.explained[str(name)])
+    if top:
+        sheet.freeze_panes = f"A{top + 1}"
+    _validate(sheet, page, top, header)
+
+
+def _width(lines: Sequence[Line], place: int) -> float:
+    """Of a column; lines of a single cell run over the cells beside it."""
+    texts = [show(line[place - 1]) for line in lines[:_LOOKED_AT] if len(line) > 1 and len(line) >= place]
+    return min(max(_NARROWEST, *map(len, texts), 0) + 2, _WIDEST)
+
+
+def _put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
+    if isinstance(value, BadCell):
+        value = value.value
+    if isinstance(value, float):
+        # Given a float, openpyxl would keep 16 digits; 17 are needed.
+        cell.value, cell.data_type = repr(value), "n"
+    elif isinstance(value, str):
+        if len(value) > LONGEST_TEXT:
+            raise ValueError(
+                f"the sheet {title!r} would have a cell of {len(value)} characters, and one holds "
+                f"{LONGEST_TEXT}: keep this job in files"
+            )
+        if re.search(r"[\x00-\x08\x0b-\x1f\x7f]", value):
+            raise ValueError(f"text with control characters cannot be written to a workbook: {value[:60]!r}")
+        cell.value, cell.data_type = value, "s"  # never a formula
+    else:
+        cell.value = value
+
+
+def _comment(text: str) -> Any:  # noqa: ANN401
+    from openpyxl.comments import Comment
+
+    comment = Comment(text, "rotorid")
+    comment.width, comment.height = 320, 24 + 20 * (1 + len(text) // 45)
+    return comment
+
+
+def _validate(sheet: Any, page: Page, top: int, header: Line) -> None:  # noqa: ANN401
+    from openpyxl.utils import get_column_letter
+
+    for place, name in enumerate(header, start=1):
+        if name in page.choices:
+            letter = get_column_letter(place)
+            _add(sheet, page.choices[str(name)], f"{letter}{top + 1}:{letter}{MOST_ROWS}")
+    for (row, place), choice in page.cell_choices.items():
+        _add(sheet, choice, f"{get_column_letter(place)}{row}")
+
+
+def _add(sheet: Any, choice: Choice, where: str) -> None:  # noqa: ANN401
+    from openpyxl.worksheet.datavalidation import DataValidation
+
+    if choice.texts:
+        joined = ",".join(choice.texts)
+        if len(joined) > _LONGEST_LIST:
+            raise ValueError(f"a list of choices of {len(joined)} characters; Excel takes {_LONGEST_LIST}")
+        rule = DataValidation(type="list", formula1=f'"{joined}"', allow_blank=True)
+        rule.error = f"One of: {joined}"[:250]
+    else:
+        low, high = f"{choice.low:g}", f"{choice.high:g}" if math.isfinite(choice.high) else None
+        operator = "greaterThanOrEqual" if high is None else "between"
+        rule = DataValidation(
+            type="decimal", operator=operator, formula1=low, formula2=high, allow_blank=True
+        )
+        words = f"of {low} or more" if high is None else f"from {low} to {high}"
+        rule.error = f"A number {words}, in a cell of its own, without a unit"
+    rule.errorTitle = "rotorid"
+    rule.showErrorMessage = True
+    rule.errorStyle = "stop" if choice.strict else "warning"
+    sheet.add_data_validation(rule)
+    rule.add(where)

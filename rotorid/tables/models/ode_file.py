@@ -1,0 +1,335 @@
+"""Model files for identification from time records: states, outputs, what to estimate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid import expressions
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.expressions import ExpressionError, is_name
+from rotorid.tables.models.harmonic_file import pair, read_errors
+from rotorid.tables.models.matrix_form import Matrices, read_matrices
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.toml_file import Section, read_toml
+
+if TYPE_CHECKING:
+    from rotorid.harmonic.experiments import AmplitudeErrors
+    from rotorid.timedomain.model import OdeModel
+
+_KEYS = (
+    "M",
+    "C",
+    "K",
+    "coordinates",
+    "force",
+    "inputs",
+    "per_record",
+    "states",
+    "initial",
+    "outputs",
+    "estimate",
+    "known",
+    "bounds",
+    "errors",
+    "speed_rad_s",
+)
+_A_NAME = "names: a letter, then letters, digits and _; not t and no function"
+
+
+@dataclass(frozen=True)
+class TimeForm:
+    """What stands in a model file in time, before a model is made of it.
+
+    Attributes
+    ----------
+    states
+        Rate of each state; of matrices only the names count.
+    matrices
+        M, C, K, where the file has them.
+    initial, outputs, force
+        Numbers and expressions by name.
+    estimate, known
+        Numbers by name.
+    inputs, per_record
+        Names.
+    bounds
+        Lowest and highest value of parameters.
+    errors
+        Stated errors of amplitudes, for harmonic tests only.
+    speed
+        At which the matrices hold, rad/s.
+    """
+
+    states: dict[str, str]
+    matrices: Matrices | None
+    initial: dict[str, float | str]
+    outputs: dict[str, str]
+    force: dict[str, str]
+    estimate: dict[str, float]
+    known: dict[str, float]
+    inputs: list[str]
+    per_record: list[str]
+    bounds: dict[str, tuple[float, float]]
+    errors: AmplitudeErrors | None
+    speed: float
+
+
+def read_ode_model(path: str | Path) -> OdeModel:
+    """Read a model file (`ode.toml`).
+
+    Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number, or an
+    expression of parameters), `[outputs]` (name = "expression"; default: the states), `[estimate]` (name =
+    starting value; empty where a model is only to be simulated), optional `[known]` (name = number) and
+    `[bounds]` (name = [lowest, highest]), `inputs`, a list of measured inputs (columns of the record), and
+    `per_record`, a list of parameters (such as unknown initial values) that every one of several records has
+    for itself. Without states the outputs are functions of the time.
+
+    Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
+    parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
+    velocity of y1 is v_y1) and `[force]` (y1 = "expression"). Initial values are 0 then where none is given.
+    The speed at which the matrices of a rotor hold may stand in `speed_rad_s`.
+
+    A linear model is read by `read_harmonic_model`, too; `[errors]` of amplitudes are for that alone.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    OdeModel
+
+    Raises
+    ------
+    InputError
+        With all problems of the file, each with its key.
+    """
+    path = Path(path)
+    problems = Problems()
+    data = read_toml(path, problems)
+    if data is None:
+        problems.stop()
+        raise AssertionError("no file and no problem")
+    section = Section(str(path), data, problems)
+    form = read_time_form(section, problems)
+    model = None
+    if not len(problems):
+        from rotorid.timedomain.model import ode_model
+        from rotorid.timedomain.second_order import second_order
+
+        given: dict[str, Any] = {
+            "initial": form.initial,
+            "outputs": form.outputs or None,
+            "estimate": form.estimate,
+            "known": form.known,
+            "inputs": form.inputs,
+            "bounds": form.bounds,
+            "per_record": form.per_record,
+        }
+        try:
+            if form.matrices is None:
+                model = ode_model(form.states, **given)
+            else:
+                m = form.matrices
+                model = second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
+        except ValueError as error:
+            problems.add(str(path), None, None, None, f"a usable model: {error}")
+    problems.stop()
+    if model is None:
+        raise AssertionError("no model and no problem")
+    return model
+
+
+def read_time_form(section: Section, problems: Problems, *, initial: bool = True) -> TimeForm:
+    """All keys of a model file in time; what is wrong with them goes to the problems.
+
+    Parameters
+    ----------
+    section
+        The whole file.
+    problems
+        Collects the complaints.
+    initial
+        Whether every state of `[states]` needs its initial value.
+    """
+    inputs = _inputs(section)
+    own = section.take("per_record")
+    known = _numbers(section, "known")
+    estimate = _numbers(section, "estimate")
+    others = [key for key in section.keys if key not in _KEYS]
+    if "estimate" not in section and not any(did_you_mean(key, ["estimate"]) for key in others):
+        section.missing(
+            "estimate",
+            "[estimate] with name = starting value for at least one parameter (an empty [estimate] where the "
+            "model is only to be simulated)",
+        )
+    own = _per_record(section, own, estimate)
+    matrices = read_matrices(section)
+    states = _texts(section, "states") if matrices is None else matrices.rates
+    outputs = _texts(section, "outputs")
+    if not states and not outputs and not len(problems):
+        section.missing("states", '[states] with name = "rate of change", such as x = "-a*x", or [outputs]')
+    _once(section, {"states": states, "estimate": estimate, "known": known, "inputs": inputs})
+    constants = [*estimate, *known]
+    everything = ["t", *states, *constants, *inputs]
+    _readable(section, "states", states, everything, problems)
+    _readable(section, "outputs", outputs, everything, problems)
+    begin = _initial(section, states, constants, problems, complete=initial and matrices is None)
+    force = {} if matrices is None else _texts(section, "force")
+    _readable(section, "force", force, everything, problems)
+    for name in force:
+        if matrices is not None and name not in matrices.coordinates:
+            hint = did_you_mean(name, matrices.coordinates)
+            expected = f"a name of coordinates{hint}; they are {listing(matrices.coordinates, 'and')}"
+            section.complain(f"force.{name}", expected, value=False)
+    bounds = _bounds(section, estimate)
+    errors = read_errors(section)
+    speed = section.number("speed_rad_s", 0.0, low=0.0) or 0.0
+    section.finish()
+    return TimeForm(
+        states, matrices, begin, outputs, force, estimate, known, inputs, own, bounds, errors, speed
+    )
+
+
+def _named(inner: Section, key: str) -> bool:
+    """Whether a key is a name; otherwise a complaint."""
+    if is_name(key) and key != "t":
+        return True
+    inner.take(key)
+    inner.complain(key, _A_NAME, value=False)
+    return False
+
+
+def _numbers(section: Section, table: str) -> dict[str, float]:
+    inner = section.section(table)
+    found: dict[str, float] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is not None and _named(inner, name):
+            # zero stands for a value that has been complained about: its name stays known
+            found[name] = inner.number(name, 0.0) or 0.0
+    return found
+
+
+def _texts(section: Section, table: str) -> dict[str, str]:
+    """Expressions by name; a plain number is one, too."""
+    inner = section.section(table)
+    found: dict[str, str] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None or not _named(inner, name):
+            continue
+        value = inner.take(name)
+        if isinstance(value, str) and value.strip():
+            found[name] = value
+        elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+            found[name] = repr(float(value))
+        else:
+            inner.complain(name, 'an expression in quotes, such as "-a*x"')
+            found[name] = "0"
+    return found
+
+
+def _inputs(section: Section) -> list[str]:
+    value = section.take("inputs")
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        section.complain("inputs", 'a list of names, such as inputs = ["u"], at the top of the file')
+        return []
+    for item in value:
+        if not is_name(item) or item == "t":
+            section.complain("inputs", f"{_A_NAME}; {item!r} is none", value=False)
+    return [item for item in value if is_name(item) and item != "t"]
+
+
+def _per_record(section: Section, value: object, estimate: dict[str, float]) -> list[str]:
+    """Parameters that every record has for itself."""
+    if value is None:
+        return []
+    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+        section.complain("per_record", 'a list of names of [estimate], such as per_record = ["x0"]')
+        return []
+    for item in value:
+        if item not in estimate:
+            hint = did_you_mean(item, estimate)
+            section.complain("per_record", f"names of [estimate]{hint}; {item!r} is none", value=False)
+    return [item for item in value if item in estimate]
+
+
+def _once(section: Section, groups: dict[str, dict[str, str] | dict[str, float] | list[str]]) -> None:
+    """Complain about a name that means two things."""
+    seen: dict[str, str] = {}
+    for table, names in groups.items():
+        for name in names:
+            if name in seen:
+                place = table if table == "inputs" else f"{table}.{name}"
+                section.complain(place, f"another name: {name} stands in {seen[name]} already", value=False)
+            seen.setdefault(name, table)
+
+
+def _readable(
+    section: Section, table: str, texts: dict[str, str], allowed: list[str], problems: Problems
+) -> None:
+    """Complain about expressions that cannot be read or use unknown names."""
+    for name, text in texts.items():
+        key = f"{table}.{name}"
+        try:
+            used = expressions.names(expressions.parse(text, where=key))
+        except ExpressionError as error:
+            problems.add(section.source, None, key, None, f"an expression that can be read: {error}")
+            continue
+        for other in sorted(used - set(allowed)):
+            hint = did_you_mean(other, allowed)
+            expected = (
+                f"names of the model only, and {other} is none{hint}; they are {listing(allowed, 'and')}"
+            )
+            problems.add(section.source, None, key, text, expected)
+
+
+def _initial(
+    section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
+) -> dict[str, float | str]:
+    """Initial values, `complete` if those of all states must be given."""
+    inner = section.section("initial")
+    found: dict[str, float | str] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None:
+            continue
+        value = inner.take(name)
+        if name not in states:
+            inner.complain(name, f"a name of [states]{did_you_mean(name, states)}", value=False)
+        elif isinstance(value, str) and value.strip():
+            found[name] = value
+        elif isinstance(value, (int, float)) and not isinstance(value, bool):
+            found[name] = inner.number(name, 0.0) or 0.0
+        else:
+            inner.complain(name, "a number, or an expression of parameters in quotes")
+    texts = {name: value for name, value in found.items() if isinstance(value, str)}
+    _readable(section, "initial", texts, constants, problems)
+    given = () if inner is None else inner.keys
+    for name in states if complete else ():
+        if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
+            section.missing(f"initial.{name}", f"the value of {name} at the first time of the record")
+    return found
+
+
+def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:
+    inner = section.section("bounds")
+    found: dict[str, tuple[float, float]] = {}
+    for name in () if inner is None else inner.keys:
+        if inner is None:
+            continue
+        limits = pair(inner.take(name))
+        if name not in estimate:
+            inner.complain(name, f"a name of [estimate]{did_you_mean(name, estimate)}", value=False)
+        elif limits is None:
+            inner.complain(name, "two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
+        elif not limits[0] <= estimate[name] <= limits[1]:
+            inner.complain(name, f"limits that hold the starting value {estimate[name]:g}")
+        else:
+            found[name] = limits
+    return found

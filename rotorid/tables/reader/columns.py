@@ -1,0 +1,379 @@
+"""Columns with names and units: cells become numbers in SI and names, or problems."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.base.suggestions import suggest
+from rotorid.base.text import listing
+from rotorid.tables.reader.grid import BadCell, Cell, Grid, make_grid, show
+from rotorid.tables.reader.number import (
+    NotANumber,
+    check_size,
+    decimal_comma,
+    parse_number,
+    thousands_or_decimals,
+)
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.text_file import decode, parse_text, read_bytes
+from rotorid.tables.reader.units import Unit, UnitError, UnitReader
+from rotorid.tables.reader.workbook import is_workbook, pick_sheet, read_workbook
+
+REMARKS = ("note", "comment")
+_UNCLEAR = Unit("?", "unclear")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that a table may have.
+
+    Attributes
+    ----------
+    stem
+        The name without its unit.
+    unit
+        Reads the unit's name; None for a column of text.
+    examples
+        Full names for messages, the usual one first.
+    required
+        Whether the table is unusable without it.
+    blank
+        Whether a cell may be empty: NaN or `""` then, and the reader of the table decides.
+    no_unit
+        Whether the unit may be left out.
+    """
+
+    stem: str
+    unit: UnitReader | None = None
+    examples: tuple[str, ...] = ()
+    required: bool = True
+    blank: bool = False
+    no_unit: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names for messages and suggestions."""
+        return self.examples or (self.stem,)
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A column that a table has: its name and unit there, and its values (NaN or `""` where unusable)."""
+
+    name: str
+    unit: Unit | None
+    cells: tuple[Cell, ...]
+    numbers: FloatArray
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table with meaning, that still knows where everything stood.
+
+    Attributes
+    ----------
+    source
+        The file, and the sheet of a workbook.
+    header_row, rows
+        Row numbers in the file.
+    fields
+        By stem of the column's name.
+    comments
+        Comment lines.
+    complete
+        Whether every row of the file is here.
+    """
+
+    source: str
+    header_row: int
+    rows: tuple[int, ...]
+    fields: Mapping[str, Field]
+    comments: tuple[str, ...] = ()
+    complete: bool = True
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __contains__(self, stem: str) -> bool:
+        return stem in self.fields
+
+    def numbers(self, stem: str, missing: float = math.nan) -> FloatArray:
+        """Values in SI, shape (rows,); `missing` everywhere if the table has no such column."""
+        if stem not in self.fields:
+            return np.full(len(self.rows), missing)
+        return self.fields[stem].numbers
+
+    def texts(self, stem: str) -> tuple[str, ...]:
+        """Values of a text column."""
+        return self.fields[stem].texts
+
+    def unit(self, stem: str) -> Unit:
+        """The unit of a column of numbers."""
+        unit = self.fields[stem].unit
+        if unit is None:
+            raise KeyError(stem)
+        return unit
+
+    def shown(self, stem: str, index: int) -> str:
+        """A cell as it stood in the file."""
+        return show(self.fields[stem].cells[index])
+
+    def complain(self, problems: Problems, index: int, stem: str, expected: str) -> None:
+        """Note a problem with one cell."""
+        field = self.fields[stem]
+        problems.add(self.source, self.rows[index], field.name, self.shown(stem, index), expected)
+
+
+def read_table(
+    path: str | Path,
+    sheet: str,
+    columns: Sequence[Column],
+    problems: Problems,
+    *,
+    first: bool = False,
+    may_be_empty: bool = False,
+) -> Table | None:
+    """Read a table from a text file or a workbook.
+
+    Parameters
+    ----------
+    path
+        `.xlsx` is a workbook, everything else text.
+    sheet
+        Name of the sheet in a workbook; the only sheet may have any name (with `first`, the first one).
+    columns
+        What the table may contain; every other column is a problem.
+    problems
+        Collects the complaints.
+    may_be_empty
+        Whether a header without rows says something.
+
+    Returns
+    -------
+    Table or None
+        None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
+    """
+    grid = read_grid(Path(path), sheet, problems, first=first, may_be_empty=may_be_empty)
+    return None if grid is None else make_table(grid, columns, problems)
+
+
+def read_grid(
+    path: Path, sheet: str, problems: Problems, *, first: bool = False, may_be_empty: bool = False
+) -> Grid | None:
+    """The cells of a text file or of a sheet."""
+    if is_workbook(path):
+        sheets = read_workbook(path, problems)
+        chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
+        if chosen is None:
+            return None
+        title, rows = chosen
+        return make_grid(sheet_source(path, title), rows, "", problems, may_be_empty=may_be_empty)
+    data = read_bytes(path, problems)
+    text = None if data is None else decode(str(path), data, problems)
+    return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
+
+
+def sheet_source(path: Path, title: str) -> str:
+    """How messages name a sheet."""
+    return f"{path} (sheet {title!r})"
+
+
+def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Table | None:
+    """Give the columns of a grid their meaning; every complaint goes to `problems`."""
+    if not any(_column_of(name, columns) or nearest(name, columns) for name in grid.header if name):
+        _complain_about_header(grid, columns, problems)
+        return None
+    found = _match(grid, columns, problems)
+    _complain_about_missing(grid, columns, found, problems)
+    comma = decimal_comma(
+        (
+            cell
+            for index, column, _ in found.values()
+            if column.unit is not None
+            for cell in (cells[index] for _, cells in grid.rows)
+            if isinstance(cell, str) and "," in cell
+        ),
+        grid.separator,
+    )
+    fields = {
+        stem: _field(grid, index, column, unit, problems, comma=comma)
+        for stem, (index, column, unit) in found.items()
+    }
+    if any(column.required and column.stem not in found for column in columns):
+        return None
+    rows = tuple(number for number, _ in grid.rows)
+    return Table(grid.source, grid.header_row, rows, fields, grid.comments, grid.complete)
+
+
+_Match = tuple[int, Column, Unit | None]
+
+
+def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[str, _Match]:
+    """Which column of the grid is which; problems for unknown, repeated and wrongly named ones."""
+    found: dict[str, _Match] = {}
+    for index, name in enumerate(grid.header):
+        if not name or name.casefold().startswith(REMARKS):
+            continue
+        column = _column_of(name, columns)
+        if column is None:
+            near = nearest(name, columns)
+            hint = f" (did you mean {near!r}?)" if near else f": {_known(columns)}; remarks go into 'note'"
+            problems.add(grid.source, grid.header_row, name, name, f"a known column{hint}")
+            continue
+        unit: Unit | None = None
+        if column.unit is not None:
+            try:
+                unit = column.unit(name[len(column.stem) + 1 :])
+            except UnitError as error:
+                problems.add(grid.source, grid.header_row, name, name, str(error))
+                # Marked as found, so that it is not reported as missing too.
+                unit = _UNCLEAR
+        if column.stem in found:
+            other = grid.header[found[column.stem][0]]
+            what = "the column once" if other == name else f"one unit for {column.stem}, not also {other}"
+            problems.add(grid.source, grid.header_row, name, name, what)
+            continue
+        found[column.stem] = (index, column, unit)
+    return found
+
+
+def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
+    expected = f"a header row with the names of columns, separated by , or ; or tabs: {_known(columns)}"
+    shown = (grid.separator or " ").join(name for name in grid.header if name)
+    later = _header_below(grid, columns)
+    if later is not None:
+        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+        expected = (
+            f"the header in the first row, and it seems to be row {later}: "
+            "delete what stands above it, or begin those rows with #"
+        )
+    problems.add(grid.source, grid.header_row, None, shown, expected)
+
+
+def _header_below(grid: Grid, columns: Sequence[Column]) -> int | None:
+    """The row that names most of the required columns, if it is not the first one."""
+    needed = {column.stem for column in columns if column.required}
+    for number, cells in grid.first_rows[1:]:
+        names = [_column_of(show(cell), columns) for cell in cells]
+        if len(needed & {column.stem for column in names if column is not None}) > len(needed) / 2:
+            return number
+    return None
+
+
+def _column_of(name: str, columns: Sequence[Column]) -> Column | None:
+    fitting = [
+        column
+        for column in columns
+        if name == column.stem or (column.unit is not None and name.startswith(f"{column.stem}_"))
+    ]
+    return max(fitting, key=lambda column: len(column.stem), default=None)
+
+
+def nearest(name: str, columns: Sequence[Column]) -> str | None:
+    """The name of a column that was probably meant: `amplitude_um` for `Amplitude [um]`."""
+    plain = re.sub(r"[^\w/%]+|_+", "_", name).strip("_")
+    for column in sorted(columns, key=lambda column: -len(column.stem)):
+        head, tail = plain[: len(column.stem)], plain[len(column.stem) :]
+        if head.casefold() == column.stem and column.unit is not None and tail.startswith("_"):
+            try:
+                return f"{column.stem}_{column.unit(tail[1:]).name}"
+            except UnitError:
+                break
+    return suggest(name, [example for column in columns for example in column.names])
+
+
+def _known(columns: Sequence[Column]) -> str:
+    return listing([example for column in columns for example in column.names], "and")
+
+
+def _complain_about_missing(
+    grid: Grid, columns: Sequence[Column], found: Mapping[str, _Match], problems: Problems
+) -> None:
+    unknown = [
+        name
+        for name in grid.header
+        if name and not name.casefold().startswith(REMARKS) and _column_of(name, columns) is None
+    ]
+    close = [_column_of(near, columns) for name in unknown if (near := nearest(name, columns))]
+    misspelt = {column.stem for column in close if column is not None}
+    for column in columns:
+        if column.required and column.stem not in found and column.stem not in misspelt:
+            present = listing([name for name in grid.header if name], "and")
+            expected = f"a column {listing(column.names)}; the columns are {present}"
+            problems.add(grid.source, grid.header_row, column.names[0], None, expected)
+
+
+def _field(
+    grid: Grid, index: int, column: Column, unit: Unit | None, problems: Problems, *, comma: bool
+) -> Field:
+    cells = tuple(row[index] for _, row in grid.rows)
+    name = grid.header[index]
+    numbers = np.full(len(cells), math.nan)
+    texts = [""] * len(cells)
+    # most cells of a long table say what another one has said
+    known: dict[Cell, str | float] = {"": ""} if column.blank else {}
+    doubtful: set[str] = set()
+    if unit is not None and not comma and grid.separator in (";", "\t"):
+        doubtful = thousands_or_decimals((cell for cell in cells if isinstance(cell, str)), name)
+    for place, cell in enumerate(cells):
+        if cell not in known:
+            try:
+                if isinstance(cell, BadCell):
+                    raise NotANumber(cell.expected)
+                if cell in doubtful:
+                    raise NotANumber(
+                        "a number whose point is surely no thousands separator: 1350 or, with decimal commas "
+                        "in the whole file, 1,350"
+                    )
+                known[cell] = (
+                    _name(show(cell)) if unit is None else _number(cell, unit, grid.separator, comma=comma)
+                )
+            except NotANumber as error:
+                problems.add(grid.source, grid.rows[place][0], name, show(cell), str(error))
+                continue
+        value = known[cell]
+        if isinstance(value, str):
+            texts[place] = value
+        else:
+            numbers[place] = value
+    return Field(name, unit, cells, numbers, tuple(texts))
+
+
+def _number(cell: str | float, unit: Unit, separator: str, *, comma: bool) -> float:
+    written = parse_number(cell, comma=comma, separator=separator) if isinstance(cell, str) else float(cell)
+    check_size(written)
+    value = unit.to_si(written)
+    if unit is _UNCLEAR:
+        return math.nan
+    if not math.isfinite(value):
+        raise NotANumber("a finite number")
+    return value
+
+
+def _name(text: str) -> str:
+    if not text:
+        raise NotANumber("a name")
+    if text[0] in "=@":
+        raise NotANumber("a name; one that begins with = or @ would be a formula in a spreadsheet")
+    if not text.isprintable():
+        raise NotANumber("a name without line breaks and control characters")
+    return text
+
+
+def must_be(
+    table: Table, stem: str, allowed: FloatArray | Iterable[bool], expected: str, problems: Problems
+) -> None:
+    """Complain about every number of a column that is not allowed (unreadable cells have been reported)."""
+    if stem not in table:
+        return
+    bad = ~np.fromiter(allowed, dtype=bool, count=len(table)) & ~np.isnan(table.numbers(stem))
+    for index in np.flatnonzero(bad):
+        table.complain(problems, int(index), stem, expected)

@@ -1,0 +1,151 @@
+"""Text files as spreadsheets and people write them: bytes into rows of cells."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+import warnings
+from pathlib import Path
+
+from rotorid.base.suggestions import did_you_mean
+from rotorid.tables.reader.grid import Grid, Row, clean, make_grid
+from rotorid.tables.reader.problems import Problems, TableWarning
+
+_SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
+_WORD = re.compile(rb"[A-Za-z\xa8\xb8\xc0-\xff]+")
+_NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
+
+
+def read_bytes(path: Path, problems: Problems) -> bytes | None:
+    """The content of a file, or None and a problem."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        problems.add(str(path), None, None, None, f"a file that exists{_neighbour(path)}")
+    except IsADirectoryError:
+        problems.add(str(path), None, None, None, "a file, not a folder")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        problems.add(str(path), None, None, None, f"a file that can be read ({reason})")
+    return None
+
+
+def decode(source: str, data: bytes, problems: Problems) -> str | None:
+    """Text of a file in any encoding that Excel writes, or None and a problem.
+
+    An encoding that had to be guessed (cp1251, cp1252) is named in a `TableWarning`.
+    """
+    if not data.strip():
+        problems.add(source, None, None, None, "a table with a header row; the file is empty")
+        return None
+    text = _decode(source, data, problems)
+    if text is None:
+        return None
+    if re.search(r"[\x00-\x08\x0b\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff]", text):
+        problems.add(source, None, None, None, "a text file (CSV) or a workbook (.xlsx); this one is binary")
+        return None
+    return text
+
+
+def _decode(source: str, data: bytes, problems: Problems) -> str | None:
+    if data.startswith(b"PK\x03\x04"):
+        expected = "a text file; this is a workbook or an archive: name it .xlsx, or save it as CSV"
+    elif data.startswith(b"\xd0\xcf\x11\xe0"):
+        expected = "a text file or .xlsx; this is an old Excel workbook (.xls): save it as .xlsx or CSV"
+    else:
+        expected = "a text file (CSV) or a workbook (.xlsx); this one is neither"
+        try:
+            if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+                return data.decode("utf-16")
+            if b"\x00" not in data:
+                return _decode_bytes(source, data)
+        except UnicodeDecodeError:
+            pass
+    problems.add(source, None, None, None, expected)
+    return None
+
+
+def _decode_bytes(source: str, data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        pass
+    order = ["cp1251", "cp1252"] if _looks_cyrillic(data) else ["cp1252", "cp1251"]
+    for encoding in order:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        message = f"{source}: not UTF-8, read as {encoding}; check the names in it"
+        warnings.warn(message, TableWarning, stacklevel=2)
+        return text
+    return data.decode("utf-8")
+
+
+def _looks_cyrillic(data: bytes) -> bool:
+    """Cyrillic words consist of letters above 127 only; western ones have them among ASCII letters."""
+    votes = 0
+    for word in _WORD.findall(data):
+        high = sum(byte > 127 for byte in word)
+        if high == len(word) and high > 1:
+            votes += 1
+        elif 0 < high < len(word):
+            votes -= 1
+    return votes > 0
+
+
+def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool = False) -> Grid | None:
+    """Rows of cells of a text table, or None and problems; `may_be_empty` as in `make_grid`."""
+    lines = re.split(r"\r\n|\n|\r", text)
+    separator = ""
+    declared = _SEP_LINE.fullmatch(lines[0].strip(" \ufeff"))
+    if declared:
+        # A spreadsheet takes this line as an instruction and does not show it: rows count from the next.
+        separator = declared.group(1)
+        lines = lines[1:]
+        if separator not in _NAMES:
+            problems.add(source, 1, None, f"sep={separator}", "sep=; or sep=, or a tab")
+            return None
+    else:
+        separator = _separator(lines)
+    rows: list[Row] = []
+    complete = True
+    for number, line in enumerate(lines, start=1):
+        stripped = line.strip()
+        if stripped.startswith("#"):
+            rows.append((number, (clean(stripped),)))
+            continue
+        if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
+            rows.append((number, tuple(clean(cell) for cell in line.split(separator)) if line else ()))
+            continue
+        try:
+            cells = next(csv.reader([line], delimiter=separator, strict=True), [])
+        except csv.Error as error:
+            rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
+            problems.add(source, number, None, stripped, f"{rule}: {error}")
+            complete = False
+            continue
+        rows.append((number, tuple(clean(cell) for cell in cells)))
+    return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+
+
+def _separator(lines: list[str]) -> str:
+    """What separates the columns of the header, outside quotes."""
+    for line in lines:
+        if line.strip(';,\t" \xa0\ufeff') and not line.strip().startswith(("#", '"#')):
+            outside = re.sub(r'"[^"]*"', "", line)
+            return _first_sign(outside)
+    return _first_sign("".join(line for line in lines if not line.strip().startswith("#")))
+
+
+def _first_sign(text: str) -> str:
+    return next((sign for sign in ("\t", ";", ",") if sign in text), ",")
+
+
+def _neighbour(path: Path) -> str:
+    try:
+        names = [entry.name for entry in path.parent.iterdir()]
+    except OSError:
+        return ""
+    return did_you_mean(path.name, names)

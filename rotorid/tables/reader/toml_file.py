@@ -1,0 +1,216 @@
+"""Settings (.toml files and settings sheets): every key is checked, none is passed over."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.tables.reader.number import LARGEST
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.text_file import read_bytes
+
+
+def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
+    """The content of a TOML file, or None and a problem."""
+    data = read_bytes(path, problems)
+    if data is None:
+        return None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        problems.add(str(path), None, None, None, "a text file in UTF-8, as TOML demands")
+        return None
+    if not text.strip():
+        problems.add(str(path), None, None, None, "a TOML file with settings; the file is empty")
+        return None
+    try:
+        # A lone carriage return ends a line for no reader of TOML.
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except (ValueError, RecursionError) as error:
+        problems.add(str(path), None, None, None, f"a TOML file: {error}")
+        return None
+
+
+class Section:
+    """Some settings, taken one by one; `finish` complains about those that nobody took.
+
+    Parameters
+    ----------
+    source
+        The file, for messages.
+    data
+        Keys and values.
+    problems
+        Collects the complaints.
+    prefix
+        Of the keys, for messages ("errors.").
+    where
+        Row and column of keys that stand in a sheet.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        data: Mapping[str, Any],
+        problems: Problems,
+        prefix: str = "",
+        where: Mapping[str, tuple[str, int, str]] | None = None,
+    ) -> None:
+        self.source = source
+        self._data = data
+        self._problems = problems
+        self._prefix = prefix
+        self._where = where or {}
+        self._known: list[str] = []
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._data
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """All keys, taken or not."""
+        return tuple(self._data)
+
+    def place(self, name: str) -> tuple[str, int | None, str]:
+        """File or sheet, row and column of a setting given by its whole dotted name."""
+        return self._where.get(name, (self.source, None, name))
+
+    def complain(self, key: str, expected: str, *, value: bool = True) -> None:
+        """Note a problem with a key."""
+        found = _shown(self._data[key]) if value and key in self._data else None
+        name = f"{self._prefix}{key}"
+        source, row, column = self.place(name)
+        self._problems.add(source, row, column, found, expected)
+
+    def take(self, key: str) -> Any:  # noqa: ANN401  whatever the file holds
+        """The value as it is, None if there is none."""
+        self._known.append(key)
+        return self._data.get(key)
+
+    def number(
+        self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
+    ) -> float | None:
+        """A finite number within limits."""
+        value = self.take(key)
+        if value is None:
+            return default
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            self.complain(
+                key,
+                "a number"
+                if not isinstance(value, str)
+                else "a number, without quotes (in a sheet: not as text)",
+            )
+        elif not _finite(value) or not low <= value <= high:
+            self.complain(key, _range(low, high))
+        elif abs(value) > LARGEST:
+            self.complain(key, f"a number up to {LARGEST:g} in size")
+        else:
+            return float(value)
+        return default
+
+    def text(self, key: str) -> str | None:
+        """A text that is not empty."""
+        value = self.take(key)
+        if value is None:
+            return None
+        if not isinstance(value, str) or not value.strip():
+            self.complain(key, "a text in quotes")
+            return None
+        return value.strip()
+
+    def name(self, key: str) -> str:
+        """A text exactly as it stands; empty if there is none."""
+        value = self.take(key)
+        if value is not None and not isinstance(value, str):
+            self.complain(key, "a text in quotes")
+        return value if isinstance(value, str) else ""
+
+    def choice(self, key: str, allowed: tuple[str, ...], default: str) -> str:
+        """One of several texts."""
+        value = self.take(key)
+        if value is None or value in allowed:
+            return default if value is None else str(value)
+        hint = did_you_mean(value, allowed) if isinstance(value, str) else ""
+        self.complain(key, listing(repr(option) for option in allowed) + hint)
+        return default
+
+    def flag(self, key: str) -> bool:
+        """True or false; false if not there."""
+        value = self.take(key)
+        if value is not None and not isinstance(value, bool):
+            self.complain(key, "true or false, without quotes (in a sheet: yes or no)")
+        return value is True
+
+    def section(self, key: str) -> Section | None:
+        """A table of settings, None if there is none."""
+        value = self.take(key)
+        if value is None:
+            return None
+        if not isinstance(value, dict):
+            self.complain(key, f"a table of settings, [{self._prefix}{key}]")
+            return None
+        return Section(self.source, value, self._problems, f"{self._prefix}{key}.", self._where)
+
+    def sections(self, key: str) -> list[Section]:
+        """An array of tables, [[key]]."""
+        value = self.take(key)
+        if value is None:
+            return []
+        if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+            self.complain(key, f"tables that begin with [[{key}]]")
+            return []
+        return [
+            Section(self.source, item, self._problems, f"{key}[{i}].")
+            for i, item in enumerate(value, start=1)
+        ]
+
+    def named(self, key: str) -> dict[str, Section]:
+        """Tables with names, [key.NAME]."""
+        outer = self.section(key)
+        if outer is None:
+            return {}
+        inner = {name: outer.section(name) for name in outer._data}
+        return {name: section for name, section in inner.items() if section is not None}
+
+    def missing(self, key: str, expected: str) -> None:
+        """Note that a key is missing."""
+        self.complain(key, expected, value=False)
+
+    def refuse(self, expected: str) -> None:
+        """Note a problem with these settings as a whole."""
+        self._problems.add(self.source, None, self._prefix.rstrip(".") or None, None, expected)
+
+    def finish(self) -> None:
+        """Complain about every key that nobody took."""
+        for key in self._data:
+            if key not in self._known:
+                hint = did_you_mean(key, self._known)
+                known = listing(self._known, "and") or "none yet"
+                self.complain(key, f"a known key{hint}; known are {known}")
+
+
+def _finite(value: float) -> bool:
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+def _range(low: float, high: float) -> str:
+    if low == -math.inf and high == math.inf:
+        return "a finite number"
+    if high == math.inf:
+        return f"a finite number, {low:g} or more" if low >= 1e-9 or low == 0 else "a number above 0"
+    return f"a number from {low:g} to {high:g}"
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "a table" if isinstance(value, dict) else str(value)

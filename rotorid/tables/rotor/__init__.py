@@ -1,0 +1,1 @@
+"""Rotor tables and files, their bearings, and unbalance tables."""

@@ -1,0 +1,249 @@
+"""Bearings and seals of a rotor file: constants, or a table over speed, with or without a pedestal."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from fem.supports import Coefficient, Pair, Pedestal, Support
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.toml_file import Section
+from rotorid.tables.reader.units import one_of
+
+Kind = Literal["bearing", "seal"]
+SCALARS = {"stiffness": "stiffness_N_per_m", "damping": "damping_N_s_per_m"}
+ENTRIES = {
+    "stiffness": {name: f"{name}_N_per_m" for name in ("kxx", "kxy", "kyx", "kyy")},
+    "damping": {name: f"{name}_N_s_per_m" for name in ("cxx", "cxy", "cyx", "cyy")},
+}
+DIAGONAL = ("kxx", "kyy", "cxx", "cyy")
+"""What pushes back, or brakes, in a bearing; the others may have either sign."""
+TILTING = "tilting_stiffness_N_m_per_rad"
+PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_N_s_per_m")
+_STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)
+COLUMNS = (
+    Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz")),
+    Column("stiffness", _STIFFNESS, ("stiffness_N_per_m",), required=False),
+    Column("damping", _DAMPING, ("damping_N_s_per_m",), required=False),
+    *(Column(n, _STIFFNESS, (full,), required=False) for n, full in ENTRIES["stiffness"].items()),
+    *(Column(n, _DAMPING, (full,), required=False) for n, full in ENTRIES["damping"].items()),
+)
+
+
+@dataclass(frozen=True)
+class _Coefficients:
+    """What a section and its table say, `{name: number or values over speed}`, and how to complain."""
+
+    values: Mapping[str, float | FloatArray]
+    complain: Mapping[str, Callable[[str], None]]
+    missing: Callable[[str, str], None]
+    speeds: tuple[float, ...] = ()
+
+
+def read_support(
+    section: Section, node: Callable[[Section], int | None], folder: Path, kind: Kind, problems: Problems
+) -> Support | None:
+    """Read `[[bearing]]` or `[[seal]]`, or None and problems.
+
+    Parameters
+    ----------
+    section
+        Its settings.
+    node
+        Reads its node.
+    folder
+        Where the rotor file lies, which names its tables from there.
+    kind
+        Which of the two; `[[bearing]]` may also say `kind = "seal"`.
+    problems
+        Collects the complaints.
+    """
+    before = len(problems)
+    where = node(section)
+    name = section.name("name")
+    tilting = section.number(TILTING, 0.0, low=0.0)
+    if kind == "bearing":
+        kind = "seal" if section.choice("kind", ("bearing", "seal"), "bearing") == "seal" else "bearing"
+        pedestal = _pedestal(section)
+    else:
+        pedestal = None
+    settled = len(problems)
+    coefficients = _coefficients(section, folder, kind, problems)
+    section.finish()
+    if coefficients is None or len(problems) > settled:
+        return None  # what is missing may be what is misspelt
+    stiffness = _quantity("stiffness", coefficients)
+    damping = _quantity("damping", coefficients)
+    if stiffness is None:
+        if len(problems) == settled and damping is None:
+            coefficients.missing(SCALARS["stiffness"], f"the stiffness of the {kind}, or its damping")
+            return None
+        stiffness = 0.0  # a damper
+    if where is None or len(problems) > before:
+        return None
+    try:
+        return Support(
+            where,
+            stiffness,
+            0.0 if damping is None else damping,
+            name,
+            speeds=coefficients.speeds,
+            pedestal=None if pedestal is None else Pedestal(*pedestal),
+            kind=kind,
+            tilting_stiffness=tilting or 0.0,
+        )
+    except ValueError as error:
+        section.refuse(f"a possible {kind}: {error}")
+        return None
+
+
+def bearing_tables(data: Mapping[str, object]) -> list[str]:
+    """Names of the tables that the bearings and seals of a rotor file refer to."""
+    named = []
+    for kind in ("bearing", "seal"):
+        items = data.get(kind)
+        for item in items if isinstance(items, list) else []:
+            table = item.get("table") if isinstance(item, dict) else None
+            if isinstance(table, str) and table.strip():
+                named.append(table.strip())
+    return list(dict.fromkeys(named))
+
+
+def _coefficients(section: Section, folder: Path, kind: Kind, problems: Problems) -> _Coefficients | None:
+    values: dict[str, float | FloatArray] = {}
+    complain: dict[str, Callable[[str], None]] = {}
+    low = -math.inf if kind == "seal" else 0.0  # a seal may push outwards
+    for quantity, scalar in SCALARS.items():
+        _take(section, quantity, (scalar,), low, values, complain)
+        for name, full in ENTRIES[quantity].items():
+            _take(section, name, (full, name), low if name in DIAGONAL else -math.inf, values, complain)
+    file = section.text("table")
+    if file is None:
+        return None if "table" in section else _Coefficients(values, complain, section.missing)
+    table = read_table(folder / file, kind, COLUMNS, problems, first=True)
+    if table is None:
+        return None
+    _check_speeds(table, problems)
+    present = [column.stem for column in COLUMNS[1:] if column.stem in table]
+    if not present:
+        expected = f"a column of coefficients, such as {listing(c.names[0] for c in COLUMNS[1:4])}"
+        problems.add(table.source, table.header_row, COLUMNS[1].names[0], None, expected)
+        return None
+    for name in (*SCALARS, *DIAGONAL):
+        must_be(table, name, table.numbers(name) >= low, "0 or more", problems)
+    if len(table) == 1:
+        table.complain(problems, 0, "speed", "two speeds at least: a table says how coefficients change")
+    for name in present:
+        if name in values:
+            complain[name](f"nothing: {table.source} has a column {table.fields[name].name}")
+        values[name] = table.numbers(name)
+        complain[name] = _in_header(table, name, problems)
+
+    def missing(name: str, expected: str) -> None:
+        problems.add(table.source, table.header_row, name, None, expected)
+
+    return _Coefficients(values, complain, missing, tuple(table.numbers("speed").tolist()))
+
+
+def _take(
+    section: Section,
+    name: str,
+    keys: tuple[str, ...],
+    low: float,
+    values: dict[str, float | FloatArray],
+    complain: dict[str, Callable[[str], None]],
+) -> None:
+    """One constant; `kxx` alone is `kxx_N_per_m`."""
+    for key in keys:
+        value = section.number(key, low=low)
+        if value is None:
+            continue
+        if name in values:
+            section.complain(key, f"the coefficient once, {keys[0]}")
+        values[name] = value
+        complain[name] = lambda expected, key=key: section.complain(key, expected)  # type: ignore[misc]
+
+
+def _in_header(table: Table, name: str, problems: Problems) -> Callable[[str], None]:
+    field = table.fields[name]
+    return lambda expected: problems.add(table.source, table.header_row, field.name, field.name, expected)
+
+
+def _check_speeds(table: Table, problems: Problems) -> None:
+    speed = table.numbers("speed")
+    must_be(table, "speed", speed >= 0, "a speed of 0 or more", problems)
+    rising = np.insert(~(np.diff(speed) <= 0), 0, True)
+    must_be(table, "speed", rising, "a speed above that of the row before (ascending, each once)", problems)
+
+
+def _quantity(quantity: str, given: _Coefficients) -> Coefficient | tuple[Coefficient, ...] | None:
+    """Stiffness or damping as `Support` takes it; None if nothing is given."""
+    entries = ENTRIES[quantity]
+    used = [name for name in entries if name in given.values]
+    if quantity in given.values:
+        for name in used[:1]:
+            given.complain[name](
+                f"either {SCALARS[quantity]} or {listing(entries.values(), 'and')}, not some of both"
+            )
+        return _over_speed(given, lambda at: at(quantity))
+    if not used:
+        return None
+    first, *_, last = entries
+    diagonal = [name for name in (first, last) if name in used]
+    if len(diagonal) == 1:  # none is cross-coupling alone
+        (name,) = {first, last} - {*diagonal}
+        given.missing(entries[name], f"{name} too, as {diagonal[0]} is given")
+        return None
+    xx, xy, yx, yy = entries
+    return _over_speed(given, lambda at: ((at(xx), at(xy)), (at(yx), at(yy))))
+
+
+def _over_speed(
+    given: _Coefficients, make: Callable[[Callable[[str], float]], Coefficient]
+) -> Coefficient | tuple[Coefficient, ...]:
+    """Build an entry from the coefficients' names: one, or one per speed of the table."""
+
+    def build(index: int) -> Coefficient:
+        def at(name: str) -> float:
+            value = given.values.get(name, 0.0)
+            return value if isinstance(value, float) else float(value[index])
+
+        return make(at)
+
+    return tuple(build(k) for k in range(len(given.speeds))) if given.speeds else build(0)
+
+
+def _pedestal(section: Section) -> tuple[float, Pair, Pair] | None:
+    mass = section.number(PEDESTAL[0], 0.0, low=0.0)
+    stiffness, damping = _pair(section, PEDESTAL[1]), _pair(section, PEDESTAL[2])
+    if not any(key in section for key in PEDESTAL):
+        return None
+    if PEDESTAL[1] not in section:
+        section.missing(PEDESTAL[1], "the stiffness of the pedestal")
+    return mass or 0.0, 0.0 if stiffness is None else stiffness, 0.0 if damping is None else damping
+
+
+def _pair(section: Section, key: str) -> Pair | None:
+    """A number, or `[x, y]`."""
+    value = section.take(key)
+    if not isinstance(value, list):
+        return section.number(key, low=0.0)
+    good = [
+        float(item)
+        for item in value
+        if isinstance(item, (int, float)) and not isinstance(item, bool) and 0 <= item <= sys.float_info.max
+    ]
+    if len(value) != 2 or len(good) != 2:
+        section.complain(key, "a finite number, 0 or more, or two of them: [x, y]")
+        return None
+    return good[0], good[1]

@@ -1,0 +1,223 @@
+"""Rotor tables: shaft elements, with what is attached to their left nodes."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
+from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.units import one_of
+
+_LENGTH = one_of(units.LENGTH)
+_INERTIA = one_of(units.INERTIA)
+ATTACHED = {
+    "mass": "mass_kg",
+    "polar_inertia": "polar_inertia_kg_m2",
+    "diametral_inertia": "diametral_inertia_kg_m2",
+    "support_stiffness": "support_stiffness_N_per_m",
+    "support_damping": "support_damping_N_s_per_m",
+}
+COLUMNS = (
+    Column("length", _LENGTH, ("length_m", "length_mm")),
+    Column("diameter", _LENGTH, ("diameter_m", "diameter_mm"), blank=True),
+    Column("inner_diameter", _LENGTH, ("inner_diameter_m",), required=False, blank=True),
+    Column("element", required=False, blank=True),
+    Column("mass", one_of(units.MASS), ("mass_kg",), required=False),
+    Column("polar_inertia", _INERTIA, ("polar_inertia_kg_m2",), required=False),
+    Column("diametral_inertia", _INERTIA, ("diametral_inertia_kg_m2",), required=False),
+    Column("support_stiffness", one_of(units.STIFFNESS), ("support_stiffness_N_per_m",), required=False),
+    Column("support_damping", one_of(units.DAMPING), ("support_damping_N_s_per_m",), required=False),
+    Column("youngs_modulus", one_of(units.MODULUS), ("youngs_modulus_Pa",), required=False, blank=True),
+    Column("density", one_of(units.DENSITY), ("density_kg_per_m3",), required=False, blank=True),
+    Column("poisson_ratio", units.ratio, required=False, blank=True),
+    Column("material_damping", one_of(units.TIME), ("material_damping_s",), required=False, blank=True),
+)
+PLAIN = Model()
+USUAL = (
+    ("length", 0.0, 50.0, "m", "is this in mm?"),
+    ("diameter", 0.0, 10.0, "m", "is this in mm?"),
+    ("inner_diameter", 0.0, 10.0, "m", "is this in mm?"),
+    ("youngs_modulus", 1e9, 1e12, "Pa", "is this in another unit?"),
+    ("density", 100.0, 3e4, "kg/m³", "is this in another unit?"),
+)
+"""Stem, range and unit of what shafts are; outside a warning asks."""
+OF_ELEMENTS = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a shaft is made of where its table does not say: Pa, kg/m³, 1, s."""
+
+    youngs_modulus: float = STEEL_MODULUS
+    density: float = STEEL_DENSITY
+    poisson_ratio: float = 0.3
+    material_damping: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shaft:
+    """A rotor table: elements, and what stands in it about nodes."""
+
+    length: FloatArray
+    outer_diameter: FloatArray
+    inner_diameter: FloatArray
+    youngs_modulus: FloatArray
+    density: FloatArray
+    poisson_ratio: FloatArray
+    material_damping: FloatArray
+    discs: tuple[Disc, ...]
+    supports: tuple[Support, ...]
+    model: Model = PLAIN
+
+
+def read_rotor(path: str | Path) -> Rotor:
+    """Read a rotor from a rotor table (`.csv`, `.xlsx`) or a rotor file (`.toml`).
+
+    Parameters
+    ----------
+    path
+        The file; in a workbook the sheet `rotor`, or else the first one.
+
+    Returns
+    -------
+    fem.Rotor
+        In SI; nodes are numbered from 1, row *i* is the element between nodes *i* and *i* + 1.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+
+    Warns
+    -----
+    TableWarning
+        About a guessed encoding, and sizes that no shaft has.
+    """
+    from rotorid.tables.rotor.rotor_file import read_rotor_file
+
+    path = Path(path)
+    problems = Problems()
+    if path.suffix.lower() == ".toml":
+        return read_rotor_file(path, problems)
+    shaft = read_shaft(path, Material(), problems)
+    problems.stop()
+    assert shaft is not None
+    return build(str(path), shaft, {}, problems)
+
+
+def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | None:
+    """Read a rotor table, or None and problems."""
+    table = read_table(path, "rotor", COLUMNS, problems, first=True)
+    if table is None:
+        return None
+    length = table.numbers("length")
+    last = len(table) - 1
+    end_row = bool(length[last] == 0.0)
+    elements = np.arange(len(table)) < len(table) - end_row
+    must_be(
+        table,
+        "length",
+        (length > 0) | ~elements,
+        "a length above 0 (0 only in the last row, which then attaches to the right end)",
+        problems,
+    )
+    if not elements.any():
+        expected = "at least one row with a length above 0"
+        problems.add(table.source, table.header_row, table.fields["length"].name, None, expected)
+    for stem in ("diameter", "inner_diameter", *OF_ELEMENTS):
+        _complain_about_blanks(table, stem, elements, problems)
+    diameter, inner = table.numbers("diameter"), table.numbers("inner_diameter", 0.0)
+    must_be(table, "diameter", (diameter > 0) | ~elements, "a diameter above 0", problems)
+    must_be(table, "inner_diameter", (inner >= 0) | ~elements, "a diameter of 0 or more", problems)
+    fits = ~(inner >= diameter) | ~(diameter > 0) | ~elements
+    must_be(table, "inner_diameter", fits, "less than the outer diameter", problems)
+    modulus, density = table.numbers("youngs_modulus"), table.numbers("density")
+    must_be(table, "youngs_modulus", (modulus > 0) | ~elements, "a number above 0", problems)
+    must_be(table, "density", (density >= 0) | ~elements, "a number of 0 (no mass) or more", problems)
+    poisson, damping = table.numbers("poisson_ratio"), table.numbers("material_damping")
+    possible = (poisson > -1) & (poisson <= 0.5)
+    must_be(table, "poisson_ratio", possible | ~elements, "a number above -1, up to 0.5", problems)
+    must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
+    for stem in ATTACHED:
+        must_be(table, stem, table.numbers(stem) >= 0, "0 (nothing attached) or more", problems)
+    _warn_of_sizes(table, elements)
+    return Shaft(
+        length[elements],
+        diameter[elements],
+        inner[elements],
+        table.numbers("youngs_modulus", material.youngs_modulus)[elements],
+        table.numbers("density", material.density)[elements],
+        table.numbers("poisson_ratio", material.poisson_ratio)[elements],
+        table.numbers("material_damping", material.material_damping)[elements],
+        *_attached(table),
+    )
+
+
+def _warn_of_sizes(table: Table, elements: BoolArray) -> None:
+    """A millimetre taken for a metre gives a rotor that can be computed all the same."""
+    for stem, low, high, unit, question in USUAL:
+        if stem not in table:
+            continue
+        field, values = table.fields[stem], table.numbers(stem)
+        for row in np.flatnonzero(elements & (values > 0) & ((values < low) | (values > high)))[:1]:
+            others = int(np.sum(elements & (values > 0) & ((values < low) | (values > high)))) - 1
+            more = f" and {others} more row{'s' if others > 1 else ''}" if others else ""
+            warnings.warn(
+                f"{table.source}, row {table.rows[row]}{more}, column {field.name}: "
+                f"{table.shown(stem, int(row))} means {values[row]:.6g} {unit}; {question}",
+                TableWarning,
+                stacklevel=4,
+            )
+
+
+def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:
+    """Make the rotor; what it refuses becomes a problem of the file."""
+    try:
+        return Rotor(
+            length=shaft.length,
+            outer_diameter=shaft.outer_diameter,
+            inner_diameter=shaft.inner_diameter,
+            youngs_modulus=shaft.youngs_modulus,
+            density=shaft.density,
+            poisson_ratio=shaft.poisson_ratio,
+            material_damping=shaft.material_damping,
+            discs=shaft.discs,
+            supports=shaft.supports,
+            stations=stations,
+            model=shaft.model,
+        )
+    except ValueError as error:
+        problems.add(source, None, None, None, f"a possible rotor: {error}")
+        problems.stop()
+        raise
+
+
+def _complain_about_blanks(table: Table, stem: str, elements: BoolArray, problems: Problems) -> None:
+    """Optional only in a last row without an element."""
+    if stem not in table:
+        return
+    for index, needed in enumerate(elements):
+        if needed and not table.shown(stem, index):
+            table.complain(problems, index, stem, "a number")
+
+
+def _attached(table: Table) -> tuple[tuple[Disc, ...], tuple[Support, ...]]:
+    values = {stem: table.numbers(stem, 0.0) for stem in ATTACHED}
+    discs, supports = [], []
+    for index in range(len(table)):
+        mass, polar, diametral, stiffness, damping = (float(column[index]) for column in values.values())
+        if any(math.isnan(value) or value < 0 for value in (mass, polar, diametral, stiffness, damping)):
+            continue  # reported
+        if mass or polar or diametral:
+            discs.append(Disc(index + 1, mass, polar, diametral))
+        if stiffness or damping:
+            supports.append(Support(index + 1, stiffness, damping))
+    return tuple(discs), tuple(supports)

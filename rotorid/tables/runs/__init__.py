@@ -1,0 +1,1 @@
+"""Runs, weights and influence tables: what balancing works on."""

@@ -1,0 +1,231 @@
+"""How a job counts phases and angles, and how large its errors are said to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import isfinite, radians
+from typing import cast
+
+import numpy as np
+
+from balancing.data.conventions import Angles as Angles
+from balancing.data.conventions import Labels, Rotation, View, check_turning
+from balancing.data.conventions import Phase as Phase
+from balancing.data.trials import ReadingErrors
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.tables.reader.toml_file import Section
+
+PHASES = ("lead", "lag")
+ANGLES = ("with rotation", "against rotation")
+ROTATIONS = ("clockwise", "counter-clockwise")
+STATED_ANGLES = (*ANGLES, *ROTATIONS)
+"""What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
+VIEWS = ("drive end", "free end")
+DEFAULT_TOLERANCE = 0.5
+LARGEST_TOLERANCE = 20.0
+FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """What the numbers of a job's tables mean.
+
+    Attributes
+    ----------
+    phase
+        Whether a positive phase leads or lags.
+    angles
+        Whether angles on the rotor count with or against the rotation.
+    speed_tolerance_percent
+        Speeds of different runs that differ by less count as one.
+    rotation, view
+        How the rotor turns, and the end from which that is seen; None where the job does not say.
+    clock
+        Whether the job calls its angles clockwise or counter-clockwise.
+
+    Raises
+    ------
+    ValueError
+        If a value is none of the allowed ones, or needs `rotation` and there is none.
+    """
+
+    phase: Phase = "lead"
+    angles: Angles = "with rotation"
+    speed_tolerance_percent: float = DEFAULT_TOLERANCE
+    rotation: Rotation | None = None
+    view: View | None = None
+    clock: bool = False
+
+    def __post_init__(self) -> None:
+        if self.phase not in PHASES:
+            raise ValueError(f"phase must be 'lead' or 'lag', not {self.phase!r}")
+        if self.angles not in ANGLES:
+            raise ValueError(f"angles must be 'with rotation' or 'against rotation', not {self.angles!r}")
+        if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
+            raise ValueError(
+                f"speed_tolerance_percent must be from 0 to {LARGEST_TOLERANCE:g}, "
+                f"not {self.speed_tolerance_percent!r}"
+            )
+        check_turning(self.rotation, self.view, clock=self.clock)
+
+    def on(self, labels: Labels) -> Labels:
+        """Labels that also say how the rotor turns and from which end that is seen."""
+        return replace(labels, rotation=self.rotation, view=self.view, clock=self.clock)
+
+    @property
+    def phase_sign(self) -> int:
+        """+1 for lead, −1 for lag."""
+        return 1 if self.phase == "lead" else -1
+
+    @property
+    def angle_sign(self) -> int:
+        """+1 with the rotation, −1 against it."""
+        return 1 if self.angles == "with rotation" else -1
+
+
+@dataclass(frozen=True)
+class StatedErrors:
+    """One standard deviation of a reading as a job file writes it.
+
+    Attributes
+    ----------
+    amplitude_percent, phase_deg
+        Relative to the amplitude; of the phase.
+    floor
+        In the amplitude's own unit, in every direction.
+
+    Raises
+    ------
+    ValueError
+        If one of them is negative or not finite.
+    """
+
+    amplitude_percent: float = 0.0
+    phase_deg: float = 0.0
+    floor: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("amplitude_percent", "phase_deg", "floor"):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0):
+                raise ValueError(f"{name} of a reading must be finite and not negative, not {value!r}")
+
+    def in_si(self, labels: Labels) -> ReadingErrors:
+        """Relative, in rad, and in the unit of the readings inside."""
+        floor = self.floor / labels.vibration_scale
+        return ReadingErrors(self.amplitude_percent / 100.0, radians(self.phase_deg), floor)
+
+
+@dataclass(frozen=True)
+class Turning:
+    """What a job says about angles on the rotor and its rotation.
+
+    Attributes
+    ----------
+    angles
+        With or against the rotation; None where nobody says.
+    rotation, view, clock
+        As in `Conventions`.
+    """
+
+    angles: Angles | None = None
+    rotation: Rotation | None = None
+    view: View | None = None
+    clock: bool = False
+
+
+def read_turning(top: Section, override: str | None = None) -> Turning:
+    """Take the keys angles, rotation and view of a job; problems are noted with it.
+
+    Parameters
+    ----------
+    top
+        The settings of the job.
+    override
+        Replaces `angles`, one of `STATED_ANGLES`.
+    """
+    said = top.choice("angles", STATED_ANGLES, "")
+    rotation = cast("Rotation | None", top.choice("rotation", ROTATIONS, "") or None)
+    view = cast("View | None", top.choice("view", VIEWS, "") or None)
+    stated = override or said
+    if rotation is None and "rotation" not in top:
+        if stated in ROTATIONS:
+            expected = (
+                f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end as the "
+                f"angles, which count {stated}"
+            )
+            top.missing("rotation", expected)
+        elif view is not None:
+            expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the {view}"
+            top.missing("rotation", expected)
+    if rotation is None:
+        return Turning(cast("Angles", stated) if stated in ANGLES else None)
+    return Turning(
+        resolve_angles(stated, rotation) if stated else None, rotation, view, clock=stated in ROTATIONS
+    )
+
+
+def read_key_phasor(top: Section) -> float:
+    """Take the direction of the key phasor, degrees from x as the job counts angles; 0 where none is said."""
+    section = top.section("key_phasor")
+    if section is None:
+        return 0.0
+    angle = section.number("angle_deg", low=-360.0, high=360.0)
+    if "angle_deg" not in section:
+        section.missing("angle_deg", "the direction of the key phasor, degrees from the model's x")
+    section.finish()
+    return angle or 0.0
+
+
+def check_angles(word: str) -> None:
+    """Refuse a word that says nothing about angles.
+
+    Raises
+    ------
+    ValueError
+        Naming the allowed words.
+    """
+    if word not in STATED_ANGLES:
+        hint = did_you_mean(word, STATED_ANGLES)
+        raise ValueError(f"angles must be {listing(map(repr, STATED_ANGLES))}, not {word!r}{hint}")
+
+
+def resolve_angles(stated: str, rotation: str | None) -> Angles:
+    """With or against the rotation, from one of `STATED_ANGLES` and the rotation seen from the same end.
+
+    Raises
+    ------
+    ValueError
+        For another word, and for clockwise or counter-clockwise without a rotation.
+    """
+    check_angles(stated)
+    if stated in ANGLES:
+        return cast("Angles", stated)
+    if rotation is None:
+        raise ValueError(
+            f"angles that count {stated} need the direction of rotation seen from the same end: state "
+            'rotation = "clockwise" or "counter-clockwise" in a job file, or angles with or against rotation'
+        )
+    return "with rotation" if stated == rotation else "against rotation"
+
+
+def as_phase(word: str) -> Phase:
+    """A checked word."""
+    return cast("Phase", word)
+
+
+def as_angles(word: str) -> Angles:
+    """A checked word."""
+    return cast("Angles", word)
+
+
+def polar(size: FloatArray, angle: FloatArray, sign: int) -> ComplexArray:
+    """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
+    turns = angle / (np.pi / 2)
+    quarter = np.round(turns)
+    exact = np.abs(turns - quarter) < 1e-15 * np.maximum(np.abs(turns), 1.0)
+    unit = np.where(exact, 1j ** np.mod(np.where(exact, quarter, 0.0), 4), np.exp(1j * angle))
+    z = size * unit
+    return np.asarray(z if sign > 0 else np.conj(z), dtype=complex)

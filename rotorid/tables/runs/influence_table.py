@@ -1,0 +1,347 @@
+"""Influence tables: stored coefficients, one row per speed × sensor × plane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
+from balancing.data.trials import Trials
+from fem.sensors import label
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, make_table, must_be, read_grid
+from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.tables.reader.writing import table_bytes, write_bytes
+from rotorid.tables.runs.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.runs.influence_comments import (
+    PHASE_MEANING,
+    check_notes,
+    error_comments,
+    read_conventions,
+    read_errors,
+)
+from rotorid.tables.runs.influence_errors import error_columns, error_values, read_covariance
+from rotorid.tables.runs.runs_table import PHASE, SPEED
+from rotorid.tables.runs.speeds import same_speed, show_speed
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+
+    from fem.sensors import SensorLike
+
+_GAPS_NAMED = 100
+_PATTERN = (
+    "influence_<vibration unit>_per_<weight unit>, such as influence_um_pp_per_g or influence_m_per_kg_m"
+)
+
+
+class Stored(NamedTuple):
+    """Stored coefficients, and what their table itself says about its conventions (`phase`, `angles`)."""
+
+    influence: Influence
+    said: Mapping[str, str]
+
+
+class Coefficients(Protocol):
+    """What can be written as an influence table: results of `balancing` and of `fem`."""
+
+    @property
+    def speeds(self) -> FloatArray:
+        """rad/s, shape (S,)."""
+
+    @property
+    def sensors(self) -> Sequence[SensorLike]:
+        """Names or nodes, those of a rotor model with their angles, length C."""
+
+    @property
+    def planes(self) -> Sequence[str | int]:
+        """Names or nodes, length P."""
+
+    @property
+    def W(self) -> ComplexArray:
+        """Shape (S, C, P), SI."""
+
+
+def _split(name: str) -> tuple[Unit, Unit]:
+    """Units of the vibration and of the weight from `um_pp_per_g`."""
+    above, separator, below = name.rpartition("per_")
+    if not separator or (above and not above.endswith("_")):
+        raise UnitError(f"a name like {_PATTERN}")
+    return units.vibration(above.rstrip("_")), units.weight(below)
+
+
+def _influence_unit(name: str) -> Unit:
+    vibration, weight = _split(name)
+    return Unit(name, "influence", vibration.multiply * weight.divide, vibration.divide * weight.multiply)
+
+
+COLUMNS = (
+    SPEED,
+    Column("sensor"),
+    Column("plane"),
+    Column("influence", _influence_unit, ("influence_um_pp_per_g", "influence_m_per_kg_m")),
+    PHASE,
+)
+
+
+def read_influence(
+    path: str | Path, *, phase: Phase | None = None, angles: Angles | None = None
+) -> Influence:
+    """Read stored influence coefficients.
+
+    The phase of a coefficient is the phase reading that a weight at angle 0 causes; whether it leads or lags
+    stands in a comment line `# phase = lag`, or else in `phase`.
+
+    Parameters
+    ----------
+    path
+        `.csv` or `.xlsx` (sheet `influence`).
+    phase, angles
+        Conventions of the job: to print results in, and to read the table with if it states none itself
+        (default: its own, else lead and with rotation).
+
+    Returns
+    -------
+    balancing.Influence
+        In SI, phase lead, with labels to print in and without a baseline; with the covariance of the
+        coefficients and the errors of a reading where the table has them (`write_influence`).
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    problems = Problems()
+    stored = load_influence(Path(path), phase, angles, problems)
+    problems.stop()
+    assert stored is not None
+    return stored.influence
+
+
+def load_influence(
+    source: Path | Grid, phase: Phase | None, angles: Angles | None, problems: Problems
+) -> Stored | None:
+    """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
+    before = len(problems)
+    grid = source if isinstance(source, Grid) else read_grid(source, "influence", problems)
+    columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
+    table = None if grid is None else make_table(grid, columns, problems)
+    if table is None:
+        return None
+    said = read_conventions(table.source, table.comments, problems)
+    speed, size, angle = (table.numbers(stem) for stem in ("speed", "influence", "phase"))
+    must_be(table, "speed", speed > 0, "a speed above 0", problems)
+    must_be(table, "influence", size >= 0, "a coefficient of 0 or more", problems)
+    must_be(table, "phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    sensor, plane = table.texts("sensor"), table.texts("plane")
+    sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    planes = tuple(dict.fromkeys(name for name in plane if name))
+    speeds = sorted({float(value) for value in speed if value > 0})
+    at = [{value: k for k, value in enumerate(values)} for values in (speeds, sensors, planes)]
+    seen: dict[tuple[int, int, int], int] = {}
+    for i in range(len(table)):
+        if not (sensor[i] and plane[i] and speed[i] > 0):
+            continue
+        key = (at[0][float(speed[i])], at[1][sensor[i]], at[2][plane[i]])
+        if key in seen:
+            expected = (
+                f"one coefficient per speed, sensor and plane (row {table.rows[seen[key]]} has the same)"
+            )
+            table.complain(problems, i, "plane", expected)
+        seen.setdefault(key, i)
+    if len(problems) > before:
+        return None
+    complete = len(seen) == len(speeds) * len(sensors) * len(planes)
+    for s, c, p in () if complete else np.ndindex(len(speeds), len(sensors), len(planes)):
+        if len(problems) > before + _GAPS_NAMED:
+            break
+        if (s, c, p) not in seen:
+            shown = show_speed(speeds[s], table.unit("speed"))
+            expected = f"a coefficient of sensor {sensors[c]!r} and plane {planes[p]!r} at {shown}"
+            problems.add(table.source, None, "plane", None, expected)
+    if len(problems) > before:
+        return None
+    sign = -1 if (said.get("phase") or phase) == "lag" else 1
+    places = np.empty((len(speeds), len(sensors), len(planes)), dtype=np.intp)
+    for key, i in seen.items():
+        places[key] = i
+    vibration, weight = _split(table.unit("influence").name)
+    covariance = read_covariance(table, places, planes, sign, problems)
+    errors = read_errors(table, vibration, problems)
+    if len(problems) > before:
+        return None
+    labels = Labels(
+        vibration_unit=vibration.name,
+        vibration_scale=vibration.scale,
+        weight_unit=weight.name,
+        weight_scale=weight.scale,
+        phase=phase or as_phase(said.get("phase", "lead")),
+        angles=angles or as_angles(said.get("angles", "with rotation")),
+    )
+    influence = Influence(
+        speeds=np.array(speeds),
+        sensors=sensors,
+        planes=planes,
+        W=polar(size, angle, sign)[places],
+        covariance=covariance,
+        dof=errors.dof,
+        errors=errors.reading,
+        error_source=errors.source,
+        labels=labels,
+    )
+    return Stored(influence, said)
+
+
+def influence_frame(coefficients: Coefficients, labels: Labels | None = None) -> pd.DataFrame:
+    """Influence coefficients as the table that `read_influence` reads.
+
+    Parameters
+    ----------
+    coefficients
+        Of `balancing` or of a rotor model (`fem`).
+    labels
+        Units and conventions to write; default: those of the coefficients, or m per kg·m and phase lead.
+
+    Returns
+    -------
+    pandas.DataFrame
+        `speed_rad_s`, `sensor`, `plane`, `influence_<unit>`, `phase_deg`; where their errors are known,
+        also `std_re_<unit>`, `std_im_<unit>` and the correlations.
+    """
+    import pandas as pd
+
+    labels = labels or labels_of(coefficients)
+    W = np.asarray(coefficients.W)
+    S, C, P = W.shape
+    above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""
+    size, phase = labels.vibration(W / labels.weight_scale)
+    return pd.DataFrame(
+        {
+            "speed_rad_s": np.repeat(np.asarray(coefficients.speeds, dtype=float), C * P),
+            "sensor": [str(label(name)) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
+            "plane": [str(name) for _ in range(S * C) for name in coefficients.planes],
+            f"influence_{above}per_{labels.weight_unit}": size.ravel(),
+            "phase_deg": phase.ravel(),
+            **(error_values(coefficients, labels) if isinstance(coefficients, Influence) else {}),
+        }
+    )
+
+
+def labels_of(coefficients: Coefficients) -> Labels:
+    """How the coefficients are labelled; SI and lead for a rotor model."""
+    labels = getattr(coefficients, "labels", None)
+    return labels if isinstance(labels, Labels) else Labels(weight_unit="kg_m")
+
+
+def write_influence(path: str | Path, influence: Coefficients, notes: Sequence[str] = ()) -> None:
+    """Write influence coefficients to `.csv` or `.xlsx`: with their conventions, and errors where known.
+
+    What is stored of the errors: the covariance of the coefficients, and the errors of a reading with their
+    source and degrees of freedom. The readings of the bare rotor are not stored: a later job has its own.
+
+    Parameters
+    ----------
+    path
+        An existing file is replaced.
+    influence
+        Of `balancing` or of a rotor model.
+    notes
+        Conditions in words (machine, load, number of runs), written as comment lines.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; nothing half written is left.
+    ValueError
+        For a note that a reader would take for a statement about conventions or errors.
+    """
+    write_bytes(Path(path), influence_bytes(path, influence, notes))
+
+
+def influence_bytes(path: str | Path, influence: Coefficients, notes: Sequence[str] = ()) -> bytes:
+    """What `write_influence` writes."""
+    labels = labels_of(influence)
+    check_notes(notes)
+    comments = (
+        f"phase = {labels.phase}",
+        f"angles = {labels.angles}",
+        PHASE_MEANING,
+        *(error_comments(influence, labels) if isinstance(influence, Influence) else ()),
+        *notes,
+    )
+    return table_bytes(path, influence_frame(influence, labels), comments=comments, sheet="influence")
+
+
+def fit_to_readings(
+    influence: Influence, trials: Trials, tolerance_percent: float, source: str, problems: Problems
+) -> Influence | None:
+    """The part of stored coefficients that belongs to the readings, in their order, or None and problems.
+
+    Every speed and sensor of the readings must be there; further ones are left out.
+    """
+    ours, theirs = trials.labels, influence.labels
+    unlike = _kind(ours.vibration_unit) != _kind(theirs.vibration_unit)
+    if unlike:
+        expected = (
+            f"coefficients for readings in {ours.vibration_unit or 'no unit'}, "
+            f"as the runs table has, or in a unit that converts to it"
+        )
+        problems.add(source, None, "influence", theirs.vibration_unit or "no unit", expected)
+    if trials.planes and units.weight(ours.weight_unit).kind != units.weight(theirs.weight_unit).kind:
+        expected = (
+            f"coefficients per {ours.weight_unit}, or a unit that converts to it, as the weights table has"
+        )
+        problems.add(source, None, "influence", theirs.weight_unit, expected)
+    rows, columns = [], []
+    rpm = units.SPEED["rpm"]
+    for speed in trials.speeds:
+        near = int(np.argmin(np.abs(influence.speeds - speed)))
+        if not same_speed(float(influence.speeds[near]), float(speed), tolerance_percent):
+            known = listing((show_speed(float(value), rpm) for value in influence.speeds), "and")
+            expected = (
+                f"coefficients at {show_speed(float(speed), rpm)}, as the runs table has; there are {known}"
+            )
+            problems.add(source, None, "speed", None, expected)
+        rows.append(near)
+    for sensor in trials.sensors:
+        if sensor not in influence.sensors:
+            known = listing(influence.sensors, "and")
+            hint = did_you_mean(sensor, influence.sensors)
+            expected = f"coefficients of sensor {sensor!r}, as the runs table has; there are {known}{hint}"
+            problems.add(source, None, "sensor", None, expected)
+            continue
+        columns.append(influence.sensors.index(sensor))
+    for plane in trials.planes:
+        if plane not in influence.planes:
+            known = listing(influence.planes, "and")
+            expected = f"coefficients of plane {plane!r}, as the weights table has; there are {known}"
+            problems.add(source, None, "plane", None, expected + did_you_mean(plane, influence.planes))
+    if len(problems):
+        return None
+    unit = units.weight(ours.weight_unit if trials.planes else theirs.weight_unit)
+    if not trials.planes and unit.name == "kg_m":
+        unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
+    labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
+    return replace(
+        influence,
+        speeds=trials.speeds,
+        sensors=trials.sensors,
+        W=influence.W[np.ix_(rows, columns)],
+        covariance=None if influence.covariance is None else influence.covariance[np.ix_(rows, columns)],
+        labels=labels,
+    )
+
+
+def _kind(unit: str) -> str:
+    return units.vibration(unit).kind

@@ -1,0 +1,176 @@
+"""Runs tables: what the sensors read, one row per run × speed × sensor (and repeat)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.tables.reader import units
+from rotorid.tables.reader.columns import Column, Table, make_table, must_be, read_table
+from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.units import Unit, one_of
+from rotorid.tables.runs.conventions import FULL_TURN, Conventions, polar
+from rotorid.tables.runs.speeds import merge_speeds, same_speed, show_speed
+
+SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
+PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))
+COLUMNS = (
+    Column("run"),
+    SPEED,
+    Column("sensor"),
+    Column("amplitude", units.vibration, ("amplitude_um_pp", "amplitude_mm_s_rms", "amplitude")),
+    PHASE,
+    Column("repeat", required=False),
+)
+
+
+_RUNS_NAMED, _SPEEDS_NAMED = 20, 10
+"""Of runs with gaps, and of speeds that one run lacks, so many are named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Readings of all runs; arrays as in `balancing.Trials`."""
+
+    source: str
+    runs: tuple[str, ...]
+    speeds: FloatArray
+    sensors: tuple[str, ...]
+    readings: ComplexArray
+    unit: Unit
+    speed_unit: Unit
+    warnings: tuple[str, ...] = ()
+
+
+def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Problems) -> Runs | None:
+    """Read a runs table, or None and problems.
+
+    Parameters
+    ----------
+    source
+        A file, or the cells of a sheet.
+    conventions
+        What phases mean, and which speeds count as one.
+    problems
+        Collects the complaints.
+    """
+    if isinstance(source, Grid):
+        table = make_table(source, COLUMNS, problems)
+    else:
+        table = read_table(source, "runs", COLUMNS, problems)
+    if table is None:
+        return None
+    speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
+    must_be(table, "speed", speed > 0, "a speed above 0", problems)
+    must_be(table, "amplitude", amplitude >= 0, "an amplitude of 0 or more", problems)
+    must_be(table, "phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    run, sensor = table.texts("run"), table.texts("sensor")
+    usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
+    start = len(problems)
+    speeds, index, merged = merge_speeds(table, usable, conventions.speed_tolerance_percent, problems)
+    runs = tuple(dict.fromkeys(name for name in run if name))
+    sensors = tuple(dict.fromkeys(name for name in sensor if name))
+    run_at = {name: r for r, name in enumerate(runs)}
+    sensor_at = {name: c for c, name in enumerate(sensors)}
+    cells: dict[tuple[int, int, int], list[int]] = defaultdict(list)
+    for i in usable:
+        cells[run_at[run[i]], index[i], sensor_at[sensor[i]]].append(i)
+    if len(problems) == start:  # with unclear speeds all the rest would be noise
+        _complain_about_repeats(table, list(cells.values()), problems)
+    if table.complete and len(usable) == len(table) and len(problems) == start:
+        _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions, problems)
+    unit, speed_unit = table.unit("amplitude"), table.unit("speed")
+    if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
+        nothing = np.empty((0, len(runs), len(speeds), len(sensors)), dtype=complex)
+        return Runs(table.source, runs, speeds, sensors, nothing, unit, speed_unit)
+    values = polar(amplitude, phase, conventions.phase_sign)
+    order = _repeat_order(table)
+    most = max((len(rows) for rows in cells.values()), default=1)
+    readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
+    for place, rows in cells.items():
+        for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
+            readings[(k, *place)] = values[row]
+    return Runs(table.source, runs, speeds, sensors, readings, unit, speed_unit, merged)
+
+
+def _repeat_order(table: Table) -> list[int]:
+    if "repeat" not in table:
+        return list(range(len(table)))
+    labels = {label: k for k, label in enumerate(dict.fromkeys(table.texts("repeat")))}
+    return [labels[label] for label in table.texts("repeat")]
+
+
+def _complain_about_repeats(table: Table, cells: list[list[int]], problems: Problems) -> None:
+    """Two readings of one run, speed and sensor must say that they are repeats."""
+    for rows in cells:
+        if len(rows) < 2:
+            continue
+        if "repeat" not in table:
+            for row in rows[1:]:
+                expected = (
+                    f"one reading per run, speed and sensor (row {table.rows[rows[0]]} has the same); "
+                    "repeated readings need a column repeat"
+                )
+                table.complain(problems, row, "sensor", expected)
+            continue
+        first: dict[str, int] = {}
+        for row in rows:
+            label = table.texts("repeat")[row]
+            if label and first.setdefault(label, row) != row:
+                same = table.rows[first[label]]
+                table.complain(
+                    problems, row, "repeat", f"another repeat than in row {same}, the same reading"
+                )
+
+
+def _complain_about_gaps(
+    table: Table,
+    runs: tuple[str, ...],
+    speeds: FloatArray,
+    sensors: tuple[str, ...],
+    present: set[tuple[int, int, int]],
+    conventions: Conventions,
+    problems: Problems,
+) -> None:
+    """Every run needs every sensor at every speed: influence coefficients compare runs."""
+    if len(present) == len(runs) * len(speeds) * len(sensors):
+        return
+    unit = table.unit("speed")
+    read: list[dict[int, set[int]]] = [defaultdict(set) for _ in runs]
+    for r, s, c in present:
+        read[r][s].add(c)
+    anywhere = {(s, c) for _, s, c in present}
+    wanting = [r for r in range(len(runs)) if sum(map(len, read[r].values())) < len(speeds) * len(sensors)]
+    for r in wanting[:_RUNS_NAMED]:
+        run, at = runs[r], sorted(read[r])
+        if len(speeds) - len(at) > _SPEEDS_NAMED:
+            expected = f"readings of run {run!r} at all {len(speeds)} speeds of the runs; it has {len(at)}"
+            problems.add(table.source, None, table.fields["speed"].name, None, expected)
+            continue
+        for s, speed in enumerate(speeds):
+            shown = show_speed(speed, unit)
+            if s not in read[r]:
+                near = min(at, key=lambda k: abs(speeds[k] - speed))
+                hint = f"; its nearest speed is {show_speed(speeds[near], unit)}"
+                if same_speed(speed, speeds[near], 10.0):
+                    hint += f", speeds count as one within {conventions.speed_tolerance_percent:g} %"
+                expected = f"readings of run {run!r} at {shown}, as other runs have{hint}"
+                problems.add(table.source, None, table.fields["speed"].name, None, expected)
+                continue
+            for c, sensor in enumerate(sensors):
+                if c not in read[r][s]:
+                    expected = f"a reading of sensor {sensor!r} in run {run!r} at {shown}, as other runs have"
+                    if (s, c) not in anywhere:
+                        expected = (
+                            f"a reading of sensor {sensor!r} in run {run!r} at {shown}: every run needs "
+                            "every sensor at every speed"
+                        )
+                    problems.add(table.source, None, "sensor", None, expected)
+    if len(wanting) > _RUNS_NAMED:
+        expected = f"as many readings of {len(wanting) - _RUNS_NAMED} further runs"
+        problems.add(table.source, None, None, None, expected)

@@ -1,0 +1,337 @@
+"""Slow-roll vectors: what a sensor reads at slow speed, subtracted from all readings before anything else.
+
+A probe on a shaft reads the run-out of its track with the vibration: measured = vibration + S, with the same
+S at every speed, and S alone at slow speed, where unbalance does nothing. S is read with the same mark,
+sensor and phase convention as the readings, so subtraction needs no knowledge of either. Influence
+coefficients are differences of runs, in which S cancels; the vibration to be balanced is not. Derivation:
+docs/conventions.md.
+
+Stated errors in percent of the amplitude and degrees of phase hold for the *measured* amplitude |Y + S|. Of
+the difference only |Y| is left, so the share of S goes to the floor: with e the larger of the relative
+amplitude and the phase error, floor'² = floor² + (e max|S|)².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from balancing.data.conventions import Labels
+from balancing.data.trials import ReadingErrors, Trials
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import listing
+from rotorid.tables.reader import units
+from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.tables.reader.toml_file import Section
+from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.tables.runs.conventions import Conventions, polar
+from rotorid.tables.runs.runs_table import Runs, read_runs
+from rotorid.tables.runs.speeds import same_speed, show_speed
+
+SLOW = 0.5
+"""A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
+_WANTED = (
+    "a table of vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at slow "
+    'speed, slow_roll = "slow.csv"'
+)
+
+
+@dataclass(frozen=True)
+class VectorKeys:
+    """One section [slow_roll.SENSOR]: amplitude in `unit` (None: that of the readings), phase in degrees."""
+
+    section: Section
+    key: str
+    amplitude: float
+    phase_deg: float
+    unit: Unit | None = None
+
+
+@dataclass(frozen=True)
+class SlowRollKeys:
+    """What a job says about slow roll: a file or the cells of a sheet, or vectors by sensor."""
+
+    top: Section
+    path: Path | Grid | None
+    vectors: Mapping[str, VectorKeys]
+
+
+@dataclass(frozen=True, eq=False)
+class SlowRoll:
+    """Slow-roll vectors of C sensors.
+
+    Attributes
+    ----------
+    sensors
+        Names (C,).
+    vectors
+        Complex, in the unit of the readings inside, phase lead: shape (C,), for all speeds, or (S, C); zero
+        for a sensor that has none.
+    speeds
+        rad/s, shape (S,), where the vectors differ by speed; else None.
+    warnings
+        What the user should know.
+    """
+
+    sensors: tuple[str, ...]
+    vectors: ComplexArray
+    speeds: FloatArray | None = None
+    warnings: tuple[str, ...] = ()
+
+    def at(self, speeds: FloatArray, sensors: tuple[str, ...]) -> ComplexArray:
+        """Vectors (S, C) at some of these speeds (the nearest counts) and of some of these sensors."""
+        columns = [self.sensors.index(name) for name in sensors]
+        if self.speeds is None:
+            return np.tile(self.vectors[columns], (len(speeds), 1))
+        rows = [int(np.argmin(np.abs(self.speeds - speed))) for speed in speeds]
+        return np.asarray(self.vectors[np.ix_(rows, columns)])
+
+
+def take_slow_roll(top: Section, job: Path, sheet: Grid | None = None) -> SlowRollKeys | None:
+    """Take the key `slow_roll` of a job; None without it, or with a problem.
+
+    Parameters
+    ----------
+    top
+        The settings of the job; problems are noted with it.
+    job
+        Its file: a file that it names is found relative to it.
+    sheet
+        Cells of the sheet `slow_roll` of a workbook.
+    """
+    value = top.take("slow_roll")
+    if value is None:
+        return None if sheet is None else SlowRollKeys(top, sheet, {})
+    if isinstance(value, str) and not value.isprintable():
+        expected = "a file's name without control characters: write / for \\, or put it in single quotes"
+        top.complain("slow_roll", expected)
+        return None
+    if isinstance(value, str) and value.strip():
+        return SlowRollKeys(top, job.parent / value.strip(), {})
+    if not isinstance(value, dict) or not value:
+        top.complain("slow_roll", _WANTED, value=not isinstance(value, dict))
+        return None
+    vectors = {name: _read_vector(section) for name, section in top.named("slow_roll").items()}
+    return SlowRollKeys(top, None, {name: v for name, v in vectors.items() if v is not None})
+
+
+def _read_vector(section: Section) -> VectorKeys | None:
+    section.take("amplitude")  # known, so that a misspelt one gets it as a suggestion
+    keys = [key for key in section.keys if key == "amplitude" or key.startswith("amplitude_")]
+    amplitudes = {key: section.number(key, low=0.0) for key in keys}
+    phase = section.number("phase_deg", low=-360.0, high=360.0)
+    if not keys:
+        section.missing("amplitude", "the amplitude at slow speed, in the unit of the readings")
+    for key in keys[1:]:
+        section.complain(key, f"one amplitude; {keys[0]} says it already")
+    if "phase_deg" not in section:
+        section.missing("phase_deg", "the phase at slow speed, counted as the readings count it")
+    section.finish()
+    amplitude = amplitudes[keys[0]] if len(keys) == 1 else None
+    if amplitude is None or phase is None:
+        return None
+    try:
+        unit = None if keys[0] == "amplitude" else units.vibration(keys[0].removeprefix("amplitude_"))
+    except UnitError as error:
+        section.complain(keys[0], str(error))
+        return None
+    return VectorKeys(section, keys[0], amplitude, phase, unit)
+
+
+def make_slow_roll(
+    keys: SlowRollKeys, trials: Trials, conventions: Conventions, problems: Problems
+) -> SlowRoll | None:
+    """Slow-roll vectors for the sensors of a job, or None and problems.
+
+    Parameters
+    ----------
+    keys
+        What the job says.
+    trials
+        Its readings, for names, units and speeds.
+    conventions
+        What phases mean, and which speeds count as one.
+    problems
+        Collects the complaints.
+    """
+    before = len(problems)
+    if keys.path is not None:
+        found = _from_file(keys.path, trials, conventions, problems)
+    else:
+        found = _from_vectors(keys, trials, conventions)
+    if found is None or len(problems) > before:
+        return None
+    vectors, speeds, given, words = found
+    lacking = [name for name in trials.sensors if name not in given]
+    if lacking:
+        many = len(lacking) > 1
+        words = (
+            *words,
+            f"there is no slow-roll vector for sensor{'s' if many else ''} "
+            f"{listing(map(repr, lacking), 'and')}: {'their' if many else 'its'} readings are used as they "
+            "are (amplitude = 0 says that nothing is to be subtracted)",
+        )
+    return SlowRoll(trials.sensors, vectors, speeds, words)
+
+
+class _Found(NamedTuple):
+    """Vectors (C,) or (S, C), their speeds, names of the sensors that have one, and warnings."""
+
+    vectors: ComplexArray
+    speeds: FloatArray | None
+    given: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def _from_vectors(keys: SlowRollKeys, trials: Trials, conventions: Conventions) -> _Found:
+    """Vectors of the job file, for all speeds."""
+    own = units.vibration(trials.labels.vibration_unit)
+    vectors = np.zeros(len(trials.sensors), dtype=complex)
+    for name, vector in keys.vectors.items():
+        if name not in trials.sensors:
+            expected = (
+                f"a sensor of the runs table, not {name!r}{did_you_mean(name, trials.sensors)}; "
+                f"its sensors are {listing(trials.sensors, 'and')}"
+            )
+            keys.top.complain(f"slow_roll.{name}", expected, value=False)
+            continue
+        unit = vector.unit or own
+        if unit.kind != own.kind:
+            vector.section.complain(vector.key, _other_unit(own.name))
+            continue
+        size = np.array([unit.to_si(vector.amplitude)])
+        angle = np.array([np.radians(vector.phase_deg)])
+        vectors[trials.sensors.index(name)] = polar(size, angle, conventions.phase_sign)[0]
+    return _Found(vectors, None, tuple(keys.vectors))
+
+
+def _from_file(
+    path: Path | Grid, trials: Trials, conventions: Conventions, problems: Problems
+) -> _Found | None:
+    """Vectors of a runs table."""
+    own = Problems()  # what is wrong with the job must not hide what is wrong with this file, nor the reverse
+    runs = read_runs(path, conventions, own)
+    try:
+        own.stop()
+    except InputError as error:
+        for problem in error.problems:
+            problems.add(problem.file, problem.row, problem.column, problem.value, problem.expected)
+        return None
+    assert runs is not None
+    before = len(problems)
+    ours = units.vibration(trials.labels.vibration_unit)
+    if runs.unit.kind != ours.kind:
+        found = runs.unit.name or "no unit"
+        problems.add(runs.source, None, "amplitude", found, _other_unit(ours.name))
+    if len(runs.runs) > 1:
+        expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
+        problems.add(runs.source, None, "run", runs.runs[1], expected)
+    for name in runs.sensors:
+        if name not in trials.sensors:
+            expected = (
+                f"a sensor of the job{did_you_mean(name, trials.sensors)}; "
+                f"its sensors are {listing(trials.sensors, 'and')}"
+            )
+            problems.add(runs.source, None, "sensor", name, expected)
+    rows = _rows(runs, trials, conventions, problems) if len(runs.speeds) > 1 else None
+    if len(problems) > before:
+        return None
+    count = np.sum(~np.isnan(runs.readings[:, 0]), axis=0)
+    mean = np.nansum(runs.readings[:, 0], axis=0) / count
+    all_sensors = np.zeros((len(runs.speeds), len(trials.sensors)), dtype=complex)
+    all_sensors[:, [trials.sensors.index(name) for name in runs.sensors]] = mean
+    if rows is not None:
+        return _Found(all_sensors[rows], trials.speeds, runs.sensors)
+    speed, lowest = float(runs.speeds[0]), float(trials.speeds.min())
+    words: tuple[str, ...] = ()
+    if speed > SLOW * lowest:
+        unit = units.SPEED[trials.labels.speed_unit]
+        words = (
+            f"the slow-roll vectors were read at {show_speed(speed, unit)}, which is not slow against "
+            f"{show_speed(lowest, unit)}: vibration that is subtracted with them is left unbalanced",
+        )
+    return _Found(all_sensors[0], None, runs.sensors, words)
+
+
+def _rows(runs: Runs, trials: Trials, conventions: Conventions, problems: Problems) -> list[int]:
+    """Which row of the slow run belongs to each speed of the job, where there are several."""
+    rows = []
+    unit = units.SPEED[trials.labels.speed_unit]
+    for speed in trials.speeds:
+        near = int(np.argmin(np.abs(runs.speeds - speed)))
+        if not same_speed(float(runs.speeds[near]), float(speed), conventions.speed_tolerance_percent):
+            known = listing((show_speed(float(value), unit) for value in runs.speeds), "and")
+            expected = (
+                f"one slow speed, whose vectors hold for all speeds, or vectors at every speed of the job: "
+                f"{show_speed(float(speed), unit)} is not among {known}"
+            )
+            problems.add(runs.source, None, "speed", None, expected)
+            break
+        rows.append(near)
+    return rows
+
+
+def _other_unit(name: str) -> str:
+    return f"an amplitude in {name or 'no unit'}, as the readings have, or in a unit that converts to it"
+
+
+def subtract_slow_roll(trials: Trials, roll: SlowRoll) -> Trials:
+    """Readings less the slow-roll vectors, with honest errors, and warnings.
+
+    Parameters
+    ----------
+    trials
+        Readings as they were measured, shape (K, R, S, C).
+    roll
+        Vectors of (at least) their sensors.
+    """
+    S = roll.at(trials.speeds, trials.sensors)
+    errors, words = _widened(trials.errors, float(np.abs(S).max(initial=0.0)), trials.labels)
+    warnings = (*trials.warnings, *roll.warnings, *_larger(trials, S), *words)
+    return replace(trials, readings=trials.readings - S, errors=errors, warnings=warnings)
+
+
+def _widened(
+    errors: ReadingErrors | None, largest: float, labels: Labels
+) -> tuple[ReadingErrors | None, tuple[str, ...]]:
+    """Errors of the difference, and what to say about them."""
+    relative = 0.0 if errors is None else max(errors.amplitude, errors.phase)
+    share = relative * largest
+    if errors is None or share == 0.0:
+        return errors, ()
+    words = (
+        "the stated errors hold for the amplitudes as measured: of the slow-roll vectors, up to "
+        f"{_shown(largest, labels)}, they add {_shown(share, labels)} to the floor"
+    )
+    return replace(errors, floor=float(np.hypot(errors.floor, share))), (words,)
+
+
+def _larger(trials: Trials, S: ComplexArray) -> Iterator[str]:
+    """A sentence for each sensor that reads less than its slow-roll vector, about the worst reading."""
+    size = np.abs(trials.mean)
+    unit = units.SPEED[trials.labels.speed_unit]
+    for c, sensor in enumerate(trials.sensors):
+        less = size[:, :, c] < np.abs(S[:, c]) * (1.0 - 1e-12)
+        if not less.any():
+            continue
+        excess = np.where(less, np.abs(S[:, c]) - size[:, :, c], -np.inf)
+        r, s = np.unravel_index(int(np.argmax(excess)), excess.shape)
+        speed = show_speed(float(trials.speeds[s]), unit)
+        own, read = _shown(abs(S[s, c]), trials.labels), _shown(size[r, s, c], trials.labels)
+        others = int(less.sum()) - 1
+        more = f", and than {others} other reading{'s' if others > 1 else ''}" if others else ""
+        yield (
+            f"the slow-roll vector of sensor {sensor!r}, {own}, is larger than its reading in run "
+            f"{trials.runs[r]!r} at {speed}, {read}{more}: check its unit, and that the readings have not "
+            "been corrected already"
+        )
+
+
+def _shown(amplitude: float, labels: Labels) -> str:
+    return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_unit}".rstrip()
