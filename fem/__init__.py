@@ -11,18 +11,18 @@ array([632.11])
 
 from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
+from fem.matrices.motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
+from fem.model.sensors import Sensor
 from fem.modes import Modes
-from fem.motion import Motion, equations_of_motion
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
 from fem.response import influence, unbalance_response
-from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
-from fem.sensors import Sensor
-from fem.speedmap import Intersection, SpeedMap, speed_map
+from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
-from fem.statespace import StateSpace, state_space
+from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.vibration import BearingForces, InfluenceCoefficients, Response
 from fem.whirl import WhirlModes, whirl_modes

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.crossing import synchronous
 from fem.growth import GROWTH, Growing, growing
+from fem.matrices.lateral_planes import both_planes
+from fem.model.rotor import Rotor
 from fem.orbits import whirl_direction
-from fem.planes import both_planes
-from fem.rotor import Rotor
-from fem.tracking import Followed, follow
+from fem.solvers.crossing import synchronous
+from fem.solvers.reduced_whirl import Whirl, solve_whirl
+from fem.solvers.tracking import Followed, follow
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
-from fem.whirlsolve import Whirl, solve_whirl
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats
 from rotorid.base.units import RPM, rpm_text
@@ -159,7 +159,7 @@ class Campbell:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the frequencies over speed with the 1× line and the critical speeds; return the axes."""
-        from fem.plots_campbell import draw_campbell
+        from fem.plots.campbell_diagram import draw_campbell
 
         return draw_campbell(self, ax, criticals=self.criticals)
 

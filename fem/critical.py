@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.eigen import fine_mesh_warning, finite_modes, lowest_modes
-from fem.matrices import Matrices, assemble, ignored_inertia
+from fem.matrices.bands import Matrices, assemble, ignored_inertia
+from fem.matrices.pencil import TO_XY, Pencil, whole_rotor
+from fem.model.rotor import Rotor, whole
 from fem.modes import Modes
-from fem.pencil import TO_XY, Pencil, whole_rotor
-from fem.rotor import Rotor, whole
+from fem.solvers.eigen import fine_mesh_warning, finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from fem.crossing import crossings
 from fem.orbits import whirl_direction
-from fem.quadratic import NONE
+from fem.solvers.crossing import crossings
+from fem.solvers.quadratic import NONE
+from fem.solvers.reduced_whirl import Whirl
 from fem.whirl import DIRECTION_NAMES, in_both_planes
-from fem.whirlsolve import Whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.critical import critical_speeds
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.json import floats
@@ -127,8 +127,9 @@ def refined(rotor: Rotor, times: int) -> Rotor:
 def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     """Estimate how much the mesh changes each of the n lowest critical speeds; the rotor stays as it is.
 
-    The frequencies f(h) of the elements of this package converge as h⁴ (`fem.elements`); with elements cut in
-    two, f(h) − f(0) ≈ 16/15 (f(h) − f(h/2)) (Richardson). A third solution with h/4 shows the rate.
+    The frequencies f(h) of the elements of this package converge as h⁴ (`fem.matrices.elements`); with
+    elements cut in two, f(h) − f(0) ≈ 16/15 (f(h) − f(h/2)) (Richardson). A third solution with h/4 shows the
+    rate.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM
 

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.eigen import fine_mesh_warning
-from fem.growthcheck import growing_warning, surely_stable
-from fem.matrices import Matrices, assemble, ignored_inertia
-from fem.receptance import receptance
-from fem.rotor import Rotor
-from fem.sensors import SensorLike, as_sensors
+from fem.growth_check import growing_warning, surely_stable
+from fem.matrices.bands import Matrices, assemble, ignored_inertia
+from fem.model.rotor import Rotor
+from fem.model.sensors import SensorLike, as_sensors
+from fem.solvers.eigen import fine_mesh_warning
+from fem.solvers.receptance import receptance
 from fem.vibration import BearingForces, InfluenceCoefficients, Response, phase_degrees
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 

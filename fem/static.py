@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices import Matrices, assemble, general, multiply, rounding_error
-from fem.pencil import whole_rotor
-from fem.rotor import Rotor
+from fem.matrices.bands import Matrices, assemble, general, multiply, rounding_error
+from fem.matrices.pencil import whole_rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import number
 

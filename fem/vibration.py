@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.rotor import Rotor, Support
-from fem.sensors import SensorLike, as_sensor, label
+from fem.model.rotor import Rotor, Support
+from fem.model.sensors import SensorLike, as_sensor, label
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import phase_deg, speed_text
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.eigen import finite_modes
-from fem.matrices import assemble
+from fem.matrices.bands import assemble
+from fem.matrices.lateral_planes import both_planes
+from fem.model.rotor import Rotor, whole
 from fem.orbits import whirl_direction
-from fem.planes import both_planes
-from fem.rotor import Rotor, whole
-from fem.whirlexact import exact_modes
-from fem.whirlsolve import solve_whirl
+from fem.solvers.eigen import finite_modes
+from fem.solvers.full_whirl import exact_modes
+from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
 

@@ -135,7 +135,7 @@ def _chosen(
     if plane not in running.nodes:
         known = ", ".join(map(str, running.nodes))
         raise ValueError(f"plane {plane} does not exist: the masses stand at nodes {known}")
-    from fem.sensors import label
+    from fem.model.sensors import label
 
     p = running.nodes.index(plane)
     words = f"reading at node {label(running.sensors[sensor])},\nunbalance at node {plane}"

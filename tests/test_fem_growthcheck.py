@@ -8,7 +8,7 @@ from fem_rotors import rotor23
 from whirl_rotors import machine
 
 import fem
-from fem.growthcheck import surely_stable
+from fem.growth_check import surely_stable
 
 SPEEDS = np.linspace(50.0, 1500.0, 60)
 

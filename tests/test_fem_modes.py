@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.eigen import lowest_modes
-from fem.matrices import assemble, dense, general, multiply, strain_energy
+from fem.matrices.bands import assemble, dense, general, multiply, strain_energy
+from fem.solvers.eigen import lowest_modes
 
 # Roots of cos x cosh x = 1: the free beam.
 FREE = np.array([4.730040744862704, 7.853204624095838, 10.995607838001671])

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem import receptance
+from fem.solvers import receptance
 
 K, C, MASS = 2e7, 4e3, 12.0
 

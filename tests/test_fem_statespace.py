@@ -12,7 +12,7 @@ from scipy.signal import StateSpace as ScipyStateSpace
 from scipy.signal import lsim
 
 import fem
-from fem.statespace import state_space
+from fem.state_space import state_space
 
 
 def motion_of(M, C, K, names=None):

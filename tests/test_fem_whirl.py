@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
-from fem.planes import both_planes
-from fem.whirlsolve import solve_whirl
+from fem.matrices.lateral_planes import both_planes
+from fem.solvers.reduced_whirl import solve_whirl
 
 
 def relative(found, expected):

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.statespace import state_space
+from fem.state_space import state_space
 from rotorid.reduction import reduce
 from rotorid.reduction.small import small_rotor
 

@@ -8,7 +8,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_boo
 
 from balancing import correct, estimate_influence
 from balancing.correction.check import compare_check
-from fem.sensors import Sensor
+from fem.model.sensors import Sensor
 from rotorid.tables import read_job, read_rotor, read_trials, write_influence
 
 SHAFT = [

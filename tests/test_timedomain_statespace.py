@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fem
-from fem.statespace import state_space as of_motion
+from fem.state_space import state_space as of_motion
 from rotorid.reduction import reduce
 from rotorid.reduction.small import small_rotor
 from rotorid.samples import sample_data

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import fem.elements
+import fem.matrices.elements
 from rotorid.reduction import equivalent_masses
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
@@ -249,10 +249,10 @@ def unstretched(function):
 @pytest.mark.parametrize(
     ("target", "wrong", "name", "least"),
     [
-        ("fem.elements._BENDING", lambda form: form * 1.0003, "rotor", 3),
-        ("fem.elements._MASS", lambda form: form * 1.001, "rotor", 3),
-        ("fem.elements._MASS", lambda form: form * 1.03, "rotor", 60),
-        ("fem.elements._BENDING", lambda form: form * 1.01, "masses", 10),
+        ("fem.matrices.elements._BENDING", lambda form: form * 1.0003, "rotor", 3),
+        ("fem.matrices.elements._MASS", lambda form: form * 1.001, "rotor", 3),
+        ("fem.matrices.elements._MASS", lambda form: form * 1.03, "rotor", 60),
+        ("fem.matrices.elements._BENDING", lambda form: form * 1.01, "masses", 10),
         ("rotorid.reduction.masses.design", lambda f: scaled(f, 1.0001), "masses", 8),
         ("rotorid.validation.masses.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
         ("rotorid.harmonic.rows.Rows.real_rows", unstretched, "lessons", 15),
@@ -285,7 +285,7 @@ def _place(target):
 def test_a_formula_that_is_right_again_agrees_again():
     """Nothing of a tampered run is kept."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fem.elements, "_BENDING", fem.elements._BENDING * 1.01)
+        patch.setattr(fem.matrices.elements, "_BENDING", fem.matrices.elements._BENDING * 1.01)
         assert validate(["rotor"]).counts["differs"] >= 70
     assert validate(["rotor"]).holds
 

@@ -28,8 +28,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from fem.rotor import Rotor
-    from fem.sensors import SensorLike
+    from fem.model.rotor import Rotor
+    from fem.model.sensors import SensorLike
 
 Quantity = Literal["displacement", "velocity", "acceleration"]
 

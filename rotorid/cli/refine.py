@@ -12,7 +12,7 @@ from rotorid.base.arrays import AnyArray, BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from fem import Peaks, Response, Rotor
-    from fem.sensors import SensorLike
+    from fem.model.sensors import SensorLike
 
 
 _INSIDE = 2  # speeds within the half-power band on either side of a summit: five with the summit

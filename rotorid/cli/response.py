@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Peaks, Response, Rotor
-    from fem.sensors import SensorLike
+    from fem.model.sensors import SensorLike
 
 
 class View(StrEnum):
@@ -87,6 +87,7 @@ def response(
     --sensors "probe DE:45,probe NDE:45" --operating 5300:6500rpm --plot bode.png
     """
     import fem
+    from fem.model.sensors import label
     from rotorid.tables import read_rotor, read_unbalance, rotor_files
 
     check_targets(plot, output, report=report)
@@ -97,7 +98,7 @@ def response(
     mounted = read_unbalance(unbalance, model)
     with busy(f"response at {len(omega)} speeds"):
         result = response_from_rest(model, mounted, omega)
-    labels = [str(fem.sensors.label(place)) for place in places]
+    labels = [str(label(place)) for place in places]
     finer, peaks = result, []
     if np.count_nonzero(result.speeds) >= 3:  # rest is no part of a peak
         with busy("peaks"):
@@ -141,7 +142,7 @@ def response(
 def _places(rotor: Rotor, sensors: str | None) -> list[SensorLike]:
     """Where to read the vibration, checked."""
     if sensors is not None:
-        from fem.sensors import as_sensor
+        from fem.model.sensors import as_sensor
 
         places: list[SensorLike] = [*parse_sensors(sensors)]
         for place in places:
@@ -154,7 +155,7 @@ def _places(rotor: Rotor, sensors: str | None) -> list[SensorLike]:
 def _orbit_data(result: Response, places: list[SensorLike]) -> dict[str, Any]:
     """Ellipses of the sensors' nodes, one list over speed for each sensor."""
     import fem
-    from fem.sensors import as_sensor
+    from fem.model.sensors import as_sensor
 
     nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in places]
     index = [node - 1 for node in nodes]
@@ -278,8 +279,8 @@ def _orbits(
     Z: np.ndarray[Any, Any],
     ax: Any,  # noqa: ANN401
 ) -> object:
+    from fem.model.sensors import as_sensor
     from fem.plots import draw_orbits
-    from fem.sensors import as_sensor
 
     k = _index(result, at) if at is not None else int(np.argmax(np.abs(Z).max(axis=1)))
     names = list(dict.fromkeys(as_sensor(place, result.rotor).node for place in places))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import fem
-from fem.matrices import ignored_inertia
+from fem.matrices.bands import ignored_inertia
 from rotorid.base.arrays import FloatArray
 from rotorid.estimate import Estimate
 from rotorid.reduction.vibration import mac

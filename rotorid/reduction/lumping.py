@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices import assemble, free_motions, ignored_inertia, multiply, rounding_error
-from fem.planes import Quadratic
+from fem.matrices.bands import assemble, free_motions, ignored_inertia, multiply, rounding_error
+from fem.matrices.lateral_planes import Quadratic
 from rotorid.base.arrays import FloatArray
 
 _LOST = 1e-3  # relative rounding error of a static shape

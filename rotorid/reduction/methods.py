@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.eigen import Spectrum, lowest_modes
-from fem.matrices import assemble, ignored_inertia, multiply
-from fem.pencil import Pencil, whole_rotor
+from fem.matrices.bands import assemble, ignored_inertia, multiply
+from fem.matrices.pencil import Pencil, whole_rotor
+from fem.solvers.eigen import Spectrum, lowest_modes
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.reduction.masses import Normalisation, RowWeights, equivalent_masses, normalised, row_factors

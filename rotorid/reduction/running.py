@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.eigen import finite_modes
-from fem.matrices import assemble
-from fem.sensors import SensorLike, label
+from fem.matrices.bands import assemble
+from fem.model.sensors import SensorLike, label
+from fem.solvers.eigen import finite_modes
 from fem.whirl import checked_speeds
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import floats

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices import assemble, rounding_error
+from fem.matrices.bands import assemble, rounding_error
 from rotorid.base.arrays import FloatArray, IndexArray
 
 if TYPE_CHECKING:

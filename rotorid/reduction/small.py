@@ -2,8 +2,8 @@
 
 The deflections of the masses and of all supported nodes are kept; between them the shaft hangs statically.
 With T the static shapes of the shaft, one column for a unit deflection of each kept node (all others held),
-the equations of `fem.planes` in the basis T read, per plane with M = diag(m) (zero at a support without a
-mass), B = Tᵀ B T, G = Tᵀ G T, K = Tᵀ K T and rotation from x to y,
+the equations of `fem.matrices.lateral_planes` in the basis T read, per plane with M = diag(m) (zero at a
+support without a mass), B = Tᵀ B T, G = Tᵀ G T, K = Tᵀ K T and rotation from x to y,
 
     x:  M x'' + (B + C) x' + Ω G y' + K x + Ω B y + supports = f_x
     y:  M y'' + (B + C) y' − Ω G x' + K y − Ω B x + supports = f_y.
@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.planes import Quadratic, both_planes, project
-from fem.statespace import StateSpace, state_space
+from fem.matrices.lateral_planes import Quadratic, both_planes, project
+from fem.state_space import StateSpace, state_space
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.reduction.lumping import (
     checked_speeds,

@@ -9,9 +9,9 @@ import numpy as np
 
 import fem
 from fem.campbell import runs_away
-from fem.planes import both_planes
+from fem.matrices.lateral_planes import both_planes
+from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number
-from fem.whirlsolve import Whirl, solve_whirl
 from rotorid.base.json import floats
 from rotorid.reduction.running import without_modal_damping
 from rotorid.reduction.threshold import STEPS, grid, searched, stability_threshold

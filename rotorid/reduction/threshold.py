@@ -11,10 +11,10 @@ import numpy as np
 import fem
 from fem.campbell import asked_for, runs_away
 from fem.orbits import whirl_direction
-from fem.quadratic import solve
-from fem.tracking import follow
+from fem.solvers.quadratic import solve
+from fem.solvers.reduced_whirl import Whirl
+from fem.solvers.tracking import follow
 from fem.whirl import checked_speeds, in_both_planes
-from fem.whirlsolve import Whirl
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.reduction.turning import whirl_of
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.basis import reference
-from fem.planes import Quadratic, both_planes, project
-from fem.quadratic import solve
-from fem.whirlsolve import Whirl
+from fem.matrices.lateral_planes import Quadratic, both_planes, project
+from fem.solvers.quadratic import solve
+from fem.solvers.reduced_whirl import Whirl
+from fem.solvers.whirl_basis import reference
 from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 def equations(small: SmallRotor) -> Quadratic:
     """λ² M + λ D(Ω) + K(Ω) of a small rotor: of z = x + i y if the rotor is symmetric, else of both planes.
 
-    In this form `fem.quadratic`, `fem.tracking` and `fem.crossing` take it for the full rotor's equations in
-    a basis of the shaft, and both models are solved in the same way. Modal damping is the same in both planes
-    and does not couple them, so that its block of one plane damps z, too.
+    In this form `fem.solvers.quadratic`, `fem.solvers.tracking` and `fem.solvers.crossing` take it for the
+    full rotor's equations in a basis of the shaft, and both models are solved in the same way. Modal damping
+    is the same in both planes and does not couple them, so that its block of one plane damps z, too.
     """
     Q = small.quadratic
     if not small.rotor.symmetric:

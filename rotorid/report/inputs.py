@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.units import RPM
 from rotorid.report.grids import Grid, texts
 from rotorid.report.pictures import Drawing, rotor_picture
@@ -16,8 +16,8 @@ from rotorid.report.pictures import Drawing, rotor_picture
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from fem.sensors import SensorLike
-    from fem.supports import Support
+    from fem.model.sensors import SensorLike
+    from fem.model.supports import Support
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Modes, Peaks, Response, Rotor, SpeedMap
-    from fem.sensors import SensorLike
+    from fem.model.sensors import SensorLike
     from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost
 
 WIDTH, LETTERS = 6.0, 9.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.units import RPM, rpm_text
 from rotorid.report.grids import Grid, Numbers, Part, evenly, every_warning
 from rotorid.report.inputs import place, rotor_sheet, unbalance_table
@@ -15,7 +15,7 @@ from rotorid.report.pictures import bode_picture, map_picture, modes_picture
 
 if TYPE_CHECKING:
     from fem import Modes, Peaks, Response, SpeedMap
-    from fem.sensors import SensorLike
+    from fem.model.sensors import SensorLike
 
 MICRO = 1e6
 READINGS = 12

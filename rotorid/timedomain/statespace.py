@@ -12,7 +12,7 @@ from rotorid.timedomain.compiled import signs
 from rotorid.timedomain.model import OdeModel
 
 if TYPE_CHECKING:
-    from fem.statespace import StateSpace
+    from fem.state_space import StateSpace
 
 
 def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float = 0.0) -> StateSpace:
@@ -45,7 +45,7 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float
     >>> state_space(model).A
     array([[-2.]])
     """
-    from fem.statespace import StateSpace
+    from fem.state_space import StateSpace
 
     _check_linear(model)
     values = model.start if theta is None else np.asarray(theta, dtype=float)

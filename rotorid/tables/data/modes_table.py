@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

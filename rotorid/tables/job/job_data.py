@@ -16,8 +16,8 @@ from rotorid.tables.reader.grid import Grid
 from rotorid.tables.runs.conventions import Conventions
 
 if TYPE_CHECKING:
-    from fem.rotor import Rotor
-    from fem.sensors import Sensor
+    from fem.model.rotor import Rotor
+    from fem.model.sensors import Sensor
 
 Source = Path | Grid
 """A table of a job: a file, or the cells of a sheet."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.data.trials import Trials
-from fem.sensors import Sensor
+from fem.model.sensors import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.job.job_data import Source, source_name
@@ -23,7 +23,7 @@ from rotorid.tables.runs.speeds import same_speed, show_speed
 from rotorid.tables.runs.trials import make_trials
 
 if TYPE_CHECKING:
-    from fem.rotor import Rotor
+    from fem.model.rotor import Rotor
 
 
 @dataclass(frozen=True)

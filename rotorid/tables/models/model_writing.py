@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.arrays import BoolArray
 
 if TYPE_CHECKING:
-    from fem.motion import Motion
+    from fem.matrices.motion import Motion
 
 
 def ode_model_bytes(
@@ -113,7 +113,7 @@ def _states(
     outputs: Sequence[str] | None,
 ) -> list[str]:
     """Rates s' = A s + B u − Σ B_i d_i v_i with the dampers' forces −d_i v_i on their coordinates."""
-    from fem.statespace import state_space
+    from fem.state_space import state_space
 
     names = motion.coordinates
     for name in dampers:

@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from fem.supports import Coefficient, Pair, Pedestal, Support
+from fem.model.supports import Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.tables.reader import units

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from fem.rotor import Disc, Model, Rotor
+from fem.model.rotor import Disc, Model, Rotor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, must_be, read_table

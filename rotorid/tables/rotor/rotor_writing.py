@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fem.rotor import Disc, Model, Rotor, Support
-from fem.supports import Coefficient
+from fem.model.rotor import Disc, Model, Rotor, Support
+from fem.model.supports import Coefficient
 from rotorid.base.text import listing
 from rotorid.tables.reader.number import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, must_be, nearest, read_table

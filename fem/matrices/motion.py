@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.planes import both_planes, project
-from fem.rotor import Rotor
+from fem.matrices.lateral_planes import both_planes, project
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 
 
@@ -75,7 +75,7 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
 
     Notes
     -----
-    The signs are those of `fem.planes`: rotation from x to y; M y'' … − Ω G x'.
+    The signs are those of `fem.matrices.lateral_planes`: rotation from x to y; M y'' … − Ω G x'.
     """
     if plane not in ("both", "x"):
         raise ValueError(f"no plane {plane!r}: it is 'both' or 'x'")

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.critical import critical_speeds
-from fem.rotor import Rotor, whole
-from fem.supports import Support
+from fem.model.rotor import Rotor, whole
+from fem.model.supports import Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import floats
 from rotorid.base.units import rpm_text
@@ -125,7 +125,7 @@ class SpeedMap:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw critical speeds and the supports' own stiffness, both axes logarithmic; return the axes."""
-        from fem.plots_map import draw_speed_map
+        from fem.plots.critical_map import draw_speed_map
 
         return draw_speed_map(self.stiffness, self.speeds, ax, supports=self.own)
 

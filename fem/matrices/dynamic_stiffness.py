@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.pencil import FROM_XY, TO_XY
-from fem.rotor import Rotor
+from fem.matrices.pencil import FROM_XY, TO_XY
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.matrices import Matrices, dense, multiply, rounding_error
-from fem.pencil import NO_MASS, Pencil, one_plane, orthonormal_rigid
-from fem.rotor import Rotor
+from fem.matrices.bands import Matrices, dense, multiply, rounding_error
+from fem.matrices.pencil import NO_MASS, Pencil, one_plane, orthonormal_rigid
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray
 
 DENSE = 64  # unknowns up to which all modes at once cost less than a subspace of the lowest

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.rotor import Disc, Rotor, Support
-from fem.sensors import SensorLike, as_sensor, label
+from fem.model.rotor import Disc, Rotor, Support
+from fem.model.sensors import SensorLike, as_sensor, label
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import COLORS, legend_above, new_axes
 

@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from fem.matrices import Matrices, multiply, shaft_energy
-from fem.rotor import Rotor, Support
+from fem.matrices.bands import Matrices, multiply, shaft_energy
+from fem.model.rotor import Rotor, Support
 from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
 Whirl = Literal[-1, 0, 1]  # backward, without gyroscopic effect, forward

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fem.plots_rotor import EDGE, draw_rotor
+from fem.plots.drawing import EDGE, draw_rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import COLORS, STYLES, legend_above, new_axes
 from rotorid.base.units import RPM

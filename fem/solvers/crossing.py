@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.planes import Quadratic
-from fem.quadratic import polish, solve
-from fem.tracking import likeness, mass_weight, plain
-from fem.whirlsolve import Whirl, enriched
+from fem.matrices.lateral_planes import Quadratic
+from fem.solvers.quadratic import polish, solve
+from fem.solvers.reduced_whirl import Whirl, enriched
+from fem.solvers.tracking import likeness, mass_weight, plain
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 _CONVERGED = 1e-13

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.checks import number
 
 

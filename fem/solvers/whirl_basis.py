@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.eigen import finite_modes, lowest_modes
-from fem.matrices import assemble, multiply
-from fem.planes import Planes
-from fem.rotor import Rotor
-from fem.supports import Support
+from fem.matrices.bands import assemble, multiply
+from fem.matrices.lateral_planes import Planes
+from fem.model.rotor import Rotor
+from fem.model.supports import Support
+from fem.solvers.eigen import finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
 _NEW = 1e-7  # part of a vector that must be new for it to join the basis

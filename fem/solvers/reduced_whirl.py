@@ -1,6 +1,6 @@
 """Whirl at many speeds: a coarse basis finds all modes, a fine one gives the digits, the full model judges.
 
-1. In the coarse basis of `fem.basis` all eigenvalues are found at every speed.
+1. In the coarse basis of `fem.solvers.whirl_basis` all eigenvalues are found at every speed.
 2. Inverse iteration in the fine basis improves each pair. At a few speeds all eigenvalues of the fine basis
    are found as well: none may be missing. Where iteration wandered, they replace it.
 3. For each mode the pair that the fine basis changed most is solved on the banded equations of the full
@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.basis import Reference, enlarge, reference, starting_vectors, vectors
-from fem.planes import Planes, Quadratic, project
-from fem.quadratic import Solutions, polish, solve
-from fem.wholeband import WholeBand
+from fem.matrices.lateral_planes import Planes, Quadratic, project
+from fem.solvers.full_band import WholeBand
+from fem.solvers.quadratic import Solutions, polish, solve
+from fem.solvers.whirl_basis import Reference, enlarge, reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 TOLERANCE = 3e-8  # of eigenvalues, relative to their size

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.dynamic import Supported
-from fem.eigen import rigid_scale
-from fem.matrices import Matrices, general, multiply
-from fem.pencil import whirling_mass
-from fem.rotor import Rotor
+from fem.matrices.bands import Matrices, general, multiply
+from fem.matrices.dynamic_stiffness import Supported
+from fem.matrices.pencil import whirling_mass
+from fem.model.rotor import Rotor
+from fem.solvers.eigen import rigid_scale
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
 AT_CRITICAL = 1e-8  # relative distance of λ from ω² at which an undamped rotor stands at its critical speed

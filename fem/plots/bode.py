@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.sensors import label
+from fem.model.sensors import label
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import (
     COLORS,

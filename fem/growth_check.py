@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import Rotor
-from fem.supports import Support
+from fem.model.rotor import Rotor
+from fem.model.supports import Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.units import speed_text
 
@@ -36,9 +36,9 @@ def growing_warning(rotor: Rotor, speeds: FloatArray, size: FloatArray) -> tuple
         How large the response is at each, shape (S,).
     """
     from fem.growth import GROWTH
-    from fem.planes import both_planes
+    from fem.matrices.lateral_planes import both_planes
+    from fem.solvers.reduced_whirl import solve_whirl
     from fem.whirl import available_modes
-    from fem.whirlsolve import solve_whirl
 
     order = np.argsort(speeds, kind="stable")
     ranked, height = speeds[order], size[order]

@@ -1,11 +1,11 @@
 """Pictures of rotors, their modes and their vibration: a table of contents."""
 
-from fem.plots_campbell import campbell_figure, draw_campbell, draw_log_decrements
-from fem.plots_map import draw_speed_map
-from fem.plots_modes import draw_modes
-from fem.plots_orbits import draw_orbits
-from fem.plots_response import draw_bode, draw_influence, draw_polar, draw_response
-from fem.plots_rotor import draw_rotor
+from fem.plots.bode import draw_bode, draw_influence, draw_polar, draw_response
+from fem.plots.campbell_diagram import campbell_figure, draw_campbell, draw_log_decrements
+from fem.plots.critical_map import draw_speed_map
+from fem.plots.drawing import draw_rotor
+from fem.plots.mode_shapes import draw_modes
+from fem.plots.orbit_paths import draw_orbits
 from rotorid.base.style import COLORS, new_axes
 
 __all__ = [

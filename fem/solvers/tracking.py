@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.quadratic import NONE, solve
-from fem.whirlsolve import Whirl
+from fem.solvers.quadratic import NONE, solve
+from fem.solvers.reduced_whirl import Whirl
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 _ALIKE = 0.8  # MAC of a mode with itself a step further

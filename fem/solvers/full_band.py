@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.planes import Planes
+from fem.matrices.lateral_planes import Planes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 

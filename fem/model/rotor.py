@@ -10,8 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fem.disc import STEEL_DENSITY, Disc
-from fem.supports import Pedestal, Support
+from fem.model.disc import STEEL_DENSITY, Disc
+from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.planes import Quadratic
+from fem.matrices.lateral_planes import Quadratic
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 
 NONE = complex(np.nan, np.nan)  # no mode: neither part of it may pass for a number

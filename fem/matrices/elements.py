@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.rotor import Rotor
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray, IndexArray
 
 # Hermite polynomials on 0 … 1 in (w₁, s₁, w₂, s₂): ∫w''², 30 ∫w'², 420 ∫w², ∫w'(1 − ξ) and ∫w'ξ times 12.

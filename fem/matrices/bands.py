@@ -1,4 +1,4 @@
-"""Assembled matrices of one lateral plane of a rotor, in bands; the elements are in `fem.elements`.
+"""Assembled matrices of one lateral plane of a rotor, in bands; the elements are in `fem.matrices.elements`.
 
 Unknowns: `stride` per node, the deflection w (m) first, then the slope θ (rad); with `shear` two shear angles
 of the element to the right follow, and the last node has w and θ only. Both planes have the same real
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.elements import Layout, bending_terms, gyroscopic_terms, mass_terms
-from fem.rotor import Rotor
+from fem.matrices.elements import Layout, bending_terms, gyroscopic_terms, mass_terms
+from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray, IndexArray
 
 _FEW = 12  # columns that are multiplied one by one

@@ -1,8 +1,9 @@
 """Equations of motion as a linear state space, massless coordinates included.
 
 M q'' + C q' + K q = f, with coordinates q₁ that move mass and q₂ that do not (zero row and column of M); C
-and K need not be symmetric: gyroscopic terms and cross-coupling stand in them with the signs of `fem.planes`
-(rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …). The signs of the state space follow from
+and K need not be symmetric: gyroscopic terms and cross-coupling stand in them with the signs of
+`fem.matrices.lateral_planes` (rotation from x to y: M x'' + Ω G y' …, M y'' − Ω G x' …). The signs of the
+state space follow from
 
     M₁₁ q₁'' + C₁₁ q₁' + C₁₂ q₂' + K₁₁ q₁ + K₁₂ q₂ = f₁
                C₂₁ q₁' + C₂₂ q₂' + K₂₁ q₁ + K₂₂ q₂ = f₂.
@@ -31,8 +32,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.massless import ZERO, Sorted, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
-from fem.motion import Motion
+from fem.matrices.massless import ZERO, Sorted, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
+from fem.matrices.motion import Motion
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 _CHUNK = 2_000_000  # complex numbers at a time

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fem.planes import Planes, project
-from fem.quadratic import solve
+from fem.matrices.lateral_planes import Planes, project
+from fem.solvers.quadratic import solve
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed
@@ -53,7 +53,7 @@ def _scale(P: Planes) -> float:
 def _arnoldi(
     P: Planes, speed: float, n: int, scale: float
 ) -> tuple[ComplexArray, ComplexArray, FloatArray, int]:
-    """Largest μ of the inverse form (see `fem.quadratic`) by Arnoldi's method, with sparse factors."""
+    """Largest μ of the inverse form (`fem.solvers.quadratic`) by Arnoldi's method, with sparse factors."""
     from scipy.sparse import coo_array, csc_array
     from scipy.sparse.linalg import LinearOperator, eigs, splu
 

@@ -1,0 +1,1 @@
+"""A rotor as plain data: shaft, discs, supports, and where vibration is read."""

@@ -1,0 +1,1 @@
+"""Eigenvalues, receptances and whirl: fast ways in reduced bases, and exact ones to check them."""
