@@ -25,8 +25,8 @@ from benchmarks.timing import Row, best_of, relative_difference
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.model import OdeModel, ode_model
-from rotorid.timedomain.record import Record
+from rotorid.timedomain.models.model import OdeModel, ode_model
+from rotorid.timedomain.models.record import Record
 
 F_OPTIMUM = np.array([0.13999975, 11.99998962, 28.00000273])
 ALLOWED = 2e-6

@@ -10,8 +10,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rotorid.estimate import Combination as Combination
-    from rotorid.estimate import Estimate as Estimate
     from rotorid.harmonic import Experiments as Experiments
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model
@@ -30,6 +28,8 @@ if TYPE_CHECKING:
     from rotorid.regression import stack as stack
     from rotorid.regression import stretch as stretch
     from rotorid.regression import unstretch as unstretch
+    from rotorid.regression.estimate import Combination as Combination
+    from rotorid.regression.estimate import Estimate as Estimate
     from rotorid.tables import InputError as InputError
     from rotorid.tables import Job as Job
     from rotorid.tables import read_compliance as read_compliance
@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from rotorid.timedomain import Record as Record
     from rotorid.timedomain import ode_model as ode_model
     from rotorid.timedomain.fit import fit as fit
+    from rotorid.timedomain.integration.simulate import simulate as simulate
     from rotorid.timedomain.result import Fit as Fit
-    from rotorid.timedomain.simulate import simulate as simulate
 
 __version__ = "0.1.0"
 
@@ -60,8 +60,8 @@ _HOME = {
     "stretch": "regression",
     "unstretch": "regression",
     "stack": "regression",
-    "Estimate": "estimate",
-    "Combination": "estimate",
+    "Estimate": "regression",
+    "Combination": "regression",
     # harmonic tests, natural frequencies and shapes
     "harmonic_model": "harmonic",
     "identify": "harmonic",
@@ -70,7 +70,7 @@ _HOME = {
     # time records
     "ode_model": "timedomain",
     "Record": "timedomain",
-    "simulate": "timedomain.simulate",
+    "simulate": "timedomain.integration.simulate",
     "fit": "timedomain.fit",
     "Fit": "timedomain.result",
     # a rotor as a few masses

@@ -8,10 +8,10 @@ from pathlib import Path
 from balancing import correct
 from balancing.correction.check import compare_check
 from balancing.mounting.mounted import mount
-from rotorid.cli.balance_report import Report
-from rotorid.cli.coefficients import choose
+from rotorid.cli.commands.balance_report import Report
+from rotorid.cli.commands.coefficients import choose
+from rotorid.cli.commands.verdict import Places, judge, tolerance_of
 from rotorid.cli.common import provenance
-from rotorid.cli.verdict import Places, judge, tolerance_of
 from rotorid.report import balance
 from rotorid.tables import read_job
 

@@ -10,7 +10,7 @@ import fem
 from rotorid import read_motion, read_ode_model, read_rotor
 from rotorid import reduce as reduce_rotor
 from rotorid.samples import sample_data
-from rotorid.timedomain.statespace import state_space
+from rotorid.timedomain.models.linear_system import state_space
 
 ROTOR = sample_data() / "rotor23.csv"
 BOOK = sample_data() / "book_task_9"

@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from rotorid.cli.amounts import vectors_of
-from rotorid.cli.split import split
+from rotorid.cli.commands.split import split
 
 
 @pytest.fixture

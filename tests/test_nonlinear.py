@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotorid.nonlinear import nonlinear_least_squares
 from rotorid.regression import least_squares
+from rotorid.regression.nonlinear import nonlinear_least_squares
 
 # NIST StRD, nonlinear: predictor, response, starting points, certified values and standard deviations
 MISRA1A_Y = [10.07, 14.73, 17.94, 23.93, 29.61, 35.18, 40.02, 44.82, 50.76, 55.05, 61.01, 66.40, 75.47, 81.78]

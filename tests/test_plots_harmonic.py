@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from rotorid import read_harmonic_model, read_measurements
 from rotorid.harmonic import identify
-from rotorid.plots_harmonic import figure_identification, plot_identification
+from rotorid.harmonic.plots import figure_identification, plot_identification
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "identify"

@@ -10,11 +10,11 @@ import pytest
 from fem_rotors import rotor23, uniform
 
 import fem
-from rotorid.plots_placement import plot_placement
-from rotorid.plots_reduction import plot_methods, plot_reduction
-from rotorid.plots_running import plot_running, plot_stability
 from rotorid.reduction import reduce
+from rotorid.reduction.dynamics.running_plots import plot_running, plot_stability
 from rotorid.reduction.methods import compare_methods
+from rotorid.reduction.placement_map import plot_placement
+from rotorid.reduction.plots import plot_methods, plot_reduction
 
 mpl.use("Agg")
 

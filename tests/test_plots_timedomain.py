@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rotorid.plots_timedomain import (
+from rotorid.samples import sample_data
+from rotorid.tables import read_ode_model, read_record
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.plots import (
     draw_iterations,
     draw_records,
     draw_residuals,
     draw_sensitivities,
     figure_fit,
 )
-from rotorid.samples import sample_data
-from rotorid.tables import read_ode_model, read_record
-from rotorid.timedomain.fit import fit
-from rotorid.timedomain.model import ode_model
-from rotorid.timedomain.record import Record
 
 FOLDER = sample_data() / "fit" / "quasilinearization"
 

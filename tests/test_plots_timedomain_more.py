@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rotorid.plots_timedomain import FAR, draw_iterations, figure_fit
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.model import ode_model
-from rotorid.timedomain.record import Record
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.plots import FAR, draw_iterations, figure_fit
 
 T = np.linspace(0, 3, 31)
 

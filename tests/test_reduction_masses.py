@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from test_reduction import COMPLIANCE, FREQUENCIES, SHAPES
 
 from rotorid.reduction import equivalent_masses, natural_frequencies
-from rotorid.reduction.masses import BoundedEstimate, design
+from rotorid.reduction.equivalent.masses import BoundedEstimate, design
 
 NORMALISATIONS = ("first", "largest", "length")
 

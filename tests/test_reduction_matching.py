@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from rotorid.reduction import equivalent_masses, matching, natural_frequencies, reduce
-from rotorid.reduction.matching import match, matching_masses
-from rotorid.reduction.trading import trade_off
+from rotorid.reduction import equivalent_masses, natural_frequencies, reduce
+from rotorid.reduction.equivalent import matching
+from rotorid.reduction.equivalent.matching import match, matching_masses
+from rotorid.reduction.equivalent.trading import trade_off
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 

@@ -11,8 +11,8 @@ from scipy.linalg import eigh
 
 import fem
 from rotorid.reduction import reduce
+from rotorid.reduction.equivalent.plane import plane_at_rest
 from rotorid.reduction.methods import compare_methods, guyan, irs, serep
-from rotorid.reduction.plane import plane_at_rest
 
 MASTERS = (7, 12, 18)
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import fem
 import rotorid
 from rotorid.reduction import reduce
-from rotorid.reduction.running import compare_response
-from rotorid.reduction.small import small_rotor
+from rotorid.reduction.dynamics.running import compare_response
+from rotorid.reduction.dynamics.small import small_rotor
 
 NODES = (7, 12, 18)
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from rotorid.reduction.separated import separate, separated_compliance
+from rotorid.reduction.equivalent.separated import separate, separated_compliance
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import fem
 from fem.state_space import state_space
 from rotorid.reduction import reduce
-from rotorid.reduction.small import small_rotor
+from rotorid.reduction.dynamics.small import small_rotor
 
 NODES = (7, 12, 18)
 

@@ -14,9 +14,9 @@ from whirl_rotors import machine, whirling_rotors
 import fem
 import rotorid
 from rotorid.reduction import reduce
-from rotorid.reduction.small import small_rotor
-from rotorid.reduction.stability import compare_stability, stability_threshold
-from rotorid.reduction.turning import whirl_of
+from rotorid.reduction.dynamics.small import small_rotor
+from rotorid.reduction.dynamics.stability import compare_stability, stability_threshold
+from rotorid.reduction.dynamics.turning import whirl_of
 
 MASS, SHAFT, DIAMETER = 20.0, 1.0, 0.03
 STIFFNESS = 48 * fem.STEEL_MODULUS * math.pi / 64 * DIAMETER**4 / SHAFT**3  # of a simply supported shaft

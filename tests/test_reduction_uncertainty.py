@@ -16,7 +16,7 @@ from test_reduction import (
 )
 
 from rotorid.reduction import equivalent_masses, mass_sensitivity, natural_frequencies
-from rotorid.reduction.uncertainty import InputErrors, mass_uncertainty
+from rotorid.reduction.equivalent.uncertainty import InputErrors, mass_uncertainty
 
 ALPHA12 = 11.2e-8 / COMPLIANCE[0, 1] - 1
 """What the printed α12 is wrong by: +1.337 %."""

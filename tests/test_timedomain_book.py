@@ -9,7 +9,7 @@ import pytest
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.record import Record
+from rotorid.timedomain.models.record import Record
 
 FOLDER = sample_data() / "fit"
 PRINTED = Path(__file__).parent / "data" / "f_printed.csv"

@@ -14,8 +14,8 @@ from timedomain_cases import (
 )
 
 from rotorid.timedomain.fit import METHODS, fit
-from rotorid.timedomain.model import ode_model
-from rotorid.timedomain.record import Record
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
 
 
 def right_or_said(found, truth):

@@ -7,8 +7,8 @@ import pytest
 from timedomain_cases import book_model, book_record, decay, decay_record
 
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.model import ode_model
-from rotorid.timedomain.record import Record
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
 
 DATA = Path(__file__).parent / "data"
 FIRST = {"x1": 1.5, "x2": "1 + sin(t)"}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotorid.timedomain import Record, SimulationError, ode_model, second_order, simulate
+from rotorid.timedomain import Record, SimulationError, ode_model, simulate
+from rotorid.timedomain.models import second_order
 
 M = [["m1", "a"], ["a", 18.0]]
 C = [["c1 + c2", "-c2"], ["-c2", "c2"]]

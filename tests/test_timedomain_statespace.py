@@ -8,13 +8,14 @@ import pytest
 import fem
 from fem.state_space import state_space as of_motion
 from rotorid.reduction import reduce
-from rotorid.reduction.small import small_rotor
+from rotorid.reduction.dynamics.small import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
 from rotorid.tables.models.motion_file import read_motion
-from rotorid.timedomain import ode_model, second_order
-from rotorid.timedomain.statespace import state_space
+from rotorid.timedomain import ode_model
+from rotorid.timedomain.models import second_order
+from rotorid.timedomain.models.linear_system import state_space
 
 SPEED = 150.0
 CROSS = ((4e7, 6e6), (-6e6, 5e7))

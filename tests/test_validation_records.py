@@ -8,8 +8,8 @@ import pytest
 
 import balancing.coefficients.influence
 import balancing.correction.correct
-import rotorid.timedomain.propagation
-import rotorid.timedomain.quasilinearization
+import rotorid.timedomain.integration.propagation
+import rotorid.timedomain.methods.quasilinearization
 from rotorid.validation import balancing as published
 from rotorid.validation import time_records
 from rotorid.validation.row import half_unit, number, printed_table
@@ -259,7 +259,7 @@ def test_a_wrong_step_of_quasilinearization_is_noticed(monkeypatch):
             table[i + 1] = table[i] + h * (A[i] @ table[i] + B[i])
         return table
 
-    monkeypatch.setattr(rotorid.timedomain.quasilinearization, "_heun", euler)
+    monkeypatch.setattr(rotorid.timedomain.methods.quasilinearization, "_heun", euler)
     found = statuses(time_records.rows())
     assert found["differs"] > 250
     assert found["agrees"] > 300
@@ -267,12 +267,12 @@ def test_a_wrong_step_of_quasilinearization_is_noticed(monkeypatch):
 
 def test_a_wrong_solution_in_time_is_noticed(monkeypatch):
     """A matrix exponential with time running 0.1 % fast."""
-    right = rotorid.timedomain.propagation.expm_and_derivatives
+    right = rotorid.timedomain.integration.propagation.expm_and_derivatives
 
     def fast(matrices, derivatives):
         return right(1.001 * matrices, 1.001 * derivatives)
 
-    monkeypatch.setattr(rotorid.timedomain.propagation, "expm_and_derivatives", fast)
+    monkeypatch.setattr(rotorid.timedomain.integration.propagation, "expm_and_derivatives", fast)
     found = [r for r in time_records.rows() if r.source.startswith("[F]")]
     differs = [r for r in found if r.status == "differs"]
     assert len(differs) > 150

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from rotorid.timedomain.model import ode_model
-from rotorid.timedomain.record import Record
-from rotorid.timedomain.simulate import simulate
+from rotorid.timedomain.integration.simulate import simulate
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
 
 CHAIN_STATES = {
     "y1": "v1",

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import typer
 
-from rotorid.cli import (
+from rotorid.cli.commands import (
     balance,
     campbell,
     critical,

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.estimate import Estimate, echelon
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words
 from rotorid.harmonic.influence import leave_one_out
@@ -19,6 +18,7 @@ from rotorid.harmonic.recovery import Recovery, System, and_words, recover
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate, echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 

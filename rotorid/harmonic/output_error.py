@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.estimate import Estimate
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.influence import leave_one_out
@@ -30,7 +29,8 @@ from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator import Operator, compile_operator
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
-from rotorid.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""

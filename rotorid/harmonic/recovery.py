@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.estimate import WORD_TOLERANCE
 from rotorid.harmonic.elimination import real_solutions
+from rotorid.regression.estimate import WORD_TOLERANCE
 
 Bounds = Mapping[str, tuple[float, float]]
 

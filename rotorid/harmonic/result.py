@@ -10,9 +10,9 @@ import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
-from rotorid.estimate import coverage_factor
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
+from rotorid.regression.estimate import coverage_factor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -228,7 +228,7 @@ class Identification:
 
     def plot(self, ax: Any = None) -> Axes:  # noqa: ANN401 - matplotlib's axes
         """Draw measured and fitted amplitudes over frequency."""
-        from rotorid.plots_harmonic import plot_identification
+        from rotorid.harmonic.plots import plot_identification
 
         return plot_identification(self, ax)
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.comparison import Comparison
-from rotorid.nonlinear import Bounds, nonlinear_least_squares
+from rotorid.regression.nonlinear import Bounds, nonlinear_least_squares
 
 
 def starting_values(

@@ -7,8 +7,8 @@ import numpy as np
 import fem
 from fem.matrices.bands import ignored_inertia
 from rotorid.base.arrays import FloatArray
-from rotorid.estimate import Estimate
-from rotorid.reduction.vibration import mac
+from rotorid.reduction.equivalent.vibration import mac
+from rotorid.regression.estimate import Estimate
 
 SENSITIVE = 0.1
 """A report warns where input errors of 1 % move a mass by more than this share."""

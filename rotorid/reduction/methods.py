@@ -32,10 +32,16 @@ from fem.matrices.pencil import Pencil, whole_rotor
 from fem.solvers.eigen import Spectrum, lowest_modes
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
-from rotorid.reduction.masses import Normalisation, RowWeights, equivalent_masses, normalised, row_factors
+from rotorid.reduction.equivalent.masses import (
+    Normalisation,
+    RowWeights,
+    equivalent_masses,
+    normalised,
+    row_factors,
+)
+from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.vibration import like, mac, natural_frequencies
 from rotorid.reduction.methods_result import Method, Methods
-from rotorid.reduction.plane import plane_at_rest
-from rotorid.reduction.vibration import like, mac, natural_frequencies
 
 DEPENDENT = 1e-6
 """Shapes whose smallest combination at the masters is below this share of their largest entries are one."""

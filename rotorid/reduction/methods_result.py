@@ -185,7 +185,7 @@ class Methods:
 
     def plot(self, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
         """Draw frequency errors and MAC of the methods as bars; returns both axes."""
-        from rotorid.plots_reduction import plot_methods
+        from rotorid.reduction.plots import plot_methods
 
         return plot_methods(self, ax)
 

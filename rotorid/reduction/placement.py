@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 import fem
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
-from rotorid.reduction.masses import Normalisation, RowWeights, design
+from rotorid.reduction.equivalent.masses import Normalisation, RowWeights, design
+from rotorid.reduction.equivalent.plane import plane_at_rest
 from rotorid.reduction.placement_result import ALIKE, BADLY, Placement
-from rotorid.reduction.plane import plane_at_rest
 from rotorid.regression import RCOND
 
 MOST = 2_000_000
@@ -57,7 +57,7 @@ def rank_nodes(
     check
         How many of the first modes are compared, 1 … n; default n.
     normalise, rows
-        As in `rotorid.reduction.masses.design`. With "first" the first mass is the leftmost one.
+        As in `rotorid.reduction.equivalent.masses.design`. With "first" the first mass is the leftmost one.
     speed
         Where tables of supports are read, rad/s; by default their lowest common speed.
 

@@ -281,7 +281,7 @@ class Placement:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the map of error over 1 − MAC with its trade-off; returns the axes."""
-        from rotorid.plots_placement import plot_placement
+        from rotorid.reduction.placement_map import plot_placement
 
         return plot_placement(self, ax)
 

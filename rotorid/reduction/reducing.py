@@ -11,6 +11,12 @@ from numpy.typing import ArrayLike
 
 import fem
 from rotorid.base.arrays import FloatArray
+from rotorid.reduction.equivalent.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
+from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.sensitivity import mass_sensitivity
+from rotorid.reduction.equivalent.separated import separate
+from rotorid.reduction.equivalent.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
+from rotorid.reduction.equivalent.vibration import like, mac, natural_frequencies
 from rotorid.reduction.judging import (
     far_off,
     of_regression,
@@ -19,13 +25,7 @@ from rotorid.reduction.judging import (
     other_shapes,
     too_heavy,
 )
-from rotorid.reduction.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
-from rotorid.reduction.plane import plane_at_rest
 from rotorid.reduction.result import Choices, Reduction
-from rotorid.reduction.sensitivity import mass_sensitivity
-from rotorid.reduction.separated import separate
-from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
-from rotorid.reduction.vibration import like, mac, natural_frequencies
 
 
 def reduce(  # noqa: PLR0913

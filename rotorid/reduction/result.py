@@ -12,18 +12,18 @@ import fem
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import floats
 from rotorid.base.units import RPM
-from rotorid.estimate import Estimate
-from rotorid.reduction.masses import Normalisation, RowWeights
-from rotorid.reduction.separated import Separated
-from rotorid.reduction.shift import Shift
-from rotorid.reduction.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
-from rotorid.reduction.vibration import mac
+from rotorid.reduction.equivalent.masses import Normalisation, RowWeights
+from rotorid.reduction.equivalent.separated import Separated
+from rotorid.reduction.equivalent.shift import Shift
+from rotorid.reduction.equivalent.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
+from rotorid.reduction.equivalent.vibration import mac
+from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from rotorid.reduction.small import SmallRotor
+    from rotorid.reduction.dynamics.small import SmallRotor
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +143,8 @@ class Reduction:
         """M x'' + K x = f of the small model: masses, and the inverse of the compliance.
 
         The displacement of the mass at node 7 is `x7`. There is no damping: what a rotor's bearings and its
-        surroundings take out is for the user to add, or to estimate (`rotorid.timedomain.second_order`), or
-        comes with the supports (`small`).
+        surroundings take out is for the user to add, or to estimate
+        (`rotorid.timedomain.models.second_order`), or comes with the supports (`small`).
         """
         K = np.linalg.inv(self.compliance) + np.diag(self.seal_stiffness)
         n = len(self.nodes)
@@ -184,7 +184,7 @@ class Reduction:
         ValueError
             Without a rotor, or with masses that are not positive.
         """
-        from rotorid.reduction.small import small_rotor
+        from rotorid.reduction.dynamics.small import small_rotor
 
         if self.rotor is None:
             raise ValueError(
@@ -281,7 +281,7 @@ class Reduction:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the shapes of both models over the rotor; returns the axes."""
-        from rotorid.plots_reduction import plot_reduction
+        from rotorid.reduction.plots import plot_reduction
 
         return plot_reduction(self, ax)
 

@@ -130,7 +130,7 @@ def methods_picture(methods: Methods) -> Drawing:
     """What methods of reduction lose, as hatched bars."""
 
     def draw(figure: Figure) -> None:
-        from rotorid.plots_reduction import plot_methods
+        from rotorid.reduction.plots import plot_methods
 
         above, below = plot_methods(methods, list(figure.subplots(2, sharex=True)))
         for axes in (above, below):
@@ -150,7 +150,7 @@ def running_picture(response: ResponseCost) -> Drawing:
     """Response of both models, and their difference."""
 
     def draw(figure: Figure) -> None:
-        from rotorid.plots_running import plot_running
+        from rotorid.reduction.dynamics.running_plots import plot_running
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
         plot_running(response, [above, below])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from rotorid.timedomain.errors import SimulationError
-from rotorid.timedomain.model import OdeModel, ode_model
-from rotorid.timedomain.record import Record
-from rotorid.timedomain.second_order import second_order
-from rotorid.timedomain.simulate import Trajectory, simulate
+from rotorid.timedomain.integration.simulate import Trajectory, simulate
+from rotorid.timedomain.models.errors import SimulationError
+from rotorid.timedomain.models.model import OdeModel, ode_model
+from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.second_order import second_order
 
 __all__ = ["OdeModel", "Record", "SimulationError", "Trajectory", "ode_model", "second_order", "simulate"]

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.nonlinear import nonlinear_least_squares
-from rotorid.search import inside
-from rotorid.timedomain.gauss_newton import gauss_newton
-from rotorid.timedomain.honesty import judge
-from rotorid.timedomain.model import OdeModel
-from rotorid.timedomain.path import Path
-from rotorid.timedomain.problem import RTOL, Problem
-from rotorid.timedomain.quasilinearization import quasilinearization
-from rotorid.timedomain.record import Record
+from rotorid.regression.nonlinear import nonlinear_least_squares
+from rotorid.regression.search import inside
+from rotorid.timedomain.fit_diagnostics import judge
+from rotorid.timedomain.integration.simulate import SimulationError
+from rotorid.timedomain.methods.gauss_newton import gauss_newton
+from rotorid.timedomain.methods.path import Path
+from rotorid.timedomain.methods.problem import RTOL, Problem
+from rotorid.timedomain.methods.quasilinearization import quasilinearization
+from rotorid.timedomain.methods.shooting import shoot
+from rotorid.timedomain.methods.starts import merge, spread_starts
+from rotorid.timedomain.methods.trajectory import Curve, given_trajectory, measured_trajectory, own_trajectory
+from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.several import for_copies
 from rotorid.timedomain.residuals import output_errors, settled
 from rotorid.timedomain.result import Fit, Minimum
-from rotorid.timedomain.several import for_copies
-from rotorid.timedomain.shooting import shoot
-from rotorid.timedomain.simulate import SimulationError
-from rotorid.timedomain.starts import merge, spread_starts
-from rotorid.timedomain.trajectory import Curve, given_trajectory, measured_trajectory, own_trajectory
 
 METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
 WEIGHINGS = 20

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.problem import Problem
+from rotorid.timedomain.methods.problem import Problem
 
 UNEXPLAINED = 0.05
 """Share of a series' variance in residuals that are not white above which it is not described."""

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
-from rotorid.estimate import Estimate
-from rotorid.timedomain.model import OdeModel
-from rotorid.timedomain.record import Record
-from rotorid.timedomain.simulate import Trajectory
+from rotorid.regression.estimate import Estimate
+from rotorid.timedomain.integration.simulate import Trajectory
+from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.record import Record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -191,6 +191,6 @@ class Fit:
 
     def plot(self) -> Figure:
         """Draw record and model, residuals, sensitivities and iterations."""
-        from rotorid.plots_timedomain import figure_fit
+        from rotorid.timedomain.plots import figure_fit
 
         return figure_fit(self)

@@ -19,8 +19,8 @@ from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, one_of
 
 if TYPE_CHECKING:
-    from rotorid.timedomain.model import OdeModel
-    from rotorid.timedomain.record import Record
+    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.models.record import Record
 
 TIME = {
     "s": Unit("s", "time"),
@@ -74,7 +74,7 @@ def read_record(
     TableWarning
         Where an evenly sampled record has gaps.
     """
-    from rotorid.timedomain.record import Record
+    from rotorid.timedomain.models.record import Record
 
     problems = Problems()
     grid = read_grid(Path(path), "record", problems, first=True)

@@ -59,7 +59,7 @@ def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> 
         section.missing(
             "M",
             "M, C and K: states have no mass matrix; read_ode_model and "
-            "rotorid.timedomain.statespace read such a file",
+            "rotorid.timedomain.models.linear_system read such a file",
         )
     else:
         for key in ("M", "C", "K"):

@@ -18,7 +18,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.timedomain.model import OdeModel
+    from rotorid.timedomain.models.model import OdeModel
 
 _KEYS = (
     "M",
@@ -119,8 +119,8 @@ def read_ode_model(path: str | Path) -> OdeModel:
     form = read_time_form(section, problems)
     model = None
     if not len(problems):
-        from rotorid.timedomain.model import ode_model
-        from rotorid.timedomain.second_order import second_order
+        from rotorid.timedomain.models.model import ode_model
+        from rotorid.timedomain.models.second_order import second_order
 
         given: dict[str, Any] = {
             "initial": form.initial,

@@ -1,0 +1,176 @@
+"""Which influence coefficients a job is balanced with: measured, stored, computed, or several together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from rotorid.base.arrays import FloatArray
+from rotorid.cli.commands.balance import MODEL_ERROR
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from balancing import Influence, Trials
+    from balancing.correction.subsets import Subsets
+    from rotorid.tables import Job
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """Coefficients, the runs that give the vibration (None: those of the coefficients), and planes to use."""
+
+    influence: Influence
+    baseline: Trials | None
+    used: tuple[str, ...]
+
+
+def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bool = False) -> Chosen:
+    """Coefficients of a job; `refined` by its check runs.
+
+    Raises
+    ------
+    ValueError
+        Where the job has no rotor, or no place in it for a plane or sensor.
+    UndeterminedError
+        Where the runs do not determine the coefficients.
+    """
+    from balancing import estimate_influence
+    from balancing.coefficients.combine import combine
+
+    has_trials = bool(job.trials.weights.any())
+    if kind is None:
+        kind = "measured" if has_trials or job.influence is not None or job.rotor is None else "computed"
+    if kind == "measured" and model_error is not None:
+        raise ValueError(
+            "--model-error is for computed coefficients: add --coefficients computed or combined"
+        )
+    if refined:
+        return _refined(job, kind)
+    if kind == "computed":
+        influence = computed(job, model_error or 0.0)
+        return _chosen(job, influence, job.trials)
+    if job.influence is not None:
+        measured, baseline = job.influence, job.trials
+    else:
+        measured, baseline = estimate_influence(job.trials), None
+    if kind == "combined":
+        error = MODEL_ERROR if model_error is None else model_error
+        measured = combine(measured, computed(job, error))
+    return _chosen(job, measured, baseline)
+
+
+def _refined(job: Job, kind: str) -> Chosen:
+    """From trial runs and check runs together."""
+    from balancing import correct, estimate_influence
+    from balancing.correction.refine import refine
+
+    if job.check is None:
+        raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
+    if kind != "measured" or job.influence is not None:
+        raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
+    mounted = None if job.check_mounted else correct(estimate_influence(job.trials))
+    return _chosen(job, refine(job.trials, job.check, corrections=mounted), None)
+
+
+def _chosen(job: Job, influence: Influence, baseline: Trials | None) -> Chosen:
+    return Chosen(influence, baseline, tuple(p for p in influence.planes if p not in job.left_out))
+
+
+def compare_planes(
+    chosen: Chosen,
+    planes: Sequence[str],
+    speeds: Sequence[float] | None,
+    k: int,
+    method: str,
+    row_weights: FloatArray | None,
+) -> Subsets:
+    """Compare all choices of k of these planes, without limits."""
+    from balancing.coefficients.baseline import match_speeds, starting_point
+    from balancing.correction.subsets import best_subsets
+
+    influence = chosen.influence
+    if unknown := [p for p in planes if p not in influence.planes]:
+        raise ValueError(f"there is no plane {unknown[0]!r}; the planes are {', '.join(influence.planes)}")
+    start = starting_point(influence, chosen.baseline)
+    at = range(len(influence.speeds)) if speeds is None else match_speeds(speeds, influence.speeds)
+    columns = [influence.planes.index(p) for p in planes]
+    return best_subsets(
+        influence.W[list(at)][..., columns].reshape(-1, len(columns)),
+        start.readings[list(at)].ravel(),
+        planes,
+        k,
+        criterion="max" if method == "minmax" else "rms",
+        row_weights=None if row_weights is None else row_weights[list(at)].ravel(),
+        labels=start.labels,
+    )
+
+
+def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:
+    """Coefficients from the rotor model of the job, at its planes, or per unbalance at given stations.
+
+    Raises
+    ------
+    ValueError
+        Where the job has no rotor, or no place in it for a plane or sensor.
+    """
+    from dataclasses import replace
+
+    from balancing.coefficients.from_model import model_influence
+    from rotorid.tables.reader.units import weight
+
+    if job.rotor is None:
+        raise ValueError('computed coefficients need a rotor model: rotor = "rotor.toml" in the job file')
+    missing = [f"[sensors.{s}]" for s in job.trials.sensors if s not in job.sensor_places]
+    nodes = stations or {p: job.plane_nodes[p] for p in job.planes if p in job.plane_nodes}
+    missing += [f"[planes.{p}]" for p in job.planes if stations is None and p not in nodes]
+    if missing or not nodes:
+        raise ValueError(
+            "computed coefficients need the place of every sensor and plane in the model: node = … (or "
+            f"station) in {', '.join(missing) or 'a [planes.NAME]'}"
+        )
+    labels = job.trials.labels
+    by_mass = stations is None and weight(labels.weight_unit).kind == "mass"
+    if stations is not None:
+        labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
+    if by_mass and (lost := [p for p in job.planes if p not in job.radii]):
+        raise ValueError(
+            f"weights as masses need the radius of every plane: radius_mm in [planes.{lost[0]}], or weights "
+            "as unbalances"
+        )
+    return model_influence(
+        job.rotor,
+        nodes,
+        {s: job.sensor_places[s] for s in job.trials.sensors},
+        job.trials.speeds,
+        radii={p: job.radii[p] for p in job.planes} if by_mass else None,
+        relative_error=error_percent / 100,
+        quantity=_quantity(labels.vibration_unit),
+        key_phasor=job.key_phasor,
+        labels=labels,
+    )
+
+
+def _quantity(unit: str) -> Literal["displacement", "velocity", "acceleration"]:
+    """What an amplitude in this unit is.
+
+    Raises
+    ------
+    ValueError
+        For a unit that is only a label.
+    """
+    from rotorid.tables.reader.units import vibration
+
+    kinds: dict[str, Literal["displacement", "velocity", "acceleration"]] = {
+        "length": "displacement",
+        "displacement": "displacement",
+        "velocity": "velocity",
+        "acceleration": "acceleration",
+    }
+    kind = vibration(unit).kind if unit else ""
+    if kind not in kinds:
+        raise ValueError(
+            "computed coefficients need amplitudes in a unit of length, velocity or acceleration, such as "
+            f"um_pp or mm_s_rms; {unit or 'a column without a unit'} is none"
+        )
+    return kinds[kind]

@@ -1,0 +1,98 @@
+"""Verdict of a balance: limits of the readings, and a tolerance of the planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.cli.commands.tolerance import plane_positions, quantity, speed_with_unit, two_positions
+
+if TYPE_CHECKING:
+    from balancing import Correction, Influence
+    from balancing.correction.verdict import Verdict
+    from balancing.iso21940 import Tolerance
+    from balancing.mounting.mounted import Mounted
+    from rotorid.tables import Job
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where planes, bearings and the centre of mass are, as the command line says it."""
+
+    positions: str | None
+    bearings: str | None
+    centre: str | None
+
+
+def tolerance_of(
+    grade: str | None, mass: str | None, service_speed: str | None, planes: tuple[str, ...], places: Places
+) -> Tolerance | None:
+    """Tolerance of one or two planes; None where no grade is given.
+
+    Raises
+    ------
+    ValueError
+        For some of the options only, more than two planes, and values that cannot be.
+    """
+    from balancing.iso21940 import tolerance
+    from rotorid.tables.reader import units
+
+    along = (places.positions, places.bearings, places.centre)
+    if grade is None and mass is None and service_speed is None and not any(along):
+        return None
+    if grade is None or mass is None or service_speed is None:
+        raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
+    if len(planes) > 2:
+        raise ValueError(
+            "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
+            f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
+        )
+    at = dict.fromkeys(planes) if places.positions is None else plane_positions(places.positions)
+    if set(at) != set(planes):
+        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
+    return tolerance(
+        quantity(mass, "--rotor-mass", units.MASS, "500kg"),
+        speed_with_unit(service_speed, "--service-speed"),
+        grade,
+        planes=at,
+        bearings=None if places.bearings is None else two_positions(places.bearings),
+        centre=None if places.centre is None else quantity(places.centre, "--centre", units.LENGTH, "350mm"),
+    )
+
+
+def judge(
+    result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
+) -> Verdict | None:
+    """Of the check run if there is one, else of the prediction; None without anything to judge by."""
+    from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
+    from rotorid.tables.reader.units import weight
+
+    limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
+    if tolerance is None and not limited:
+        return None
+    radii = None
+    if tolerance is not None and weight(result.labels.weight_unit).kind == "mass":
+        radii = {p: job.radii[p] for p in result.planes if p in job.radii}
+        if lost := [p for p in result.planes if p not in radii]:
+            raise ValueError(
+                "a tolerance is one of unbalances, and the weights are masses: give the radius of every "
+                f"plane, radius_mm in [planes.{lost[0]}] of the job"
+            )
+    if job.check is not None:
+        return verdict_of_check(
+            influence,
+            job.check,
+            tolerance=tolerance,
+            radii=radii,
+            limits=job.limits_of(influence.planes),
+            planes=result.planes,
+        )
+    return verdict_of_prediction(
+        result,
+        tolerance=tolerance,
+        radii=radii,
+        mounted=None if mounted is None or mounted.on_top_of is not None else mounted.weights,
+        after=None if mounted is None else mounted.after,
+    )

@@ -1,0 +1,1 @@
+"""Equivalent masses by formula (50): regression, matched frequencies, derivatives, errors."""

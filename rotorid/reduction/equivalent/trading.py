@@ -1,0 +1,258 @@
+"""Masses at given nodes: the rotor's frequencies exactly, or its shapes, or how much of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+import fem
+from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
+from rotorid.base.json import finite, floats
+from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
+from rotorid.reduction.equivalent.matching import match
+from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.vibration import mac, natural_frequencies
+from rotorid.reduction.placement_result import ALIKE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class TradeOff:
+    """Alternative masses at the same nodes: rows r, each an n-mass model with the same compliance.
+
+    Attributes
+    ----------
+    nodes
+        Where the masses stand, n of them.
+    names
+        Of the rows: regressions by number of modes and row weights, and sets that match all frequencies.
+    matching
+        Whether a row has the rotor's n frequencies exactly, by `matching_masses`; shape (r,).
+    masses
+        kg, shape (r, n).
+    frequencies
+        rad/s, shape (r, n); NaN where a mode does not vibrate.
+    relative_error
+        Against the rotor's frequencies, shape (r, n).
+    mac
+        Mode k of the model with mode k of the rotor, shape (r, n); NaN where a mode does not vibrate.
+    condition
+        Condition number of each regression, shape (r,); NaN for matching sets.
+    complete
+        Whether the matching sets are proven to be all (up to three masses).
+    rotor_frequencies, rotor_shapes
+        Of the rotor's plane at rest: rad/s (n,), and at the nodes (n, n).
+    rotor
+        The rotor itself.
+    warnings
+        What a user should know before choosing.
+    """
+
+    nodes: tuple[int, ...]
+    names: tuple[str, ...]
+    matching: BoolArray
+    masses: FloatArray
+    frequencies: FloatArray
+    relative_error: FloatArray
+    mac: FloatArray
+    condition: FloatArray
+    complete: bool
+    rotor_frequencies: FloatArray
+    rotor_shapes: FloatArray
+    rotor: fem.Rotor
+    warnings: tuple[str, ...]
+
+    @property
+    def traps(self) -> IndexArray:
+        """Matching rows whose smallest MAC is below 0.9: the frequencies are right, the shapes are not."""
+        return np.flatnonzero(self.matching & (self.mac.min(axis=1) < ALIKE))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per alternative: masses, frequencies, errors, MAC, condition number."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"model": self.names, "matching": self.matching}
+        columns |= {f"mass_{node}_kg": self.masses[:, i] for i, node in enumerate(self.nodes)}
+        for k in range(len(self.nodes)):
+            columns[f"frequency_{k + 1}_rad_s"] = self.frequencies[:, k]
+            columns[f"relative_error_{k + 1}"] = self.relative_error[:, k]
+            columns[f"mac_{k + 1}"] = self.mac[:, k]
+        return pd.DataFrame({**columns, "condition_number": self.condition})
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types: the nodes, the rotor's frequencies, and a document per alternative."""
+        return {
+            "nodes": list(self.nodes),
+            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
+            "matching_sets_complete": self.complete,
+            "alternatives": [
+                {
+                    "model": name,
+                    "matching": bool(self.matching[r]),
+                    "masses_kg": self.masses[r].tolist(),
+                    "natural_frequencies_rad_s": floats(self.frequencies[r]),
+                    "relative_error": floats(self.relative_error[r]),
+                    "mac": floats(self.mac[r]),
+                    "condition_number": finite(self.condition[r]),
+                }
+                for r, name in enumerate(self.names)
+            ],
+            "warnings": list(self.warnings),
+        }
+
+    def summary(self) -> str:
+        """Text for an engineer: two lines per alternative, and the trap in words."""
+        lines = [f"Warning: {w}" for w in self.warnings]
+        lines.append(f"{len(self.nodes)} mass(es) at node(s) {', '.join(map(str, self.nodes))}")
+        for r, name in enumerate(self.names):
+            lines.append(f"{name}: " + ", ".join(f"{m:.2f}" for m in self.masses[r]) + " kg")
+            errors = "  ".join(_cell(round(100 * e, 4) + 0.0, "+10.4f") for e in self.relative_error[r])
+            lines.append(f"    error, %  {errors}")
+            lines.append("    MAC       " + "  ".join(_cell(value, "10.4f") for value in self.mac[r]))
+        lines.append(fill(self._verdict(), 110))
+        return "\n".join(lines)
+
+    def _verdict(self) -> str:
+        n, count = len(self.nodes), int(self.matching.sum())
+        if n == 1:
+            return "One mass has no shape to compare: its MAC is always 1."
+        if not count:
+            which = "" if self.complete else " was found; there may be one"
+            text = f"No set of positive masses at these nodes has all {n} frequencies{which}. "
+        else:
+            text = (
+                f"{count} different mass set(s) have the rotor's {n} frequencies exactly. Frequencies alone "
+                "are a trap: they do not say where the mass is. "
+            )
+        if self.traps.size:
+            told = "; ".join(f"{self.names[r]} has MAC {self._worst(r)}" for r in self.traps)
+            text += f"Do not use {'this one' if self.traps.size == 1 else 'these'}: {told}. "
+        physical = np.flatnonzero((self.masses > 0).all(axis=1))
+        if not physical.size:
+            return text + "No model here has positive masses: choose other nodes."
+        best = int(physical[self.mac[physical].min(axis=1).argmax()])
+        if self.mac[best].min() < ALIKE:
+            return text + (
+                f"None of these models moves like the rotor in all {n} modes (the closest has MAC "
+                f"{self._worst(best)}): choose other nodes, such as by rank_nodes."
+            )
+        return text + (
+            f"Closest in shape: {self.names[best]}, smallest MAC {self._worst(best)}, largest frequency "
+            f"error {100 * np.abs(self.relative_error[best]).max():.2f} %."
+        )
+
+    def _worst(self, r: int | np.intp) -> str:
+        return f"{self.mac[r].min():.4f} in mode {self.mac[r].argmin() + 1}"
+
+
+def trade_off(
+    rotor: fem.Rotor,
+    nodes: Sequence[int | str],
+    *,
+    normalise: Normalisation = "first",
+    speed: float | None = None,
+) -> TradeOff:
+    """Put regressions over 1 … n modes beside all masses that match the rotor's n frequencies exactly.
+
+    Parameters
+    ----------
+    rotor
+        On supports; of its plane x at rest, see `reduce`.
+    nodes
+        Different node numbers or names of stations, n of them.
+    normalise
+        As in `equivalent_masses`. The rows of each regression are weighted equally (the book) and relatively.
+    speed
+        Where tables of supports are read, rad/s; by default their lowest common speed.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not exist or repeat, a rotor free to move, or with fewer than n modes.
+
+    Notes
+    -----
+    Regressions that these modes do not determine are left out and named in `warnings`. [S] 1.10.
+    """
+    places = tuple(rotor.node(node) for node in nodes)
+    n = len(places)
+    if n == 0 or len(set(places)) != n:
+        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    plane, said = plane_at_rest(rotor, speed)
+    alpha = fem.compliance(plane, places)
+    full = fem.critical_speeds(plane, n)
+    shapes = full.shapes[np.array(places) - 1]
+    names, masses, condition, lost = _regressions(alpha, full.frequencies, shapes, normalise)
+    sets = match(alpha, full.frequencies)
+    names += [f"matching set {i + 1}" for i in range(len(sets.masses))]
+    matching = np.arange(len(names)) >= len(masses)
+    m = np.concatenate((np.array(masses).reshape(-1, n), sets.masses))
+    pairs = [natural_frequencies(alpha, row) for row in m]
+    frequencies = np.array([omega for omega, _ in pairs]).reshape(-1, n)
+    agreement = np.array([_paired(model, shapes) for _, model in pairs]).reshape(-1, n)
+    agreement[np.isnan(frequencies)] = np.nan
+    return TradeOff(
+        nodes=places,
+        names=tuple(names),
+        matching=matching,
+        masses=m,
+        frequencies=frequencies,
+        relative_error=frequencies / full.frequencies - 1.0,
+        mac=agreement,
+        condition=np.concatenate((condition, np.full(len(sets.masses), np.nan))),
+        complete=sets.complete,
+        rotor_frequencies=full.frequencies,
+        rotor_shapes=shapes,
+        rotor=rotor,
+        warnings=(*said, *full.warnings, *lost, *sets.warnings, *_unphysical(names, m)),
+    )
+
+
+def _regressions(
+    alpha: FloatArray, omega: FloatArray, shapes: FloatArray, normalise: Normalisation
+) -> tuple[list[str], list[FloatArray], list[float], list[str]]:
+    """Names, masses and condition numbers of the regressions, and what is said of those left out."""
+    names: list[str] = []
+    masses: list[FloatArray] = []
+    condition: list[float] = []
+    lost: list[str] = []
+    choices: tuple[Literal["equal", "relative"], ...] = ("equal", "relative")
+    for k in range(1, len(omega) + 1):
+        for rows in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
+            name = f"regression, {k} mode{'s' if k > 1 else ''}" + (f", {rows} rows" if k > 1 else "")
+            try:
+                fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=rows)
+            except ValueError as problem:
+                lost.append(f"{name}: left out, {problem}")
+                continue
+            if not fit.full_rank:
+                lost.append(f"{name}: left out, {fit.describe_rank()}")
+                continue
+            names.append(name)
+            masses.append(fit.solution)
+            condition.append(fit.condition_number)
+    return names, masses, condition, lost
+
+
+def _paired(model: FloatArray, reference: FloatArray) -> FloatArray:
+    """MAC of mode k with mode k, shape (n,); 0 for a rotor's mode that does not move these nodes."""
+    still = ~reference.any(axis=0)
+    return np.where(still, 0.0, np.diag(mac(model, np.where(still, 1.0, reference))))
+
+
+def _unphysical(names: list[str], masses: FloatArray) -> list[str]:
+    return [
+        f"{name}: a mass of {row.min():.4g} kg is not positive, no physical model"
+        for name, row in zip(names, masses, strict=True)
+        if row.min() <= 0
+    ]
+
+
+def _cell(value: float, form: str) -> str:
+    return f"{value:{form}}" if np.isfinite(value) else f"{'none':>10}"

@@ -1,0 +1,18 @@
+"""The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
+
+from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
+from rotorid.regression.linear import RCOND, gain, least_squares, stack, stretch, unstretch
+
+__all__ = [
+    "RCOND",
+    "WORD_TOLERANCE",
+    "Combination",
+    "Estimate",
+    "coverage_factor",
+    "echelon",
+    "gain",
+    "least_squares",
+    "stack",
+    "stretch",
+    "unstretch",
+]

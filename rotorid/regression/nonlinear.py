@@ -1,0 +1,236 @@
+"""Nonlinear least squares: scipy's driver, polished by Gauss–Newton, judged by the kernel.
+
+The driver finds the minimum; the last digits and everything that is said about the result (covariance,
+rank, null space in words, intervals) come from `rotorid.regression` applied to the Jacobian at the minimum.
+Rules for the covariance are those of the kernel: stated errors give normal intervals, otherwise the variance
+of the residuals and Student's t. Output error and time-domain fits share this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.robust import LOSSES
+from rotorid.regression.search import Function, Search, drive, inside, polish
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Bounds = Mapping[str, tuple[float | None, float | None]]
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearEstimate:
+    """Parameters of a nonlinear model, and how they were found.
+
+    Attributes
+    ----------
+    estimate
+        Values, covariance, rank and null space at the minimum; `residuals` are those of the given function.
+        The values of combinations are of the model linearised there.
+    start
+        Where the search began (inside the bounds), shape (n,).
+    converged, message
+        Whether the minimum was reached, and in words.
+    iterations
+        Accepted steps, polishing included.
+    history
+        Parameters at the start and after each accepted step, shape (iterations + 1, n).
+    costs
+        Half the sum of squared residuals (of the loss) at each of them.
+    at_bounds
+        Names of parameters that stand at a bound: kept there, without a standard deviation.
+    loss
+        Name of the loss.
+    """
+
+    estimate: Estimate
+    start: FloatArray
+    converged: bool
+    message: str
+    iterations: int
+    history: FloatArray
+    costs: FloatArray
+    at_bounds: tuple[str, ...]
+    loss: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return self.estimate.names
+
+    @property
+    def values(self) -> FloatArray:
+        """Parameters (n,); NaN where the data do not determine one."""
+        return self.estimate.values
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,); NaN at a bound or where not determined; None where errors are unknown."""
+        return self.estimate.std
+
+    @property
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals (n, 2); NaN at a bound; None where errors are unknown."""
+        return self.estimate.ci95
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must know before trusting the numbers."""
+        found = [] if self.converged else [self.message]
+        if self.at_bounds:
+            one = len(self.at_bounds) == 1
+            found.append(
+                f"{', '.join(self.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: "
+                "no standard deviation is given, and those of the others hold it fixed"
+            )
+        if not self.estimate.full_rank:
+            found.append(self.estimate.describe_rank())
+        return tuple(found)
+
+    def summary(self) -> str:
+        """Text: the estimate, parameters at bounds, convergence."""
+        return f"{self.estimate.summary(self.at_bounds)}\n{self.message}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; the keys of the estimate and those of the search."""
+        return {
+            **self.estimate.to_dict(),
+            "converged": self.converged,
+            "message": self.message,
+            "iterations": self.iterations,
+            "history": [
+                {"cost": float(c), **dict(zip(self.names, map(float, row), strict=True))}
+                for c, row in zip(self.costs, self.history, strict=True)
+            ],
+            "at_bounds": list(self.at_bounds),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per parameter: value, std, interval, and whether it stands at a bound."""
+        frame = self.estimate.to_frame()
+        frame["at_bound"] = [name in self.at_bounds for name in self.names]
+        return frame
+
+
+def nonlinear_least_squares(  # noqa: PLR0913
+    residual: Function,
+    jacobian: Function,
+    start: ArrayLike,
+    *,
+    names: Sequence[str],
+    sigma_stated: bool,
+    bounds: Bounds | None = None,
+    scale: ArrayLike | None = None,
+    loss: str = "linear",
+    max_iterations: int = 200,
+    near: bool = False,
+) -> NonlinearEstimate:
+    """Minimise the sum of squared residuals over the parameters of a nonlinear model.
+
+    Parameters
+    ----------
+    residual
+        Function of the parameters (n,) giving residuals (m,), each divided by its standard deviation where
+        errors are stated.
+    jacobian
+        Their derivatives, (m, n).
+    start
+        First guess (n,); a value outside its bounds is moved inside.
+    names
+        Of the parameters.
+    sigma_stated
+        Whether a residual of 1 means one stated standard deviation (normal intervals, not rescaled).
+    bounds
+        {name: (lower, upper)}, None for no bound.
+    scale
+        Typical size of a change of each parameter (n,); default: from the columns of the Jacobian.
+    loss
+        "linear" (least squares), or "huber", "soft_l1", "cauchy", which give gross errors less weight. With
+        these the spread is taken from the residuals and intervals are Student's.
+    max_iterations
+        Of the driver.
+    near
+        The start is near the minimum: Gauss–Newton alone, the driver only if that does not contract.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit, unknown names or losses, empty bounds, residuals that are not finite at
+        the start.
+
+    Notes
+    -----
+    Every step of the search solves the linearised problem K δ = −r, [S] (9), with K the Jacobian.
+
+    Examples
+    --------
+    >>> t = np.array([0.0, 1.0, 2.0, 3.0])
+    >>> y = np.array([2.0, 1.21, 0.74, 0.44])
+    >>> fit = nonlinear_least_squares(
+    ...     lambda x: x[0] * np.exp(-x[1] * t) - y,
+    ...     lambda x: np.stack((np.exp(-x[1] * t), -x[0] * t * np.exp(-x[1] * t)), axis=1),
+    ...     [1.0, 1.0], names=["a", "k"], sigma_stated=False)
+    >>> print(np.round(fit.values, 3), fit.converged)
+    [2.    0.501] True
+    """
+    labels = tuple(names)
+    first = np.asarray(start, dtype=np.float64)
+    n = len(labels)
+    if first.shape != (n,) or n == 0 or len(set(labels)) != n or not np.isfinite(first).all():
+        raise ValueError(f"{n} different names need as many finite starting values; got {list(first)}")
+    if loss not in LOSSES:
+        raise ValueError(f"unknown loss {loss!r}: choose one of {', '.join(LOSSES)}")
+    lower, upper = _limits(bounds, labels)
+    first = inside(first, lower, upper)
+    r0 = np.asarray(residual(first), dtype=np.float64)
+    if r0.ndim != 1 or not np.isfinite(r0).all():
+        raise ValueError("the residuals at the starting values are not finite: choose other starting values")
+    search = Search(residual, jacobian, loss)
+    left = False
+    if near and loss == "linear":
+        x, judged, left = polish(search, first, lower, upper, labels, sigma_stated)
+        ok, why = True, ""
+    if not left:
+        search.path.clear()
+        search.costs.clear()
+        x, ok, why = drive(search, first, lower, upper, scale, loss, sigma_stated, max_iterations)
+        x, judged, left = polish(search, x, lower, upper, labels, sigma_stated)
+    converged = ok and left
+    if ok and not left:
+        why = "the minimum was not reached: the last step is not yet small"
+    elif converged:
+        why = f"converged in {len(search.path) - 1} iterations"
+    fixed = (x <= lower) | (x >= upper)
+    return NonlinearEstimate(
+        estimate=judged,
+        start=first,
+        converged=converged,
+        message=why,
+        iterations=len(search.path) - 1,
+        history=np.array(search.path),
+        costs=np.array(search.costs),
+        at_bounds=tuple(name for name, f in zip(labels, fixed, strict=True) if f),
+        loss=loss,
+    )
+
+
+def _limits(bounds: Bounds | None, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    for name, (low, high) in (bounds or {}).items():
+        if name not in names:
+            raise ValueError(f"bounds are given for {name!r}, which is not estimated: {', '.join(names)}")
+        i = names.index(name)
+        lower[i] = -np.inf if low is None else low
+        upper[i] = np.inf if high is None else high
+        if not lower[i] < upper[i]:
+            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low}, {high}")
+    return lower, upper

@@ -1,0 +1,191 @@
+"""What must be known before the numbers of a fit are used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.search import RCOND
+from rotorid.timedomain.combinations import combined
+from rotorid.timedomain.integration.adaptive import longest_step
+from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.methods.path import Path
+from rotorid.timedomain.methods.problem import RTOL, Problem
+from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
+
+PROBES = 100_001
+"""Times at which pulses are looked for."""
+INSENSITIVE = 1e-7
+"""Change of the outputs, relative to their size, by a parameter changing by all of itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The estimate, without intervals where these would mislead (not `reliable`), and what was noticed."""
+
+    estimate: Estimate
+    reliable: bool
+    warnings: tuple[str, ...]
+    integration_change: FloatArray | None
+    autocorrelation: float | None
+
+
+def judge(problem: Problem, path: Path, loss: str) -> Judgement:  # noqa: C901, PLR0915
+    """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
+    found, names = path.estimate, problem.model.parameters
+    warnings: list[str] = []
+    reliable = path.converged
+    if not path.converged:
+        warnings.append(f"{path.message}; no intervals are given")
+    if path.at_bounds:
+        one = len(path.at_bounds) == 1
+        warnings.append(
+            f"{', '.join(path.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: no "
+            "standard deviation is given, and those of the others hold it fixed"
+        )
+    r = found.residuals
+    change = None
+    try:
+        J = problem.jacobian(found.solution)
+        weak = _insensitive(problem, J, found)
+        if weak:
+            warnings.append(f"the record hardly depends on {', '.join(weak)}")
+        if path.converged:
+            found, local = combined(problem, found)
+            warnings += [local] if local else []
+        spread = None if problem.stated or loss != "linear" else unequal(problem, len(names), r)
+        if spread is not None:
+            warnings.append(_unequal_words(problem, found, J, spread))
+        change = _integration_change(problem, found, J)
+    except SimulationError as error:
+        warnings.append(f"the model cannot be simulated with the result: {error}")
+        reliable = False
+    if not found.full_rank:
+        warnings.append(found.describe_rank())
+    if not problem.data.any():
+        warnings.append("the record is zero throughout: a sensor without a signal?")
+    if change is not None:
+        warnings += _integration_words(found, change, names)
+    seen = correlation(problem, r)
+    poor = misfit(problem, found.dof, r, loss)
+    if poor:
+        warnings.append(poor)
+        reliable = False
+    elif seen is not None and seen.words():
+        warnings.append(seen.words())
+    if found.errors_stated and not poor and found.dof > 0 and found.chi_square is not None:
+        warnings += _chi_words(found.chi_square, found.dof)
+    warnings += _aliases(problem, found.solution)
+    missed = _pulses(problem, found.solution) if reliable else []
+    if missed:
+        warnings += missed
+        reliable = False
+    if not reliable:
+        found = replace(found, covariance=None, solution_covariance=None)
+    return Judgement(found, reliable, tuple(warnings), change, None if seen is None else seen.neighbours)
+
+
+def _insensitive(problem: Problem, J: FloatArray, found: Estimate) -> list[str]:
+    size = float(np.linalg.norm(problem.data))
+    effect = np.linalg.norm(J, axis=0) * np.maximum(np.abs(found.solution), 1e-12)
+    weak = (effect < INSENSITIVE * size) & ~np.isnan(found.values) & (found.solution != 0)
+    return [name for name, w in zip(problem.model.parameters, weak, strict=True) if w]
+
+
+def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> FloatArray | None:
+    """Change of the parameters at a tighter tolerance (n,); None where the solution is exact."""
+    used = problem.runs[0].method
+    if used in ("expm", "none"):
+        return None
+    r = problem.residual(found.solution)
+    if used in ("heun", "rk4"):
+        finer = problem.again("auto", RTOL)
+    else:
+        finer = problem.again(problem.integrator, max(problem.rtol / 100, 1e-13))
+    exact = finer.evaluate(found.solution)[0]
+    return least_squares(J, r - exact, rcond=RCOND).solution
+
+
+def _integration_words(found: Estimate, change: FloatArray, names: tuple[str, ...]) -> list[str]:
+    size = np.abs(change)
+    floor = 1e-8 * np.abs(found.solution)
+    limit = floor if found.std is None else np.maximum(floor, 0.1 * np.nan_to_num(found.std))
+    words = [
+        f"{name} by about {c:.2g}" + ("" if found.std is None else f" (standard deviation {s:.2g})")
+        for name, c, s, big in zip(
+            names, change, found.std if found.std is not None else change, size > limit, strict=True
+        )
+        if big
+    ]
+    return [f"a more accurate integration would change {', '.join(words)}"] if words else []
+
+
+def _aliases(problem: Problem, theta: FloatArray) -> list[str]:
+    """Words where a linear model vibrates faster than evenly spaced samples can tell."""
+    for model, record in zip(problem.models, problem.records, strict=True):
+        steps = np.diff(record.t)
+        if not model.linear_driven or len(steps) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
+            continue
+        fastest = float(np.abs(np.linalg.eigvals(model.matrices(theta)[0]).imag).max())
+        if fastest * steps.mean() > np.pi:
+            return [
+                f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
+                f"({np.pi / steps.mean():.4g} rad/s): slower vibrations may describe the record as well"
+            ]
+    return []
+
+
+def _pulses(problem: Problem, theta: FloatArray) -> list[str]:
+    """Words where the rates change with the time so fast that an integration may miss it."""
+    for model, record, run in zip(problem.models, problem.records, problem.runs, strict=True):
+        t = record.t
+        if not model.timed or run.method not in ("dop853", "lsoda") or len(t) < 2:
+            continue
+        u, x = inputs_of(model, record)[:1], run.x[:1]
+        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / longest_step(t))) + 1)
+        fine = np.linspace(t[0], t[-1], PROBES)
+        at_coarse, at_fine = (
+            model.f(times, np.repeat(x, len(times), 0), theta, np.repeat(u, len(times), 0))
+            for times in (coarse, fine)
+        )
+        straight = np.stack([np.interp(fine, coarse, column) for column in at_coarse.T], axis=-1)
+        away = np.abs(at_fine - straight).max(axis=0)
+        if (away > 0.05 * np.maximum(np.ptp(at_fine, axis=0), 1e-300)).any():
+            return [
+                f"the rates change within {coarse[1] - coarse[0]:.2g} s of time or less: the integration may "
+                "step over that; give the record more times there. No intervals are given"
+            ]
+    return []
+
+
+def _unequal_words(problem: Problem, found: Estimate, J: FloatArray, variances: FloatArray) -> str:
+    """Plain least squares with errors s_g of each series: the covariance would be Σ s_g² G_g G_gᵀ, G = J⁺."""
+    first = np.cumsum([0, *problem.groups[:-1]])
+    own = np.repeat(np.sqrt(variances), problem.groups)
+    sizes = ", ".join(
+        f"{name} {s:.2g}" for name, s in zip(problem.series, problem.plain(own)[first], strict=True)
+    )
+    words = f"the outputs have different errors ({sizes}), but the intervals hold for equal ones"
+    if found.full_rank and found.std is not None and np.isfinite(found.std).all():
+        size = np.linalg.norm(J, axis=0)
+        G = np.linalg.pinv(J / size, rcond=RCOND) / size[:, None] * own
+        ratio = np.sqrt((G * G).sum(axis=1)) / found.std
+        words += f"; with their own they would be {ratio.min():.2g} to {ratio.max():.2g} times as wide"
+    return f"{words}. With --sigma auto precise outputs count for more"
+
+
+def _chi_words(chi_square: float, dof: int) -> list[str]:
+    if chance(chi_square, dof) < 1e-3:
+        ratio = np.sqrt(chi_square / dof)
+        return [
+            f"residuals are {ratio:.2g} times as large as the stated errors explain: intervals are too "
+            "narrow, or the model does not quite describe the record"
+        ]
+    if chance(chi_square, dof) > 1 - 1e-6 and chi_square < dof / 2:
+        ratio = np.sqrt(chi_square / dof)
+        return [f"residuals are only {ratio:.2g} times as large as the stated errors: these are too large"]
+    return []

@@ -1,0 +1,1 @@
+"""Solutions of a model in time, with their sensitivities to the parameters."""

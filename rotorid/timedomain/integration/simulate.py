@@ -1,0 +1,202 @@
+"""Simulation of a model over a record's times, with the sensitivities to all parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray
+from rotorid.timedomain.integration import adaptive, propagation
+from rotorid.timedomain.integration.system import Augmented
+from rotorid.timedomain.models.errors import SimulationError, check_finite
+from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.record import Record
+
+METHODS = ("auto", "expm", "dop853", "lsoda", "heun", "rk4")
+
+__all__ = ["METHODS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """States and outputs over time, and their derivatives by the parameters.
+
+    Attributes
+    ----------
+    t
+        Shape (n,).
+    x, y
+        States (n, n_x) and outputs (n, n_y).
+    S, y_theta
+        Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
+    method
+        The integrator used: "none" without states.
+    """
+
+    t: FloatArray
+    x: FloatArray
+    S: FloatArray
+    y: FloatArray
+    y_theta: FloatArray
+    method: str
+
+
+def simulate(
+    model: OdeModel,
+    theta: ArrayLike,
+    record: Record | ArrayLike,
+    *,
+    method: str = "auto",
+    rtol: float = 1e-10,
+    atol: float | None = None,
+    sensitivities: bool = True,
+    x0: ArrayLike | None = None,
+) -> Trajectory:
+    """Solve a model over the times of a record.
+
+    Parameters
+    ----------
+    model
+        The model.
+    theta
+        Parameters, shape (n_p,).
+    record
+        Times and inputs; times alone (n,) for a model without inputs.
+    method
+        "expm": the exact solution of a linear model with constant coefficients (inputs allowed); "dop853",
+        "lsoda" (stiff models): error control, of states and sensitivities; "heun" ([Q]), "rk4": one step
+        from sample to sample. "auto": "expm" if possible, else "dop853", and "lsoda" where that needs too
+        many steps.
+    rtol, atol
+        Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
+    sensitivities
+        Whether to solve for the derivatives too.
+    x0
+        Initial states (n_x,) instead of the model's own (then independent of the parameters).
+
+    Raises
+    ------
+    SimulationError
+        The solution does not exist up to the last time, or takes too many steps.
+    ValueError
+        A method that does not suit the model, missing inputs.
+    """
+    if method not in METHODS:
+        raise ValueError(f"no integrator {method!r}; integrators are {', '.join(METHODS)}")
+    if not isinstance(record, Record):
+        record = Record(np.asarray(record, dtype=float), name="the times")
+    values = np.asarray(theta, dtype=float)
+    if values.shape != (len(model.parameters),) or not np.isfinite(values).all():
+        raise ValueError(
+            f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
+        )
+    u = inputs_of(model, record)
+    used: str = method
+    t = record.t
+    if not model.states:
+        x, s, used = np.zeros((len(t), 0)), np.zeros((len(t), 0, len(values))), "none"
+    else:
+        system = Augmented(model, values, t, u, sensitivities)
+        x_0, s_0 = _start(model, values, x0, sensitivities)
+        check_finite(model, t[:1], x_0[None], s_0[None])
+        if used == "auto" and model.linear_driven:
+            used = "expm"
+        if used == "expm":
+            x, s = _exact(model, values, t, u, x_0, s_0)
+        elif used in ("heun", "rk4"):
+            x, s = _stepwise(system, x_0, s_0, used)
+        else:
+            x, s, used = adaptive.integrate(system, x_0, s_0, used, rtol, atol)
+        check_finite(model, t, x, s)
+    y = model.h(t, x, values, u)
+    y_theta = np.zeros((*y.shape, len(values)))
+    if sensitivities:
+        y_theta = model.h_x(t, x, values, u) @ s + model.h_theta(t, x, values, u)
+    else:
+        s = np.zeros((len(t), len(model.states), len(values)))
+    bad = ~(np.isfinite(y) & np.isfinite(y_theta).all(axis=-1))
+    if bad.any():
+        i, j = np.argwhere(bad)[0]
+        raise SimulationError(
+            f"the output {model.outputs[j]} has no finite value at t = {t[i]:g}; change the parameters or "
+            "the output"
+        )
+    return Trajectory(t, x, s, y, y_theta, used)
+
+
+def inputs_of(model: OdeModel, record: Record) -> FloatArray:
+    """Inputs of the model in its order, (n, n_u)."""
+    if missing := [name for name in model.inputs if name not in record.inputs]:
+        have = ", ".join(record.inputs) or "none"
+        raise ValueError(f"{record.name}: the input {missing[0]} is missing; inputs are: {have}")
+    if not model.inputs:
+        return np.zeros((len(record.t), 0))
+    return np.stack([record.inputs[name] for name in model.inputs], axis=1)
+
+
+def _start(
+    model: OdeModel, theta: FloatArray, x0: ArrayLike | None, sensitivities: bool
+) -> tuple[FloatArray, FloatArray]:
+    empty = np.zeros((len(model.states), len(theta) if sensitivities else 0))
+    if x0 is None:
+        return model.x0(theta), model.x0_theta(theta) if sensitivities else empty
+    start = np.array(x0, dtype=float)
+    if start.shape != (len(model.states),):
+        raise ValueError(f"x0 must be {len(model.states)} numbers ({', '.join(model.states)})")
+    return start, empty
+
+
+def _exact(
+    model: OdeModel, theta: FloatArray, t: FloatArray, u: FloatArray, x0: FloatArray, s0: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    if not model.linear_driven:
+        raise ValueError(
+            "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
+            "or auto"
+        )
+    a, b, da, db = model.matrices(theta)
+    n, k = len(x0), s0.shape[1]
+    if not (model.driven or b.any() or db.any()):
+        return propagation.propagate(t, x0, s0, a, da[:k])
+    # more states: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
+    nu = u.shape[1] if model.driven else 0
+    size = n + 1 + 2 * nu
+    system, derivatives = np.zeros((size, size)), np.zeros((k, size, size))
+    system[:n, :n], system[:n, n] = a, b
+    derivatives[:, :n, :n], derivatives[:, :n, n] = da[:k], db[:k]
+    if not nu:
+        z, s = propagation.propagate(t, np.append(x0, 1.0), np.vstack([s0, np.zeros(k)]), system, derivatives)
+        return z[:, :n], s[:, :n]
+    matrix, slopes = model.input_matrices(theta)
+    system[:n, n + 1 : n + 1 + nu], derivatives[:, :n, n + 1 : n + 1 + nu] = matrix, slopes[:k]
+    system[n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
+    growth = np.diff(u, axis=0) / np.diff(t)[:, None]
+    drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1], growth], axis=1)
+    return propagation.propagate_driven(t, x0, s0, system, derivatives, drive)
+
+
+def _stepwise(
+    system: Augmented, x0: FloatArray, s0: FloatArray, method: str
+) -> tuple[FloatArray, FloatArray]:
+    """One step of Heun's or the classical Runge–Kutta method per sample."""
+    t = system.t
+    table = np.empty((len(t), system.size))
+    table[0] = z = system.pack(x0, s0)
+    with np.errstate(all="ignore"):
+        for i, h in enumerate(np.diff(t).tolist()):
+            now, then = float(t[i]), float(t[i + 1])
+            k1 = system(now, z)
+            if method == "heun":
+                z = z + h / 2 * (k1 + system(then, z + h * k1))
+            else:
+                k2 = system(now + h / 2, z + h / 2 * k1)
+                k3 = system(now + h / 2, z + h / 2 * k2)
+                k4 = system(then, z + h * k3)
+                z = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            table[i + 1] = z
+            if not np.isfinite(z).all():
+                table[i + 2 :] = np.nan
+                break
+    return system.unpack(table)

@@ -1,0 +1,1 @@
+"""Ways to the parameters of a model in time."""

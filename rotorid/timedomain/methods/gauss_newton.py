@@ -1,0 +1,70 @@
+"""Gauss–Newton on sensitivity functions: the plain method of [F]."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.search import RCOND
+from rotorid.timedomain.integration.simulate import SimulationError
+from rotorid.timedomain.methods.path import Path, at, half_square, negligible
+from rotorid.timedomain.methods.problem import Problem
+
+
+def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, tolerance: float) -> Path:
+    """Solve K δ = −r with the sensitivities K = ∂y/∂θ, and add δ; again, until δ is negligible.
+
+    The whole step is taken, without safeguards, and without bounds: from a bad start it may diverge, which
+    is said. Source: [F], dU/dt = f_x U + f_θ.
+
+    Parameters
+    ----------
+    problem
+        Residuals and sensitivities.
+    start
+        First parameters (n,).
+    max_iterations
+        Steps at most.
+    tolerance
+        A step below this, relative to the parameters, is negligible.
+
+    Raises
+    ------
+    SimulationError
+        The states diverge with the starting values.
+    """
+    theta = start.copy()
+    r, K = problem.evaluate(theta)
+    history, costs = [theta], [half_square(r)]
+    found = _step(problem, r, K)
+    converged, message = False, f"not converged in {max_iterations} iterations"
+    for _ in range(max_iterations):
+        new = theta + found.solution
+        try:
+            if not np.isfinite(new).all():
+                raise SimulationError("the parameters grow beyond all bounds")
+            r, K = problem.evaluate(new)
+        except SimulationError as error:
+            message = f"Gauss–Newton diverged after {len(history) - 1} iterations: {error}"
+            break
+        step, theta = found.solution, new
+        history.append(theta)
+        costs.append(half_square(r))
+        small = negligible(step, theta, found, tolerance)
+        found = _step(problem, r, K)
+        if small:
+            # a minimum, not only a short step: the next one is no longer either
+            converged = negligible(found.solution, theta, found, 10 * tolerance)
+            message = f"converged in {len(history) - 1} iterations"
+            if converged:
+                break
+    r, _ = problem.evaluate(theta)
+    return Path(at(found, theta, r), np.array(history), np.array(costs), converged, message)
+
+
+def _step(problem: Problem, r: FloatArray, K: FloatArray) -> Estimate:
+    return least_squares(
+        K, -r, names=problem.model.parameters, sigma=1.0 if problem.stated else None, rcond=RCOND
+    )

@@ -1,0 +1,180 @@
+"""A fit as a least-squares problem: residuals and their derivatives over all records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.timedomain.integration.simulate import SimulationError, Trajectory, simulate
+from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.several import models_of
+
+RTOL = 1e-10
+"""Of the integration during a fit."""
+
+
+class Problem:
+    """Residuals y(t, θ) − measured, divided by the standard deviations where these are stated.
+
+    Rows are ordered record by record, output by output, sample by sample; missing samples have none.
+
+    Parameters
+    ----------
+    model, records
+        What is fitted to what.
+    integrator
+        Of `simulate`.
+    rtol
+        Its tolerance.
+    errors
+        Estimated standard deviation of each output, to weigh by; not stated ones.
+
+    Raises
+    ------
+    ValueError
+        A record without any output of the model, or with columns the model does not have; standard deviations
+        for some outputs only; fewer than one sample.
+    """
+
+    def __init__(
+        self,
+        model: OdeModel,
+        records: Sequence[Record],
+        integrator: str = "auto",
+        rtol: float = RTOL,
+        errors: Mapping[str, float] | None = None,
+    ) -> None:
+        self.records, self._given = tuple(records), model
+        self.integrator, self.rtol = integrator, rtol
+        self.errors = dict(errors or {})
+        if not self.records:
+            raise ValueError("a fit needs at least one record")
+        self.models = models_of(model, len(self.records))
+        """One per record, all with the same parameters."""
+        self.model = self.models[0]
+        tables = [self._table(record) for record in self.records]
+        known = {given for _, _, given in tables if given is not None}
+        if len(known) > 1:
+            raise ValueError("standard deviations must be stated for all measured outputs, or for none")
+        self.stated = known == {True}
+        self.measured = [data for data, _, _ in tables]
+        self.masks = [~np.isnan(data.T) for data, _, _ in tables]
+        self.weights = [1.0 / sigma for _, sigma, _ in tables]
+        if self.rows == 0:
+            raise ValueError("the records have no samples of an output")
+        self._last: tuple[bytes, FloatArray, FloatArray] | None = None
+        self.runs: tuple[Trajectory, ...] = ()
+        """Of the last evaluation, one per record."""
+        self.failure = ""
+
+    def again(self, integrator: str, rtol: float) -> Problem:
+        """The same problem, integrated otherwise."""
+        return Problem(self._given, self.records, integrator, rtol, self.errors)
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of samples."""
+        return int(sum(np.count_nonzero(mask) for mask in self.masks))
+
+    @cached_property
+    def groups(self) -> list[int]:
+        """Samples of each series (one output of one record), in the order of the rows."""
+        return [int(count) for mask in self.masks for count in mask.sum(axis=1) if count]
+
+    @cached_property
+    def series(self) -> list[str]:
+        """Name of each series, in the order of the rows."""
+        several = len(self.records) > 1
+        return [
+            f"{name} in {record.name}" if several else name
+            for record, mask in zip(self.records, self.masks, strict=True)
+            for name, count in zip(self.model.outputs, mask.sum(axis=1), strict=True)
+            if count
+        ]
+
+    def plain(self, r: FloatArray) -> FloatArray:
+        """Weighted rows in the unit of the outputs."""
+        return np.asarray(r / self.vector([np.ones_like(data) for data in self.measured]))
+
+    def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
+        """Tables (n, n_y, …) of all records as weighted rows."""
+        parts = []
+        for table, mask, weight in zip(tables, self.masks, self.weights, strict=True):
+            w = weight if table.ndim == 2 else weight[..., None]
+            parts.append(np.swapaxes(table * w, 0, 1)[mask])
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    @cached_property
+    def data(self) -> FloatArray:
+        """Measured values as weighted rows."""
+        return self.vector(self.measured)
+
+    def evaluate(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals (m,) and derivatives (m, n).
+
+        Raises
+        ------
+        SimulationError
+            The states diverge.
+        """
+        key = theta.tobytes()
+        if self._last is None or self._last[0] != key:
+            runs = [
+                simulate(model, theta, record, method=self.integrator, rtol=self.rtol)
+                for model, record in zip(self.models, self.records, strict=True)
+            ]
+            r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
+            J = self.vector([run.y_theta for run in runs])
+            if not (np.isfinite(r).all() and np.isfinite(J).all()):
+                raise SimulationError("the outputs of the model are not finite")
+            self._last, self.runs = (key, r, J), tuple(runs)
+        return self._last[1], self._last[2]
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Residuals (m,); infinite where the states diverge, so that a search steps back."""
+        try:
+            return self.evaluate(theta)[0]
+        except SimulationError as error:
+            self.failure = str(error)
+            return np.full(self.rows, np.inf)
+
+    def jacobian(self, theta: FloatArray) -> FloatArray:
+        """Derivatives (m, n)."""
+        return self.evaluate(theta)[1]
+
+    def _table(self, record: Record) -> tuple[FloatArray, FloatArray, bool | None]:
+        """Measured values and standard deviations (n, n_y); whether these are stated (None: no values)."""
+        outputs = self.model.outputs
+        unknown = [name for name in record.outputs if name not in outputs]
+        if unknown:
+            raise ValueError(
+                f"{record.name}: {', '.join(unknown)} is no output of the model; outputs are "
+                f"{', '.join(outputs)}"
+            )
+        missing = [name for name in self.model.inputs if name not in record.inputs]
+        if missing:
+            raise ValueError(f"{record.name}: the input {', '.join(missing)} is missing")
+        if not record.outputs:
+            raise ValueError(f"{record.name} has no column of an output: {', '.join(outputs)}")
+        data = np.full((len(record), len(outputs)), np.nan)
+        sigma = np.ones_like(data)
+        given: set[bool] = set()
+        for i, name in enumerate(outputs):
+            if name not in record.outputs or np.isnan(record.outputs[name]).all():
+                continue
+            data[:, i] = record.outputs[name]
+            given.add(record.sigma is not None and name in record.sigma)
+            if record.sigma is not None and name in record.sigma:
+                sigma[:, i] = record.sigma[name]
+        if len(given) > 1:
+            raise ValueError(
+                f"{record.name}: standard deviations must be stated for all measured outputs, or for none"
+            )
+        if given and not any(given):
+            sigma = np.tile([self.errors.get(name, 1.0) for name in outputs], (len(record), 1))
+        sigma[np.isnan(data)] = 1.0
+        return data, sigma, given.pop() if given else None

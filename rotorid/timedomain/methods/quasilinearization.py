@@ -1,0 +1,209 @@
+"""Quasilinearization after Bellman and Kalaba, as [Q] describes it.
+
+About the current trajectory x_k(t) and parameters θ_k the equations are linear,
+dx/dt = f + f_x (x − x_k) + f_θ (θ − θ_k). Their solution is x = D + G (θ − θ_k) with the particular solution
+D and the homogeneous solutions G; θ follows from linear least squares, and x is the next trajectory. It need
+not solve the original equations until the end, which is what makes the method forgiving.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.search import RCOND
+from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.methods.path import Path, at, half_square, negligible
+from rotorid.timedomain.methods.problem import Problem
+from rotorid.timedomain.methods.trajectory import Curve
+from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.record import Record
+
+
+def quasilinearization(
+    problem: Problem, start: FloatArray, curves: Sequence[Curve], *, max_iterations: int, tolerance: float
+) -> Path:
+    """Iterate linear fits about the last trajectory until neither it nor the parameters change.
+
+    Parameters
+    ----------
+    problem
+        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, any other
+        integrates with error control.
+    start
+        First parameters (n,).
+    curves
+        First trajectory of each record.
+    max_iterations
+        Steps at most.
+    tolerance
+        A step below this, relative to the parameters, is negligible.
+
+    Raises
+    ------
+    SimulationError
+        The linear equations have no finite solution with the starting values.
+    """
+    model, theta = problem.model, start.copy()
+    states = tuple(curve(record.t) for curve, record in zip(curves, problem.records, strict=True))
+    history, costs, trajectories = [theta], [_cost(problem, theta, states)], [states]
+    found: Estimate | None = None
+    step: FloatArray | None = None
+    converged, message = False, f"not converged in {max_iterations} iterations"
+    for _ in range(max_iterations):
+        try:
+            if not np.isfinite(theta).all():
+                raise SimulationError("the parameters grow beyond all bounds")
+            parts = [linear_solutions(problem, theta, curve, i) for i, curve in enumerate(curves)]
+            found = _solve(problem, theta, states, [table for table, _ in parts])
+        except SimulationError as error:
+            if found is None:
+                raise
+            message = f"quasilinearization diverged after {len(history) - 1} iterations: {error}"
+            break
+        last, step = step, found.solution
+        theta = theta + step
+        curves = [_next(curve, step) for _, curve in parts]
+        before, states = states, tuple(table @ np.append(1.0, step) for table, _ in parts)
+        history.append(theta)
+        costs.append(half_square(found.residuals))
+        trajectories.append(states)
+        change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
+        if negligible(step, theta, found, tolerance, last) and change < 1e-3:
+            converged, message = True, f"converged in {len(history) - 1} iterations"
+            break
+    if found is None:
+        raise ValueError("max_iterations must be at least 1")
+    r = problem.residual(theta)
+    if not np.isfinite(r).all():
+        converged, message, r = False, f"not converged: {problem.failure}", -found.residuals
+    path, size = np.array(history), np.array(costs)
+    return Path(at(found, theta, r), path, size, converged, message, (), tuple(trajectories))
+
+
+def linear_solutions(
+    problem: Problem, theta: FloatArray, curve: Curve, number: int
+) -> tuple[FloatArray, Curve]:
+    """D and G of the equations linearised about a trajectory of one of the records.
+
+    Returns
+    -------
+    [D | G] at the times of the record, (n, n_x, 1 + n_p), and as a function of time.
+    """
+    model, record = problem.models[number], problem.records[number]
+    t = record.t
+    shape = (len(model.states), 1 + len(theta))
+    first = np.column_stack((model.x0(theta), model.x0_theta(theta))) if model.states else np.zeros(shape)
+    if not model.states or len(t) == 1:
+        table = np.broadcast_to(first, (len(t), *shape)).copy()
+        return table, lambda at: np.broadcast_to(first, (*np.shape(at), *shape))
+    if problem.integrator == "heun":
+        table = _heun(model, theta, curve(t), record, first)
+        flat = table.reshape(len(t), -1)
+
+        def straight(at: FloatArray) -> FloatArray:
+            columns = [np.interp(at, t, column) for column in flat.T]
+            return np.stack(columns, axis=-1).reshape(*np.shape(at), *shape)
+
+        return table, straight
+    return _adaptive(model, theta, curve, record, first, problem.rtol)
+
+
+def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray) -> FloatArray:
+    t, u = record.t, inputs_of(model, record)
+    A = model.f_x(t, x, theta, u)
+    b = model.f(t, x, theta, u) - np.einsum("tij,tj->ti", A, x)
+    B = np.concatenate((b[..., None], model.f_theta(t, x, theta, u)), axis=-1)
+    table = np.empty((len(t), *first.shape))
+    table[0] = w = first
+    with np.errstate(all="ignore"):
+        for i, h in enumerate(np.diff(t)):
+            slope = A[i] @ w + B[i]
+            w = w + h / 2 * (slope + A[i + 1] @ (w + h * slope) + B[i + 1])
+            table[i + 1] = w
+    if not np.isfinite(table).all():
+        raise SimulationError(
+            "the linearised equations have no finite solution; start from another trajectory"
+        )
+    return table
+
+
+def _adaptive(
+    model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray, rtol: float
+) -> tuple[FloatArray, Curve]:
+    from scipy.integrate import solve_ivp
+
+    t = record.t
+    u, shape, n = inputs_of(model, record), first.shape, len(model.states)
+
+    def slope(time: float, w: FloatArray) -> FloatArray:
+        x = curve(np.array(time))
+        inputs = np.array([np.interp(time, t, column) for column in u.T])
+        point = model.point(time, x, theta, inputs)
+        A = point[:, 1 : 1 + n]
+        out = A @ w.reshape(shape)
+        out[:, 0] += point[:, 0] - A @ x
+        out[:, 1:] += point[:, 1 + n :]
+        return out.ravel()
+
+    size = np.maximum(np.abs(curve(t)).max(axis=0), np.abs(first[:, 0])).max()
+    atol = rtol * max(float(size), 1e-300)
+    with np.errstate(all="ignore"):
+        run = solve_ivp(
+            slope, (t[0], t[-1]), first.ravel(), "DOP853", dense_output=True, rtol=rtol, atol=atol
+        )
+    if not run.success or not np.isfinite(run.y).all():
+        raise SimulationError(
+            f"the linearised equations have no finite solution beyond t = {run.t[-1]:g}; start from another "
+            "trajectory"
+        )
+
+    def dense(at: FloatArray) -> FloatArray:
+        values = run.sol(at)
+        return np.asarray(np.moveaxis(values, 0, -1).reshape(*np.shape(at), *shape))
+
+    return dense(t), dense
+
+
+def _solve(
+    problem: Problem, theta: FloatArray, states: Sequence[FloatArray], tables: Sequence[FloatArray]
+) -> Estimate:
+    """Linear least squares for the change of the parameters."""
+    outputs, slopes = [], []
+    parts = zip(problem.models, problem.records, states, tables, problem.measured, strict=True)
+    for model, record, x, W, data in parts:
+        u = inputs_of(model, record)
+        C = model.h_x(record.t, x, theta, u)
+        y = model.h(record.t, x, theta, u) + np.einsum("tij,tj->ti", C, W[..., 0] - x)
+        outputs.append(data - y)
+        slopes.append(C @ W[..., 1:] + model.h_theta(record.t, x, theta, u))
+    K, Y = problem.vector(slopes), problem.vector(outputs)
+    if not (np.isfinite(K).all() and np.isfinite(Y).all()):
+        raise SimulationError("the linearised outputs are not finite; start from another trajectory")
+    sigma = 1.0 if problem.stated else None
+    return least_squares(K, Y, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
+
+
+def _next(curve: Curve, step: FloatArray) -> Curve:
+    weights = np.append(1.0, step)
+    return lambda t: curve(t) @ weights
+
+
+def _cost(problem: Problem, theta: FloatArray, states: Sequence[FloatArray]) -> float:
+    """Of a trajectory that need not solve the equations."""
+    tables = [
+        model.h(record.t, x, theta, inputs_of(model, record)) - data
+        for model, record, x, data in zip(
+            problem.models, problem.records, states, problem.measured, strict=True
+        )
+    ]
+    return half_square(problem.vector(tables))
+
+
+def _change(before: FloatArray, after: FloatArray) -> float:
+    size = float(np.abs(after).max())
+    return float(np.abs(after - before).max()) / size if size > 0 else 0.0

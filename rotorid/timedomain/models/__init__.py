@@ -1,0 +1,1 @@
+"""Models in time and the records that they are fitted to."""
