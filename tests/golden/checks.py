@@ -1,4 +1,4 @@
-"""The tests of a group of cases: all run in one process of their own, each is compared by a test of its own."""
+"""The tests of a group of cases: all run in one process, each is compared by its own test."""
 
 from __future__ import annotations
 

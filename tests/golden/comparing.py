@@ -1,7 +1,7 @@
 """What differs between a stored outcome and one of now, beyond rounding.
 
-Keys, their order, words, whole numbers and exit statuses are compared exactly; decimals to 1e-9 of the largest
-number of their array, or to one unit of the last digit that is printed. `TOLERANCES` names what may differ more.
+Keys, their order, words, whole numbers and exit statuses are compared exactly; decimals to 1e-9 of the
+largest number of their array, or to one unit of the last printed digit. `TOLERANCES` names what may differ more.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import csv
 import io
 import json
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase

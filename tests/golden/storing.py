@@ -1,7 +1,7 @@
 """Outcomes as files: `NAME.txt` (command, status, output, error and files as text) and `NAME.json`.
 
-Numbers with a decimal point are stored with 12 digits: more than `golden.comparing` compares, and few enough that
-another machine stores nearly the same.
+Numbers with a decimal point are stored with 12 digits: more than `golden.comparing` compares, and few enough
+that another machine stores nearly the same.
 """
 
 from __future__ import annotations
