@@ -8,13 +8,22 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test lint docs format bench build clean
+.PHONY: golden golden-exact demo test lint docs format bench build clean
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile
+
+# Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
+golden: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden store
+
+# The same byte for byte with another commit, on this machine: make golden-exact PARENT=main
+PARENT ?= HEAD~1
+golden-exact: $(VENV)/.dev
+	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

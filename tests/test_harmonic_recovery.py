@@ -26,6 +26,19 @@ def exact(equation, known, estimate, frequencies, errors=None, digits=None, **op
     return identify(model, experiments(model, w, {**load, **amplitudes}, errors=errors), **options)
 
 
+@pytest.mark.parametrize("last_digit", [-1e-12, 0.0, 1e-12])
+def test_the_order_of_solutions_does_not_hang_on_rounding(last_digit, monkeypatch):
+    """T0 of both solutions is the same but for rounding: the larger T1 comes first."""
+    names = ("T0", "T1", "T2")
+    exponents = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [0, 1, 1]])
+    matrix = np.array([[1.0, 0, 0, 0], [0, 1, 1, 0], [0, 0, 0, 1]])
+    system = System(names, exponents, matrix, np.array([1.0, 1.3, 0.4]), None)
+    starts = [np.array([1.0 + last_digit, 0.5, 0.8]), np.array([1.0, 0.8, 0.5])]
+    monkeypatch.setattr("rotorid.harmonic.recovery.real_solutions", lambda *_: (starts, False))
+    monkeypatch.setattr("rotorid.harmonic.recovery._refine", lambda _system, start, *_: start)
+    assert [solution[1] for solution in recover(system).solutions] == [0.8, 0.5]
+
+
 def test_41_in_words():
     found = exact(ROTOR, {"m": 10.0, "e": 1e-4}, ["c", "b", "delta"], [80, 100])
     assert found.unidentifiable == (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cmp_to_key
 
 import numpy as np
 
@@ -142,8 +143,7 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
         found = [(m, t) for m, t in found if m <= max(1.0, 3 * best)]
         if best > 1:
             warnings.append("the estimated combinations contradict each other by more than their errors")
-    found.sort(key=lambda item: tuple(-item[1]))
-    solutions = [theta for _, theta in found]
+    solutions = sorted((theta for _, theta in found), key=cmp_to_key(_larger_first))
     reasons: list[str] = []
     if bounds and len(solutions) > 1:
         solutions = [t for t in solutions if _inside(t, names, bounds, open_)] or solutions
@@ -231,6 +231,12 @@ def _misfit(system: System, theta: FloatArray) -> float:
 
 def _same(a: FloatArray, b: FloatArray) -> bool:
     return bool(np.all(np.abs(a - b) <= SAME * np.maximum(np.abs(a), np.abs(b))))
+
+
+def _larger_first(a: FloatArray, b: FloatArray) -> int:
+    """For sorting: by the first parameter that differs by more than rounding."""
+    differ = np.flatnonzero(np.abs(a - b) > SAME * np.maximum(np.abs(a), np.abs(b)))
+    return int(np.sign(b[differ[0]] - a[differ[0]])) if len(differ) else 0
 
 
 def _inside(theta: FloatArray, names: Sequence[str], bounds: Bounds, open_: BoolArray) -> bool:

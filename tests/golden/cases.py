@@ -1,0 +1,381 @@
+# ruff: noqa: E501 - a command line is as long as it is
+"""Which command lines the net holds.
+
+Every command runs in a folder that has a copy of `sample_data`, as text and once more with `--json`.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+TEXT, JSON = "text", "json"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One command line.
+
+    Attributes
+    ----------
+    name
+        Of the stored files.
+    command
+        As typed after `rotorid`.
+    group
+        The cases of one group run in one process, one after the other.
+    forms
+        As text, with `--json`, or both.
+    before
+        Commands, run first, that make files which this one reads.
+    edits
+        Files to write before: new name → (sample file, old text, new text).
+    stored
+        Whether the outputs are stored. Where they are not (what the libraries below say in their own words, as
+        `--help`, or what takes long), only `make golden-exact` runs the case.
+    """
+
+    name: str
+    command: str
+    group: str
+    forms: tuple[str, ...] = (TEXT, JSON)
+    before: tuple[str, ...] = ()
+    edits: Mapping[str, tuple[str, str, str]] = field(default_factory=dict)
+    stored: bool = True
+
+    @property
+    def words(self) -> list[str]:
+        """After `rotorid`."""
+        return shlex.split(self.command)
+
+    @property
+    def json_words(self) -> list[str]:
+        """After `rotorid`, with `--json`, without pictures and pages: the text has made them already."""
+        words = [*self.words, "--json"]
+        for option in ("--plot", "--report"):
+            if option in words and self.name not in REFUSED_TARGETS:
+                del words[words.index(option) : words.index(option) + 2]
+        return words
+
+
+REFUSED_TARGETS = ("critical-two-into-one",)
+ROTOR23 = "sample_data/rotor23.csv"
+COMPRESSOR = "sample_data/compressor/rotor.toml"
+RESPONSE = f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv"
+TURBO = "sample_data/turbo_job"
+MODEL_JOB = "sample_data/model_job/job.toml"
+PRINTED = (
+    "reduce --compliance sample_data/book_task_9/compliance_printed.csv "
+    "--measured sample_data/book_task_9/modes_printed.csv"
+)
+GIVEN = (
+    "reduce --compliance sample_data/book_task_9/compliance.csv --measured sample_data/book_task_9/modes.csv"
+)
+IDENTIFY, FIT = "sample_data/identify", "sample_data/fit"
+PROBES = '--sensors "probe DE:45,probe NDE:45"'
+
+ROTOR_COMMANDS = f"""
+critical-rotor23            critical {ROTOR23} -n 3 --plot modes.png
+critical-rotor23-report     critical {ROTOR23} --report rotor.html
+critical-rotor23-mesh       critical {ROTOR23} -n 5 --mesh-check --output modes.csv --verbose
+critical-model-job          critical sample_data/model_job/rotor.csv -n 2
+critical-compressor         critical {COMPRESSOR} -n 4 --operating 5300:6500rpm --output modes.xlsx
+critical-compressor-map     critical {COMPRESSOR} -n 3 --map --plot map.png
+critical-misspelt           critical misspelt.csv
+critical-missing            critical nowhere.csv
+critical-too-many           critical {ROTOR23} -n 1000
+critical-two-into-one       critical {ROTOR23} --output modes.csv --plot modes.csv
+campbell-rotor23            campbell {ROTOR23} --speeds 50:650:150 -n 4
+campbell-model-job          campbell sample_data/model_job/rotor.csv --speeds 1000:6000:1000rpm --output c.csv
+campbell-compressor-coarse  campbell {COMPRESSOR} --speeds 2000:14000:3000rpm --operating 5300:6500rpm --verbose
+campbell-compressor         campbell {COMPRESSOR} --speeds 1000:15000:250rpm --plot campbell.png
+campbell-outside            campbell {COMPRESSOR} --speeds 100:500:100rpm
+response-coarse             {RESPONSE} --speeds 2000:14000:2000rpm {PROBES} --output response.csv --verbose
+response-stations           {RESPONSE} --speeds 5000rpm,6000rpm --operating 5300:6500rpm
+response-orbits             {RESPONSE} --speeds 4000:6000:500rpm {PROBES} --view orbits --at 5000rpm --plot o.png
+response-report             {RESPONSE} --speeds 4000:10000:3000rpm {PROBES} --report response.html
+response-compressor         {RESPONSE} --speeds 1000:15000:50rpm {PROBES} --operating 5300:6500rpm --plot bode.png
+response-no-sensor          {RESPONSE} --speeds 5000rpm --sensors "prob DE:45"
+influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
+influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
+influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
+influence-no-plane          influence {ROTOR23} --planes 7,99 --sensors 2 --speeds 100
+demo-list                   demo --list
+demo-misspelt               demo --sample maine
+"""
+
+BALANCE_COMMANDS = f"""
+turbo                       balance {TURBO}/job.toml --plot corrections.png
+turbo-files                 balance {TURBO}/runs.csv {TURBO}/weights.csv --amplitude-error 2 --phase-error 2
+turbo-output                balance {TURBO}/job.toml --output sheet.xlsx
+turbo-output-table          balance {TURBO}/job.toml --output corrections.csv --save-influence w.csv --verbose
+turbo-minmax                balance {TURBO}/job.toml --method minmax --max-mass left=400,right=400
+turbo-minmax-bounded        balance {TURBO}/job.toml --method minmax --max-mass 430g_mm
+turbo-minmax-plain          balance {TURBO}/job.toml --method minmax --verbose
+turbo-weighted              balance {TURBO}/job.toml --method weighted
+turbo-weighted-limit        balance {TURBO}/job.toml --method weighted --limit "probe 4=2"
+turbo-limit                 balance {TURBO}/job.toml --limit 5
+turbo-limit-minmax          balance {TURBO}/job.toml --method minmax --limit "probe 1=3" --limit "probe 2=4"
+turbo-max-mass              balance {TURBO}/job.toml --max-mass 300g_mm
+turbo-best-planes           balance {TURBO}/job.toml --best-planes 2
+turbo-trade-off             balance {TURBO}/job.toml --best-planes 2 --trade-off --plot trade-off.png
+turbo-ridge                 balance {TURBO}/job.toml --ridge 0.05
+turbo-ridge-auto            balance {TURBO}/job.toml --ridge auto
+turbo-truncate              balance {TURBO}/job.toml --truncate 2
+turbo-truncate-share        balance {TURBO}/job.toml --truncate 0.1
+turbo-part                  balance {TURBO}/job.toml --planes left,right --speeds 1220,3600
+turbo-lag                   balance {TURBO}/job.toml --phase lag --angles "against rotation"
+turbo-coarse-errors         balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8
+turbo-coarse-ridge          balance {TURBO}/job.toml --amplitude-error 10 --phase-error 8 --ridge auto
+turbo-report                balance {TURBO}/job.toml --report sheet.html
+checked                     balance {TURBO}/checked.toml
+checked-verbose             balance {TURBO}/checked.toml --verbose --history --output sheet.xlsx
+checked-refine              balance {TURBO}/checked.toml --refine
+checked-refine-minmax       balance {TURBO}/checked.toml --refine --method minmax --report sheet.html
+checked-grade               balance {TURBO}/checked.toml --planes left,right --grade G2.5 --rotor-mass 558kg --service-speed 4500rpm
+checked-grade-positions     balance {TURBO}/checked.toml --planes left,right --grade G6.3 --rotor-mass 558kg --service-speed 4500rpm --positions left=600mm,right=2500mm --bearings 200mm,3000mm --centre 1600mm
+holes-report                balance {TURBO}/holes.toml --split --report sheet.html
+holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
+holes-minmax                balance {TURBO}/holes.toml --split --method minmax --split-seconds 60
+holes-unsplit               balance {TURBO}/holes.toml --output sheet.xlsx
+model-job                   balance {MODEL_JOB} --model-error 2
+model-job-assumed           balance {MODEL_JOB}
+model-job-10                balance {MODEL_JOB} --model-error 10
+model-job-ridge             balance {MODEL_JOB} --model-error 10 --ridge auto
+model-job-weighted          balance {MODEL_JOB} --model-error 2 --method weighted --report sheet.html
+computed                    balance sample_data/model_job/modelled.toml --coefficients computed --model-error 5
+combined                    balance sample_data/model_job/modelled.toml --coefficients combined --model-error 5
+bk                          balance sample_data/bk_two_plane/job.toml
+bk-errors                   balance sample_data/bk_two_plane/job.toml --amplitude-error 2 --phase-error 1
+bk-minmax                   balance sample_data/bk_two_plane/job.toml --method minmax
+bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method weighted
+bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --amplitude-error 2 --phase-error 1 --verbose
+left-in                     balance sample_data/left_in/job.toml --history
+left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
+left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
+template                    balance --template job.xlsx
+balance-misspelt-column     balance misspelt.csv {TURBO}/weights.csv
+balance-missing-run         balance {TURBO}/runs.csv short.csv
+balance-misspelt-key        balance sample_data/turbo_job/misspelt.toml
+balance-no-file             balance {TURBO}/jop.toml
+balance-no-plane            balance {TURBO}/job.toml --planes left,midle
+balance-ending              balance {TURBO}/job.toml --output corrections.txt
+balance-undetermined        balance {TURBO}/runs.csv alike.csv --amplitude-error 2 --phase-error 2
+unbalance-model-job         unbalance {MODEL_JOB} --stations 6,9,12,15,18
+unbalance-output            unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2 --output u.csv --plot u.png --verbose
+unbalance-ridge             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method ridge
+unbalance-ridge-stated      unbalance {MODEL_JOB} --stations 6,12,18 --method ridge --ridge 0.1
+unbalance-modal             unbalance {MODEL_JOB} --stations 6,9,12,15,18 --method modal --modes 2
+unbalance-no-rotor          unbalance {TURBO}/job.toml --stations 6,12
+split-holes                 split 35g@120 --holes 24 --pieces 10g,20g
+split-taken                 split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2 --output s.csv --plot s.png
+split-stock                 split 35g@120 --holes 0,30,60,90,180,270 --pieces 5g,10g --stock 4,2 --most-pieces 5 --good-enough 5 --verbose
+split-free                  split 35g@120 --holes 12 --first-hole 10 --step 0.5g --max-mass 40g --angles "against rotation"
+split-two                   split 35g@120 --two 20g,30g
+split-sum                   split 35g@120+5g@200 --mounted 10g@30+20g@200 --holes 24
+split-scale                 split 35g@121.3 --step 0.5g --angle-step 15
+split-drill                 split 35g@120 --drill 8mm --depth 20mm --radius 100mm
+split-drill-axial           split 35g@120 --drill 8mm --depth 10mm --radius 100mm --axial --density 7800 --tip-angle 180
+split-grind                 split 3500g_mm@120 --grind --radius 100mm
+split-wrong                 split 35g120 --holes 24
+tolerance                   tolerance --mass 500kg --speed 3000rpm --grade G2.5
+tolerance-positions         tolerance --mass 500kg --speed 3000rpm --grade G2.5 --planes left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm --plot t.png --output t.csv --verbose
+tolerance-overhung          tolerance --mass 500kg --speed 3000rpm --grade G6.3 --planes fan=900mm,coupling=-100mm --bearings 0mm,700mm --centre 600mm
+tolerance-no-grade          tolerance --mass 500kg --speed 3000rpm --grade G3
+trial-weight                trial-weight --rotor-mass 500kg --speed 3000rpm --radius 200mm
+trial-weight-load           trial-weight --bearing-load 9kN --speed 50Hz --radius 8in --reading-phase 120 --lag below
+trial-weight-critical       trial-weight --rotor-mass 500kg --carried-by 2 --speed 3000rpm --radius 200mm --reading-phase 40 --critical 2400rpm --max-mass 30g --unit oz
+trial-weight-model          trial-weight {MODEL_JOB} --plane middle
+trial-weight-model-all      trial-weight {MODEL_JOB} --output t.csv --plot t.png --verbose
+trial-weight-turbo          trial-weight {TURBO}/job.toml --share 30
+trial-weight-tried          trial-weight sample_data/bk_two_plane/job.toml --mass 2g --max-mass 3g
+trial-weight-nothing        trial-weight --speed 3000rpm
+"""
+
+MODEL_COMMANDS = f"""
+reduce-book                 reduce {ROTOR23} --nodes 7,12,18 --modes 2 --plot reduction.png
+reduce-rank                 reduce {ROTOR23} --rank --plot map.png
+reduce-everything           reduce {ROTOR23} --nodes 7,12,18 --methods --trade-off --response auto --plot response.png
+reduce-errors               reduce {ROTOR23} --nodes 7,12,18 --errors compliance=1,shapes=1 --what-if alpha12=1.3
+reduce-compressor           reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --stability 1000:14000rpm --model small.toml --state-space small.mat
+reduce-compressor-json      reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --speed 6000rpm --both-planes --model m.toml --state-space small.json
+reduce-compressor-response  reduce {COMPRESSOR} --nodes "impeller 1,impeller 3,impeller 5" --modes 2 --response 2000:14000:2000rpm
+reduce-printed              {PRINTED} --modes 1
+reduce-printed-2            {PRINTED} --modes 2 --verbose
+reduce-given                {GIVEN} --modes 3 --output masses.csv
+reduce-given-relative       {GIVEN} --modes 2 --rows relative --nonnegative
+reduce-seals                {GIVEN} --modes 2 --seals 12=2e6
+reduce-model                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --model three_masses.toml
+reduce-force                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --damping 1,0.5 --force 12 --model m.toml --state-space m.npz
+reduce-report               reduce {ROTOR23} --nodes 7,12,18 --methods --report reduction.html
+reduce-output               reduce {ROTOR23} --nodes 7,12,18 --modes 3 --normalise largest --output masses.xlsx
+reduce-apart                reduce {ROTOR23} --nodes 7,12,18 --modes 2 --supports-apart --normalise length
+reduce-place-book           reduce {ROTOR23} --place book
+reduce-place-best           reduce {ROTOR23} --place best --masses 2 --candidates 5,8,11,14,17,20
+reduce-place-mac            reduce {ROTOR23} --place mac --masses 3 --candidates 5,8,11,14,17,20
+reduce-place-compromise     reduce {ROTOR23} --place compromise --candidates 5,8,11,14,17,20 --modes 2
+reduce-model-job            reduce sample_data/model_job/rotor.csv --nodes 6,12,19 --modes 2 --stability 0:9000rpm
+reduce-without-nodes        reduce {ROTOR23}
+reduce-order                reduce {ROTOR23} --nodes 12,7
+identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
+identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
+identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
+identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
+identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
+identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
+fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
+fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
+fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
+fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
+fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
+fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
+fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8 --starts 3 --seed 1
+fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
+fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
+fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
+fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+validate                    validate --output numbers.csv
+validate-all                validate --all
+"""
+
+EXERCISES = (
+    *(
+        "section_1_6",
+        "section_1_7",
+        "section_1_8",
+        "task_1_1",
+        "task_1_2",
+        "task_2_1",
+        "task_2_2",
+        "task_2_3",
+    ),
+    *("task_3_1", "task_3_2", "task_3_3", "task_4_1", "task_4_2", "task_4_3", "task_5_1", "task_5_2"),
+    *("task_6_1", "task_6_2", "task_7_1", "task_7_2", "task_8_1", "task_8_2"),
+)
+PRINTED_ONLY = (
+    "section_1_8",
+    "task_5_1",
+    "task_5_2",
+    "task_6_1",
+    "task_6_2",
+    "task_7_1",
+    "task_7_2",
+    "task_8_1",
+    "task_8_2",
+)
+RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
+DEMOS = ("main", "balancing", "holes", "rotor", "reduction", "identification", "record")
+COMMANDS = (
+    *(
+        "demo",
+        "critical",
+        "campbell",
+        "response",
+        "influence",
+        "balance",
+        "trial-weight",
+        "split",
+        "tolerance",
+    ),
+    *("unbalance", "reduce", "identify", "fit", "validate"),
+)
+
+MODELLED = {
+    "sample_data/model_job/modelled.toml": (
+        MODEL_JOB,
+        'runs = "runs.csv"\n',
+        'runs = "../turbo_job/runs.csv"\nweights = "../turbo_job/weights.csv"\n',
+    )
+}
+ALIKE = {
+    "alike.csv": (
+        f"{TURBO}/weights.csv",
+        "trial 2,middle,800,0\n",
+        "trial 1,middle,800,0\ntrial 2,left,400,90\ntrial 2,middle,400,90\n",
+    )
+}
+EDITS = {
+    "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
+    "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
+    "identify-misspelt": {
+        "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
+    },
+    "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
+    "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},
+    "balance-missing-run": {"short.csv": (f"{TURBO}/weights.csv", "trial 3", "trial 4")},
+    "balance-undetermined": ALIKE,
+    "computed": MODELLED,
+    "combined": MODELLED,
+}
+
+
+EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all"}
+"""Cases that take long and whose code others run, too."""
+
+
+TEXT_ONLY = ("response-compressor", "fit-run-down-plot", "holes-plot", "influence-rotor23", "validate")
+"""Cases whose document is long, or that of another case."""
+
+
+def _listed(text: str, group: str) -> list[Case]:
+    rows = [line.split(maxsplit=1) for line in text.strip().splitlines()]
+    return [
+        Case(
+            name,
+            command.strip(),
+            group,
+            forms=(TEXT,) if name in TEXT_ONLY else (TEXT, JSON),
+            edits=EDITS.get(name, {}),
+            stored=name not in EXACT_ONLY,
+        )
+        for name, command in rows
+    ]
+
+
+def _all() -> list[Case]:
+    cases = (
+        _listed(ROTOR_COMMANDS, "rotor")
+        + _listed(BALANCE_COMMANDS, "balance")
+        + _listed(MODEL_COMMANDS, "models")
+    )
+    for name in EXERCISES:
+        data = ["data"] if name in PRINTED_ONLY else ["data", "data_exact"]
+        cases += [
+            Case(
+                f"identify-{name}" + table.removeprefix("data").replace("_", "-"),
+                f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv",
+                "models",
+            )
+            for table in data
+        ]
+    cases += [
+        Case(f"fit-{name}", f"fit {FIT}/{name}/model.toml {FIT}/{name}/record.csv", "models")
+        for name in RECORDS
+    ]
+    stored = "balance sample_data/model_job/runs.csv --influence w.csv --amplitude-error 2 --phase-error 2"
+    saved = f"balance {TURBO}/job.toml --save-influence w"
+    filled = f"balance {TURBO}/holes.toml --output job.xlsx"
+    cases += [
+        Case("turbo-stored", stored, "balance", before=(f"{saved}.csv",)),
+        Case(
+            "turbo-stored-xlsx", stored.replace(".csv --a", ".xlsx --a"), "balance", before=(f"{saved}.xlsx",)
+        ),
+        Case("workbook", "balance job.xlsx --output again.xlsx", "balance", before=(filled,)),
+        Case("workbook-empty", "balance job.xlsx", "balance", before=("balance --template job.xlsx",)),
+    ]
+    for name in DEMOS:
+        forms = (TEXT, JSON) if name == "identification" else (TEXT,)
+        cases.append(Case(f"demo-{name}", f"demo d --sample {name}", "demos", forms))
+    cases += [Case(f"help-{name}", f"{name} --help", "usage", (TEXT,), stored=False) for name in COMMANDS]
+    cases += [
+        Case("help", "--help", "usage", (TEXT,), stored=False),
+        Case("version", "--version", "usage", (TEXT,)),
+        Case("no-such-command", "balence", "usage", (TEXT,)),
+        Case("no-such-option", f"critical {ROTOR23} --nubmer 3", "usage", (TEXT,)),
+        Case("no-such-choice", f"{RESPONSE} --speeds 5000rpm --view bodde", "usage", (TEXT,)),
+    ]
+    return cases
+
+
+CASES = {case.name: case for case in _all()}

@@ -1,0 +1,5 @@
+"""Balancing commands say what is stored: see `tests/golden`."""
+
+from golden.checks import checks
+
+test_as_stored = checks("balance")

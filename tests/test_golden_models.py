@@ -1,0 +1,5 @@
+"""Reduction, identification and fits say what is stored: see `tests/golden`."""
+
+from golden.checks import checks
+
+test_as_stored = checks("models")
