@@ -3,12 +3,30 @@ PYTHON ?= python3
 VENV ?= .venv
 BENCH_VENV ?= .venv-bench
 HSBALANCE_VENV ?= .venv-hsbalance
+LATEST_VENV ?= .venv-latest
+LOWEST_VENV ?= .venv-lowest
+LOWEST_PYTHON ?= python3.11
+UV_VENV ?= .venv-uv
 BIN := $(VENV)/bin
+# What an environment for work on rotorid holds, of pyproject.toml.
+GROUPS ?= dev
+# The tested versions of everything, for what is installed and for what builds it; empty: the newest there are.
+CONSTRAINTS ?= constraints.txt
+export PIP_CONSTRAINT = $(CONSTRAINTS)
+export PIP_BUILD_CONSTRAINT = $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: golden golden-exact demo test lint docs format bench build clean
+.PHONY: demo test test-latest test-lowest golden golden-exact lint docs format bench build constraints clean
+.DELETE_ON_ERROR:
+
+# $(call environment,FOLDER): made there, or brought up to date
+define environment
+$(PYTHON) -c 'import sys; sys.exit("rotorid needs Python 3.11 or newer; set PYTHON=") if sys.version_info < (3, 11) else None'
+$(PYTHON) -m venv $(1)
+$(1)/bin/python -m pip -q install --upgrade 'pip>=25.3'
+endef
 
 demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
@@ -24,6 +42,19 @@ golden: $(VENV)/.dev
 PARENT ?= HEAD~1
 golden-exact: $(VENV)/.dev
 	PYTHONPATH=tests $(BIN)/python -m golden exact $(PARENT)
+
+# The newest versions of today: an environment from scratch, without constraints.txt.
+test-latest:
+	rm -rf $(LATEST_VENV)
+	$(MAKE) test VENV=$(LATEST_VENV) CONSTRAINTS=
+
+# The lowest versions that pyproject.toml promises, on the lowest Python.
+test-lowest: $(LOWEST_VENV)/lowest.txt
+	$(MAKE) test VENV=$(LOWEST_VENV) PYTHON=$(LOWEST_PYTHON) CONSTRAINTS=$< GROUPS='test docs'
+
+$(LOWEST_VENV)/lowest.txt: pyproject.toml constraints.txt .ci/lowest.py
+	mkdir -p $(@D)
+	$(LOWEST_PYTHON) .ci/lowest.py > $@
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -47,10 +78,17 @@ build: $(VENV)/.dev
 	$(BIN)/python -m pip -q install build
 	$(BIN)/python -m build
 
-$(VENV)/.pip:
-	$(PYTHON) -c 'import sys; sys.exit("rotorid needs Python 3.11 or newer; set PYTHON=") if sys.version_info < (3, 11) else None'
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip -q install --upgrade 'pip>=25.1'
+# Makes constraints.txt anew, one file for every Python and system, with the newest versions that fit together.
+constraints: CONSTRAINTS =
+constraints:
+	$(call environment,$(UV_VENV))
+	$(UV_VENV)/bin/python -m pip -q install uv
+	$(UV_VENV)/bin/uv pip compile --quiet --universal --python-version 3.11 --upgrade --no-config --no-annotate \
+	  --custom-compile-command 'make constraints' --output-file constraints.txt pyproject.toml \
+	  --group dev --group bench --group peer --group house > /dev/null
+
+$(VENV)/.pip: $(CONSTRAINTS)
+	$(call environment,$(VENV))
 	touch $@
 
 $(VENV)/.user: $(VENV)/.pip pyproject.toml
@@ -58,21 +96,21 @@ $(VENV)/.user: $(VENV)/.pip pyproject.toml
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.user
-	$(BIN)/python -m pip -q install --group dev
+	$(BIN)/python -m pip -q install $(GROUPS:%=--group %)
 	touch $@
 
-$(BENCH_VENV)/.bench: pyproject.toml
-	$(PYTHON) -m venv $(BENCH_VENV)
-	$(BENCH_VENV)/bin/python -m pip -q install --upgrade 'pip>=25.1'
+$(BENCH_VENV)/.bench: pyproject.toml $(CONSTRAINTS)
+	$(call environment,$(BENCH_VENV))
 	$(BENCH_VENV)/bin/python -m pip -q install -e . --group bench
 	touch $@
 
 # hsbalance in its own environment, without XPRESS, whose free licence refuses all but small problems
-$(HSBALANCE_VENV)/.peer:
-	$(PYTHON) -m venv $(HSBALANCE_VENV)
-	$(HSBALANCE_VENV)/bin/python -m pip -q install 'hsbalance==0.5.5' clarabel cvxopt
+$(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
+	$(call environment,$(HSBALANCE_VENV))
+	$(HSBALANCE_VENV)/bin/python -m pip -q install --group peer
 	$(HSBALANCE_VENV)/bin/python -m pip -q uninstall -y xpress
 	touch $@
 
 clean:
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
