@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from cases import each_of
 
 import fem
 
@@ -93,7 +94,7 @@ def test_a_rotor_with_everything_survives_copying():
         assert dataclasses.replace(rotor, **change) != rotor
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("make", "message"),
     [
         (lambda: fem.Support(1, ((1, 2), (3, "x"))), "support at node 1: stiffness yy must be a number"),
