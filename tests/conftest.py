@@ -47,7 +47,7 @@ def cli(capsys, monkeypatch):
     return run
 
 
-# Files that take longest for a single test begin, so that no worker ends with them: what builds the pages once,
+# Files that take longest for a single test begin, so that no worker ends with them: the pages, built once,
 # and the simulations.
 SLOW_FIRST = ("docs", "harmonic_coverage", "balancing_coverage", "balancing_discrete", "fem_campbell")
 

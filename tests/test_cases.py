@@ -29,7 +29,7 @@ def test_a_failure_inside_pytest_counts_and_labels_are_those_given():
 
     with pytest.raises(AssertionError, match="1 of 2 cases fail"):
         refused()
-    with pytest.raises(AssertionError, match="^1 of 2 cases fail:\nB: "):
+    with pytest.raises(AssertionError, match=r"^1 of 2 cases fail:\nB: "):
         refused()
 
 
