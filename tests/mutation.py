@@ -13,6 +13,7 @@ import random
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 PACKAGES = ("fem", "balancing", "rotorid")
@@ -279,11 +280,12 @@ def _is_list(node: ast.expr) -> bool:
     return isinstance(node, ast.List | ast.ListComp | ast.Tuple)
 
 
-def possible(path: str, source: str) -> list[Mutation]:
+@cache
+def possible(path: str, source: str) -> tuple[Mutation, ...]:
     """Every mutation of a module, in the order of the lines."""
     finder = _Finder(path, source)
     finder.visit(ast.parse(source))
-    return sorted(set(finder.found), key=lambda m: (m.line, m.begin, m.end, m.new))
+    return tuple(sorted(set(finder.found), key=lambda m: (m.line, m.begin, m.end, m.new)))
 
 
 def is_python(source: str) -> bool:
@@ -324,7 +326,6 @@ def draw(root: Path, seed: int, number: int) -> list[Mutation]:
     sources = {package: dict(modules(root, package)) for package in PACKAGES}
     sizes = {package: sum(map(code_lines, found.values())) for package, found in sources.items()}
     drawn: list[Mutation] = []
-    found: dict[str, list[Mutation]] = {}
     for package, count in shares(number, sizes).items():
         rng = random.Random(f"{seed} {package}")
         own = sources[package]
@@ -334,7 +335,7 @@ def draw(root: Path, seed: int, number: int) -> list[Mutation]:
             if len(taken) == count:
                 break
             name = rng.choices(names, weights)[0]
-            choices = found[name] if name in found else found.setdefault(name, possible(name, own[name]))
+            choices = possible(name, own[name])
             lines = sorted({mutation.line for mutation in choices})
             if not lines:
                 continue
