@@ -161,8 +161,6 @@ class _Finder(ast.NodeVisitor):
             self.generic_visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> None:
-        if any(map(_is_text, (node.left, node.right))):
-            return
         if any(map(_is_list, (node.left, node.right))):
             self.generic_visit(node)
             return
@@ -175,7 +173,7 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> None:
-        if type(node.op) in ARITHMETIC and not _is_text(node.value) and not _is_list(node.value):
+        if type(node.op) in ARITHMETIC and not _is_list(node.value):
             old, new = ARITHMETIC[type(node.op)]
             self.between(node.target, node.value, f"{old}=", f"{new}=")
         self.generic_visit(node)
@@ -277,7 +275,13 @@ def _is_text(node: ast.expr) -> bool:
 
 def _is_list(node: ast.expr) -> bool:
     """Another operator would be a TypeError, which every test finds: no test of the tests."""
-    return isinstance(node, ast.List | ast.ListComp | ast.Tuple)
+    if isinstance(node, ast.IfExp):
+        return _is_list(node.body) or _is_list(node.orelse)
+    if isinstance(node, ast.BinOp):
+        return _is_list(node.left) or _is_list(node.right)
+    if isinstance(node, ast.Call):
+        return isinstance(node.func, ast.Name) and node.func.id in ("list", "tuple", "sorted", "str")
+    return isinstance(node, ast.List | ast.ListComp | ast.Tuple) or _is_text(node)
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Mutations are drawn the same way every time, change one line and are still Python; their tests are found."""
+"""Mutations: the same from a seed, of one line, still Python; and the tests that they meet."""
 
 import mutants
 import mutation
@@ -112,7 +112,6 @@ def test_tests_of_the_module_come_first_and_short_ones_before_long_ones():
 
 
 def test_a_fixture_and_an_import_count_for_all_tests_that_use_them():
-    made, fails = ["fixture tests::made"], "failed"
     document = {
         "functions": ["fem/a.py::f", "fem/a.py::g", "fem/a.py::h"],
         "ran": {"fixture tests::made": [0], "file tests/test_a.py": [1], "test tests/test_a.py::one": [2]},
@@ -123,7 +122,7 @@ def test_a_fixture_and_an_import_count_for_all_tests_that_use_them():
                 "seconds": 2.0,
                 "outcome": "passed",
             },
-            "tests/test_a.py::bad": {"fixtures": [], "seconds": 2.0, "outcome": fails},
+            "tests/test_a.py::bad": {"fixtures": [], "seconds": 2.0, "outcome": "failed"},
         },
     }
     suite = mutants.of_documents([document])
