@@ -34,7 +34,7 @@ def changed(source):
         ("a = abs(b)", {"a = (b)"}),
         ("a = b if c else d", {"a = b if (not (c)) else d"}),
         ("a = [b for b in c if b]", {"a = [b for b in c if (not (b))]"}),
-        ("a = 'ü' + str(b[0])", set()),
+        ("a = 'ü' + str(b[0])", {"a = 'ü' + str(b[1])"}),
         ("a = f'{b + 1:8.2f} {c[0]}'", set()),
         ("a: tuple[int, ...] = b", set()),
         ("a = b < 1e-9", {"a = b <= 1e-9", "a = b > 1e-9"}),
