@@ -18,7 +18,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: demo test test-latest test-lowest golden golden-exact lint docs format bench build constraints clean
+.PHONY: demo test test-full test-latest test-lowest mutants golden golden-exact lint docs format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -32,7 +32,19 @@ demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -q -n 2 --dist loadfile
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal
+
+# Simulations with all their repetitions instead of 300.
+test-full: $(VENV)/.dev
+	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal
+
+# One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
+SEED ?= 1
+N ?= 60
+MINUTES ?= 15
+JOBS ?= 2
+mutants: $(VENV)/.dev
+	$(BIN)/python tests/mutants.py --seed $(SEED) --number $(N) --minutes $(MINUTES) --jobs $(JOBS)
 
 # Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
 golden: $(VENV)/.dev
@@ -112,5 +124,9 @@ $(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	touch $@
 
 clean:
+<<<<<<< HEAD
 	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
 	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+=======
+	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants
+>>>>>>> suite

@@ -45,3 +45,18 @@ def cli(capsys, monkeypatch):
         return Outcome(0 if code is None else code, captured.out, captured.err)
 
     return run
+
+
+# Files that take longest for a single test begin, so that no worker ends with them: the pages, built once,
+# and the simulations.
+SLOW_FIRST = ("docs", "harmonic_coverage", "balancing_coverage", "balancing_discrete", "fem_campbell")
+
+
+def pytest_collection_modifyitems(items):
+    """Slow files first, otherwise in the order of the files."""
+
+    def rank(item):
+        stem = item.path.stem.removeprefix("test_")
+        return SLOW_FIRST.index(stem) if stem in SLOW_FIRST else len(SLOW_FIRST)
+
+    items.sort(key=rank)

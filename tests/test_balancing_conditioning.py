@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from balancing_data import complex_normal, polar
+from cases import each_of
 
 from balancing.solvers.conditioning import ALIKE, conditioning
 
@@ -138,7 +139,7 @@ def test_to_dict_is_json_and_names_the_groups():
     assert found["readings"] == 12
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("W", "planes", "weights", "words"),
     [
         ([[1, np.nan]], "AB", None, "found NaN"),

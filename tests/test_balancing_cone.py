@@ -6,6 +6,7 @@ from pathlib import Path
 import minmax_problems
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -39,7 +40,7 @@ def test_the_stored_problems_are_what_the_comparison_needs():
     assert sum(a["method"] == "least-squares" for a in ANSWERS) >= 30
 
 
-@pytest.mark.parametrize("answer", ANSWERS, ids=label)
+@each_of("answer", ANSWERS, ids=label)
 def test_certified_and_equal_to_what_cvxpy_finds(answer):
     case = minmax_problems.case(answer["seed"])
     assert minmax_problems.fingerprint(case) == pytest.approx(answer["fingerprint"], rel=1e-12)
@@ -205,7 +206,7 @@ def test_infeasible_limits_are_refused():
         minmax_cone([[1.0], [1.0]], [3.0, 5.0], residual=[9.0, 4.0], max_weight=[0.0])
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "message"),
     [
         (([[1.0], [np.nan]], [1.0, 2.0]), "must be finite"),

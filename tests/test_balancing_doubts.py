@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, polar
+from cases import each_of
 from test_balancing_uncertainty import noisy
 
 from balancing import Influence, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
@@ -65,7 +66,7 @@ def test_a_forgotten_row_of_the_weights_table_is_asked_for():
     assert any("differ by" in w and "times the errors of the readings" in w for w in with_errors)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("change", "errors", "asked"),
     [
         (1.09, None, False),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import each_of
 
 from balancing.mounting.holes import Holes, equal_holes, from_list, mounting
 
@@ -50,7 +51,7 @@ def test_vector_of_a_mounting():
     assert mounting(holes).vector == 0
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("angles", "options", "message"),
     [
         ([], {}, "no holes"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import each_of
 from scipy.integrate import quad
 
 from balancing.mounting.hand_mounting import combine, round_to, rounded, trim, two_positions
@@ -76,7 +77,7 @@ def test_grinding_stands_opposite():
     assert opposite(2 + 1j) == -2 - 1j
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("call", "words"),
     [
         (lambda: Drill(0.008, 0.0, STEEL), "radius must be positive"),

@@ -157,4 +157,11 @@ def test_angles_of_the_picture_run_as_the_job_counts_them(angles, direction):
 
 def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
     trials, _, _ = synthetic(np.random.default_rng(2), planes=3, sensors=9, speeds=14, errors=ERRORS)
-    correct(estimate_influence(trials)).plot().savefig(tmp_path / "many.png", dpi=40)
+    c = correct(estimate_influence(trials))
+    c.plot().savefig(tmp_path / "many.png", dpi=40)
+    # of 14 speeds every other has its name, the first among them, from left to right
+    ax = plots.amplitudes(c)
+    [upper] = ax.child_axes
+    texts = [text.get_text() for text in upper.get_xticklabels()]
+    assert texts == [f"{v * 30 / np.pi:.5g}" for v in c.speeds[::2]]
+    assert upper.get_xticks()[0] < upper.get_xticks()[1]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, polar, synthetic
+from cases import each_of
 
 from balancing import (
     Influence,
@@ -225,7 +226,7 @@ def test_unknown_planes_and_speeds():
         correct(influence, speeds=[100.0, 100.1])
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("change", "message"),
     [
         ({"sensors": ("1", "1")}, "sensors need different names; found twice: 1"),

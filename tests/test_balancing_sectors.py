@@ -3,6 +3,7 @@
 import minmax_problems
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,7 +22,7 @@ def forbidden_at(angle, forbidden, margin):
     return any(margin < np.mod(angle - start, TURN) < width - margin for start, width in forbidden)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("forbidden", "allowed"),
     [
         ([(0.0, 1.0)], [(1 + TURN - 1 - np.pi, np.pi), (1.0, np.pi)]),

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from cases import each_of
 
 from balancing.data.conventions import Labels
 from balancing.mounting.holes import WIDEST, equal_holes, from_list
@@ -49,7 +50,7 @@ def problem(seed):
     return target, holes, int(rng.integers(1, 5)) if seed % 5 == 0 else None
 
 
-@pytest.mark.parametrize("seed", range(80))
+@each_of("seed", range(80))
 def test_equal_to_trying_everything(seed):
     target, holes, most = problem(seed)
     expected = exhaustive(target, holes, most)

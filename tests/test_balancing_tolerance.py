@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from cases import each_of
 
 from balancing.iso21940 import GRADES, parse_grade, tolerance
 
@@ -48,7 +49,7 @@ def test_one_plane_has_all_and_two_planes_of_a_symmetric_rotor_half_each():
     assert shares(rotor(planes={"left": None, "right": None})) == pytest.approx([0.5, 0.5])
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("centre", "expected"),
     [
         (0.5, [0.5, 0.5]),  # symmetric
@@ -144,7 +145,7 @@ def test_grades():
         parse_grade("fine")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "words"),
     [
         ({"mass": 0}, "mass of the rotor must be a finite number above 0"),

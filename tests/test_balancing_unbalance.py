@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from cases import each_of
 from fem_rotors import rotor23
 
 import fem
@@ -332,7 +333,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("change", "kind", "words"), BAD)
+@each_of(("change", "kind", "words"), BAD)
 def test_what_cannot_be(change, kind, words):
     arguments = {"W": [[1.0, 2.0]], "Y": [1.0]} | change
     with pytest.raises(kind, match=words):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, synthetic
+from repetitions import of_a_spread, repetitions
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
 from balancing.data.errors import error_model, reading_covariance
@@ -101,10 +102,11 @@ def test_over_determined_runs_with_errors_of_very_different_size():
     c = correct(estimate_influence(trials))
     exact = trials.readings[0]
     D = []
-    for _ in range(1500):
+    n = repetitions(1500)
+    for _ in range(n):
         draw = job(noisy(rng, exact, ERRORS), T, speeds=trials.speeds, errors=ERRORS)
         D.append(stretch(correct(estimate_influence(draw)).weights))
-    np.testing.assert_allclose(np.std(D, axis=0), np.sqrt(np.diag(c.covariance)), rtol=0.07)
+    np.testing.assert_allclose(np.std(D, axis=0), np.sqrt(np.diag(c.covariance)), rtol=of_a_spread(n))
 
 
 def test_the_mean_of_repeats_has_less_variance():

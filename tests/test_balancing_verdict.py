@@ -234,5 +234,7 @@ def test_words_table_and_picture(job):
     assert list(frame.verdict[:2]) == ["fail", "pass"]
     ax = found.plot()
     assert ax.lines[0].get_ydata() == pytest.approx(np.full(361, 0.15))
+    shown = max(np.max(line.get_ydata(), initial=0.0) for line in ax.lines)
+    assert 0.2 <= shown < ax.get_rmax() < 3 * shown, "everything is in the picture, and fills it"
     with pytest.raises(ValueError, match="no planes to draw"):
         verdict_of_check(influence, check, limits=limits).plot()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from cases import each_of
 
 from balancing import correct, estimate_influence
 from balancing.mounting.mounted import mount
@@ -85,7 +86,7 @@ def test_table_of_holes_is_written(cli, tmp_path):
     assert head == "plane,action,hole,angle_deg,mass,unit,pieces"
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("keys", "words"),
     [
         ("holes_deg = [0, 90, 90]\navailable_g_mm = [10]", "90"),

@@ -10,6 +10,7 @@ import time
 
 import pytest
 import typer
+from cases import each_of
 
 from rotorid.cli import progress, suggest, verbose
 from rotorid.samples import sample_data
@@ -75,7 +76,7 @@ def test_usage_with_the_nearest_name(cli, args, message):
     assert said.count("Did you mean") == message.count("Did you mean")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("args", "message"),
     [
         (["balance", JOB, "--method", "minmx"], "'minmx' is not known (did you mean 'minmax'?)"),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from cases import each_of
 
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
@@ -103,7 +104,7 @@ def test_seeds_choose_other_places(cli, tmp_path):
     assert sum(m["starts"] for m in one["minima"]) == 4
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "said"),
     [
         (("--start", "lambd=2"), "--start: 'lambd' is no parameter of the model (did you mean 'lambda'?)"),
@@ -204,7 +205,7 @@ def test_standard_deviations_beside_the_outputs(cli, tmp_path):
     assert large["std"] == pytest.approx(10 * small["std"], rel=1e-5)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("old", "new", "said"),
     [
         (ROWS[1], "1,0.5,1,0,0.3", "row 3, column y_std: found '0', expected a standard deviation above 0"),

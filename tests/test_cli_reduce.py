@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import each_of
 from scipy.io import loadmat
 
 import fem
@@ -165,7 +166,7 @@ def test_every_view_is_drawn(cli, tmp_path, view):
         assert ask[0] in refused.err
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "message"),
     [
         ((ROTOR,), "say where the masses stand"),

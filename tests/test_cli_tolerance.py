@@ -2,6 +2,7 @@
 
 import pandas as pd
 import pytest
+from cases import each_of
 
 from rotorid.samples import sample_data
 
@@ -56,7 +57,7 @@ def test_an_overhung_rotor(cli):
     assert "0.375 and 1.38" in found["warnings"][0]
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("options", "words"),
     [
         ({"--grade": "G3"}, "'G3': the nearest are G2.5 and G6.3"),

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from cases import each_of
 
 from rotorid.samples import sample_data
 
@@ -140,7 +141,7 @@ def test_files(cli, tmp_path):
     assert pd.read_csv(table)["mass"][0] == pytest.approx(24.8405, abs=1e-3)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("args", "words"),
     [
         ((), "without a job, give --rotor-mass (or --bearing-load) and --speed and --radius"),

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from cases import each_of
 
 import rotorid
 from rotorid.expressions import FUNCTIONS
@@ -58,7 +59,7 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("table", TABLES)
+@each_of("table", TABLES)
 def test_every_column_of_a_table_is_described(table):
     assert TABLES[table]
     for column in TABLES[table]:

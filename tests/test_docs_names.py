@@ -7,7 +7,7 @@ import pkgutil
 import re
 from importlib import import_module
 
-import pytest
+from cases import each_of
 
 PACKAGES = ("fem", "balancing", "rotorid")
 LISTS = (*PACKAGES, "rotorid.harmonic", "rotorid.timedomain", "rotorid.reduction", "rotorid.tables")
@@ -64,7 +64,7 @@ def test_the_lists_are_complete():
     assert len(CLASSES) > 70
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@each_of("name", FUNCTIONS)
 def test_a_function_describes_its_parameters_and_what_it_returns(name):
     function = FUNCTIONS[name]
     doc = inspect.getdoc(function) or ""
@@ -77,7 +77,7 @@ def test_a_function_describes_its_parameters_and_what_it_returns(name):
     assert section(doc, "Returns") or re.search(r"shape \(", doc.split("\n\n")[0])
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@each_of("name", CLASSES)
 def test_a_class_describes_what_it_holds_or_takes(name):
     value = CLASSES[name]
     doc = inspect.getdoc(value) or ""
@@ -90,7 +90,7 @@ def test_a_class_describes_what_it_holds_or_takes(name):
     assert described(text) >= fields
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@each_of("name", CLASSES)
 def test_every_public_method_says_what_it_does(name):
     for method, value in vars(CLASSES[name]).items():
         if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, property)):

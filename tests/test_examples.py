@@ -1,6 +1,9 @@
 """The scripts of `examples/` run, print, write pictures only when asked to, and their numbers stay."""
 
+import contextlib
+import functools
 import importlib.util
+import io
 import os
 import subprocess
 import sys
@@ -134,21 +137,33 @@ def test_every_example_is_pinned():
     assert names == set(PINNED)
 
 
+@pytest.fixture(scope="session")
+def ran(tmp_path_factory):
+    """What an example gives, prints and writes, as a function of its name; each runs once."""
+
+    @functools.cache
+    def run(name):
+        folder, printed = tmp_path_factory.mktemp(name), io.StringIO()
+        with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+            found = load(name).main()
+        return found, printed.getvalue(), list(folder.iterdir())
+
+    return run
+
+
 @pytest.mark.parametrize("name", PINNED)
-def test_the_numbers_of_an_example(name, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    found = load(name).main()
+def test_the_numbers_of_an_example(name, ran):
+    found, text, files = ran(name)
     assert found == pytest.approx(PINNED[name], rel=1e-6, abs=1e-6)
     assert all(type(value) in (int, float) for value in found.values())
-    assert len(capsys.readouterr().out.splitlines()) >= 10
-    assert list(tmp_path.iterdir()) == []
+    assert len(text.splitlines()) >= 10
+    assert files == []
 
 
-def test_the_walk_through_the_book_meets_what_is_printed(capsys):
-    found = load("book_walkthrough").main()
+def test_the_walk_through_the_book_meets_what_is_printed(ran):
+    found, text, _ = ran("book_walkthrough")
     for key, (value, tolerance) in PRINTED.items():
         assert abs(found[key] - value) <= tolerance, key
-    text = capsys.readouterr().out
     assert "only c and b*(1 - delta) are determined" in text
     assert "1.9 % too low, and not 10 % too high" in text
 

@@ -5,6 +5,7 @@ import contextlib
 
 import pytest
 import sympy
+from cases import each_of
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -13,7 +14,7 @@ from rotorid.expressions import FUNCTIONS, ExpressionError, is_name, names, pars
 X, Y, LAMBDA = sympy.symbols("x y lambda")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("text", "value"),
     [
         ("1 + 2*3", 7),
@@ -49,7 +50,7 @@ NAMES = [
 ]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@each_of("name", NAMES)
 def test_every_other_name_is_a_plain_symbol(name):
     assert parse(name) == sympy.Symbol(name)
     assert parse(name).assumptions0 == sympy.Symbol("a").assumptions0
@@ -57,7 +58,7 @@ def test_every_other_name_is_a_plain_symbol(name):
     assert names(parse(f"2*{name}**2 + sin({name})*y")) == {name, "y"}
 
 
-@pytest.mark.parametrize("function", FUNCTIONS)
+@each_of("function", FUNCTIONS)
 def test_functions_of_names_and_numbers(function):
     expr = parse(f"{function}(x)")
     assert names(expr) == {"x"}
@@ -79,7 +80,7 @@ def test_equations_have_two_sides():
         parse("a = b")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("text", "position", "hint"),
     [
         ("", 0, "ends here"),

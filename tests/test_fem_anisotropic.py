@@ -184,10 +184,12 @@ def test_sensors_have_angles():
 
 
 def test_material_damping_takes_no_part_on_symmetric_supports():
-    rotor = dataclasses.replace(rotor23(2e4), model=FULL)
+    disc = [fem.Disc(3, 50.0, 6.0, 3.0)]
+    supports = [fem.Support(n, 1e8, 2e4) for n in (1, 7)]
+    rotor = fem.Rotor(np.full(6, 0.25), 0.1, discs=disc, supports=supports, model=FULL)
     damped = dataclasses.replace(rotor, material_damping=1e-3)
     for method in ("fast", "exact"):
-        a, b = (fem.influence(r, [7], [3], [90.0, 300.0], method=method).W for r in (rotor, damped))
+        a, b = (fem.influence(r, [6], [3], [90.0, 300.0], method=method).W for r in (rotor, damped))
         np.testing.assert_array_equal(a, b)
 
 

@@ -3,6 +3,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import mirrored, refined, rotor23, rotors, uniform
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -186,7 +187,7 @@ def test_hardly_any_damping_on_a_fine_mesh_is_said():
     assert not any("damping" in text for text in fem.influence(rotor, [121], [121], [critical / 2]).warnings)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "message"),
     [
         ({"speeds": []}, "at least one"),

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import rotor23
 
 import fem
@@ -68,7 +69,7 @@ def test_stations_and_numbers_name_nodes():
         rotor.node(2.5)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "message"),
     [
         ({"length": [0.1, -0.2]}, "element 2: length must be finite and greater than zero, not -0.2"),
@@ -96,7 +97,7 @@ def test_an_impossible_rotor_is_refused(arguments, message):
         fem.Rotor(**{"length": [0.1, 0.2], "outer_diameter": 0.05, **arguments})
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("make", "message"),
     [
         (lambda: fem.Disc(0, 1.0), "disc: node 0 does not exist, nodes are numbered from 1"),

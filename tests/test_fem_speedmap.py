@@ -4,6 +4,7 @@ import math
 import matplotlib as mpl
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import rotor23, uniform
 from whirl_rotors import machine
 
@@ -104,7 +105,7 @@ def test_results_speak():
     assert found.plot().get_xscale() == "log"
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("stiffness", "options", "message"),
     [
         ([1e8, 1e7], {}, "ascending"),

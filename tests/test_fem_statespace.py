@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigvals
@@ -230,7 +231,7 @@ def test_a_rotor_with_massless_pedestals_and_shaft():
         assert model.speed == speed
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("M", "C", "K", "message"),
     [
         # y is held by nothing

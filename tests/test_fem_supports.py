@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from cases import each_of
 
 import fem
 
@@ -35,6 +36,9 @@ def test_what_kind_of_support_it_is():
     on_stand = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8, 3.0))
     assert (on_stand.plain, on_stand.symmetric, on_stand.damped) == (False, True, True)
     assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8))).symmetric
+    hardly = fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, (1e8, 2e8), (0.0, 1e-6)))
+    assert hardly.damped, "however little it is, in however few directions"
+    assert not fem.Support(1, 1e7, pedestal=fem.Pedestal(10.0, 1e8)).damped
     rotor = fem.Rotor([0.1, 0.1], 0.05, supports=[plain, TABLE])
     assert not rotor.symmetric
     assert not rotor.constant
@@ -93,7 +97,7 @@ def test_a_rotor_with_everything_survives_copying():
         assert dataclasses.replace(rotor, **change) != rotor
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("make", "message"),
     [
         (lambda: fem.Support(1, ((1, 2), (3, "x"))), "support at node 1: stiffness yy must be a number"),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from repetitions import highest_share, lowest_share, of_a_mean, repetitions
 
 PATH = Path(__file__).parents[1] / "examples" / "coverage_identify.py"
 
@@ -22,10 +23,12 @@ def example():
 
 @pytest.mark.parametrize("case", ["task_5_1", "two_masses"])
 def test_intervals_of_output_error_contain_the_truth_in_95_percent(example, case):
-    found = example.repeat(getattr(example, case)(), "output-error", 2000)
-    assert (found.coverage >= 0.93).all(), found.coverage
-    assert (found.coverage <= 0.97).all(), found.coverage
-    assert (np.abs(found.bias) < 0.1).all(), found.bias
+    n = repetitions(2000)
+    found = example.repeat(getattr(example, case)(), "output-error", n)
+    assert (found.coverage >= lowest_share(n, 0.95)).all(), found.coverage
+    assert (found.coverage <= highest_share(n, 0.95)).all(), found.coverage
+    # a nonlinear estimate has a bias of its own, of second order in the errors: 0.01 deviations
+    assert (np.abs(found.bias) < of_a_mean(n) + 0.01).all(), found.bias
 
 
 def test_without_stated_errors_the_residuals_give_honest_intervals(example):

@@ -5,6 +5,7 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 import pytest
+from cases import each_of
 from harmonic_cases import STATED, simulate, task51, two_masses
 
 from rotorid.harmonic.design import d_optimal, design
@@ -143,7 +144,7 @@ def test_the_result_speaks():
     assert document["frequencies_rad_s"] == found.frequencies.tolist()
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("change", "words"),
     [
         ({"n": 0}, "choose from 1 to 3"),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_harmonic_model import chain
@@ -79,7 +80,7 @@ def last_digit(text: str) -> float:
     return 0.5 * 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2])) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("task", PRINTED)
+@each_of("task", PRINTED)
 def test_printed_results_to_all_digits(task):
     equations, known, frequencies, signals, printed = PRINTED[task]
     model = harmonic_model(equations, known=known, estimate=list(printed))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import each_of
 
 from rotorid.harmonic import harmonic_model
 
@@ -69,7 +70,7 @@ def test_functions_of_known_numbers_are_numbers():
     np.testing.assert_allclose(x, 1 / 5, rtol=1e-14)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("equations", "known", "estimate", "message"),
     [
         ([MASS], {"m": 1}, ["c", "b", "k"], "the parameter k is to be estimated but stands in no equation"),

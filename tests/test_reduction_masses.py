@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_reduction import COMPLIANCE, FREQUENCIES, SHAPES
@@ -180,7 +181,7 @@ def test_masses_that_are_not_determined_are_named(nonnegative):
     assert still.undetermined == ("m3",)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("change", "message"),
     [
         ({"normalise": "last"}, "normalise must be"),

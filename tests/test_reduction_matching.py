@@ -5,6 +5,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -167,7 +168,7 @@ def test_too_few_starts_are_continued_and_an_odd_number_is_said():
         assert ("should be even" in r.warnings[0]) == (len(r.masses) % 2 == 1)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("alpha", "omega", "message"),
     [
         (np.eye(3), [1.0, 2.0], r"compliance \(n, n\)"),

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import machines, refined, rotor23, rotors, uniform
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -244,7 +245,7 @@ def test_a_regression_that_fails_leaves_the_others(methods):
         methods.row("craig")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("nodes", "options", "message"),
     [
         ((), {}, "different nodes"),

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import ROOT, rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -233,7 +234,7 @@ def test_outputs():
     assert not cost.small.flags.writeable
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("speeds", "options", "message"),
     [
         ([10.0, 5.0], {}, "ascend"),

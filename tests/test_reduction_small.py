@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import each_of
 from fem_rotors import rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -296,7 +297,7 @@ def test_condensed_pedestals_without_mass():
     np.testing.assert_allclose(K[0], K[1], rtol=1e-9, atol=1e-9 * np.abs(K[1]).max())
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("nodes", "masses", "options", "message"),
     [
         ((), (), {}, "different nodes"),

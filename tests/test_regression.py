@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -246,7 +247,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say():
         assert 0.935 <= count / repetitions <= 0.965
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("kwargs", "message"),
     [
         ({"K": [1.0, 2.0], "Y": [1.0, 2.0]}, "K must be"),

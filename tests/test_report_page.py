@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import jinja2
 import pytest
+from cases import each_of
 from matplotlib.figure import Figure
 
 from rotorid.report.page import Shown, fixed, inline_svg, json_inside, render, render_report, significant
@@ -126,7 +127,7 @@ def test_the_same_figure_is_drawn_the_same_twice():
     assert inline_svg(figure(), "x") == inline_svg(figure(), "x")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("value", "digits", "text"),
     [
         (416.9288, 4, "416.9"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import each_of
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_csv
 
 from balancing import correct, estimate_influence
@@ -254,7 +255,7 @@ def test_the_same_in_a_workbook(job, tmp_path):
     assert holes.names == ("A", "B")
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("column", "cell", "shown", "words"),
     [
         ("holes_deg", "0; 90; 45", "0; 90; 45", "ascending order"),

@@ -244,6 +244,7 @@ def test_the_smallest_model_file(model_file):
         ('b"]\n', 'b"]\ninputs = ["G"]\n', ["G", "no signal"]),
         ('b"]\n', 'b"]\n[bounds]\nd = [0, 1]\n', ["key bounds.d", "a name of estimate"]),
         ('b"]\n', 'b"]\n[bounds]\nc = [2, 1]\n', ["key bounds.c", "[lowest, highest]"]),
+        ('b"]\n', 'b"]\n[bounds]\nc = [1, 1]\n', ["key bounds.c", "[lowest, highest]"]),
         ('b"]\n', 'b"]\n[bounds]\nc = [0, nan]\n', ["key bounds.c"]),
         ('b"]\n', f'b"]\n[bounds]\nc = [0, 1{"0" * 400}]\n', ["key bounds.c"]),
         ('b"]\n', 'b"]\n[bounds]\nc = [0, 1]\n[start]\nc = 2\n', ["key start", "within its bounds"]),

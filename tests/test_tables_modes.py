@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tables_data import complaints, csv_text, replaced, the_only, write_book, write_csv
@@ -109,7 +110,7 @@ def test_excel_with_decimal_commas(tmp_path):
     assert read_modes(path).shapes.tolist() == [[1, 1], [1.46, 0.12], [1.02, -1.047]]
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("row", "column", "value", "words"),
     [
         (2, "mode", 1.5, "a mode number: 1, 2"),

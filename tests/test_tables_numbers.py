@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,7 +25,7 @@ def test_plain_numbers(text, value):
     assert parse_number(text.replace(".", ","), comma=True) == value
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("text", "words"),
     [
         ("", "a number"),
@@ -86,7 +87,7 @@ def test_any_text_is_a_finite_number_or_a_reason(text):
     assert words.startswith(("a number", "a finite number"))
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("unit", "shown", "inside"),
     [
         (units.LENGTH["mm"], 318.0, 0.318),
@@ -177,7 +178,7 @@ def test_suggestions():
     assert did_you_mean("sensr", ["sensor", "run"]) == " (did you mean 'sensor'?)"
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("cells", "name", "doubtful"),
     [
         (["720", "1.350", "490"], "amplitude_um", {"1.350"}),

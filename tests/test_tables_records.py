@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -79,7 +80,7 @@ def test_without_states_the_outputs_are_functions_of_time(tmp_path):
     assert read_ode_model(saved(tmp_path, "m.toml", text)).states == ()
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("old", "new", "said"),
     [
         ("-k*x - c*v + u", "-k*x - c*v + w", "key states.v: .*w is none"),
@@ -243,7 +244,7 @@ def test_a_model_of_matrices(tmp_path):
     assert damped.f(0.0, [1.0, 0.3, 2.0, 0.4], model.start)[1] == pytest.approx(-0.3)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("old", "new", "said"),
     [
         ('M = [["m1", 0], [0, 2.0]]', "M = [[1, 2]]", "key M: .*square matrix"),

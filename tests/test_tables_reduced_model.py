@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -359,7 +360,7 @@ def test_states_need_no_initial_values_for_amplitudes(tmp_path):
     assert read_harmonic_model(saved(tmp_path, "m.toml", text)).model.inputs == ("u",)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("text", "old", "new", "said"),
     [
         (MATRICES, '"g*u"', '"g*cos(3*t)"', r"force.y1 depends on the time t.*measured input"),

@@ -7,6 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tables_data import complaints, replaced, the_only, write_book, write_csv
@@ -380,7 +381,7 @@ BEYOND = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("more", "words"), BEYOND)
+@each_of(("more", "words"), BEYOND)
 def test_a_table_refuses_what_it_cannot_hold(tmp_path, more, words):
     with pytest.raises(ValueError, match=r"write a rotor file, r\.toml") as caught:
         write_rotor(tmp_path / "r.csv", Rotor([1.0], 0.1, **more))

@@ -9,6 +9,7 @@ import zipfile
 import numpy as np
 import openpyxl
 import pytest
+from cases import each_of
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
 
 from balancing import correct, estimate_influence
@@ -182,7 +183,7 @@ def test_text_numbers_with_decimal_commas_are_numbers(tmp_path):
     assert [type(cells.cell(3, place).value) for place in range(1, 6)] == [str, int, str, float, int]
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("sheet", "row", "column", "value", "shown", "words"),
     [
         ("runs", 4, "amplitude_um_pp", DATE, "2024-05-01 00:00:00", "turned the cell into a date"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -125,7 +126,7 @@ def test_curve_fitting_needs_no_states():
     assert not model.linear
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("changes", "message"),
     [
         ({"states": {"x": "-a*x +"}}, r"state x: '-a\*x \+', character 7"),
@@ -194,7 +195,7 @@ def test_record_does_not_share_what_it_was_given():
     assert record.t[0] == 0.0
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "message"),
     [
         (([0, 2, 1],), "the times must increase, but t = 1 in row 3 follows 2"),

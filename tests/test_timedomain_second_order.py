@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import each_of
 
 from rotorid.timedomain import Record, SimulationError, ode_model, simulate
 from rotorid.timedomain.models import second_order
@@ -94,7 +95,7 @@ def test_names_and_rest_by_default():
     np.testing.assert_allclose(run.x[1], [1.0, 0.0], atol=1e-14)  # 0.5 (1 − cos 2t)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("arguments", "options", "message"),
     [
         (([[1, 0]], [[0]], [[1]]), {}, "the mass matrix must be square"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import each_of
 
 import fem
 from fem.state_space import state_space as of_motion
@@ -151,7 +152,7 @@ def test_a_mass_matrix_with_parameters():
     assert found.D.shape == (2, 0)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("rate", "output", "said"),
     [
         ("-a*x**3", "x", "the rate of x is not linear"),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -88,15 +89,13 @@ def test_printed_texts(text, value, half):
     assert half_unit(text) == half
 
 
-@pytest.mark.parametrize(
-    "text", ["", "1,5", "1.5.2", "1e", "nan", "inf", "0x10", "5 kg", " 5", ".", "1e999", 5.0]
-)
+@each_of("text", ["", "1,5", "1.5.2", "1e", "nan", "inf", "0x10", "5 kg", " 5", ".", "1e999", 5.0])
 def test_what_is_no_printed_number_is_refused(text):
     with pytest.raises(ValueError, match="number"):
         number(text)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("options", "message"),
     [
         ({"tolerance": 0.1}, "needs a reason"),
