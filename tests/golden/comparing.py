@@ -1,7 +1,8 @@
 """What differs between a stored outcome and one of now, beyond rounding.
 
 Keys, their order, words, whole numbers and exit statuses are compared exactly; decimals to 1e-9 of the
-largest number of their array, or to one unit of the last printed digit. `TOLERANCES` names what may differ more.
+largest number of their array, or to one unit of the last printed digit. `TOLERANCES` names what may differ
+more.
 """
 
 from __future__ import annotations
