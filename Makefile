@@ -32,11 +32,11 @@ demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -q -n 2 --dist worksteal
+	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder
 
 # Simulations with all their repetitions instead of 300.
 test-full: $(VENV)/.dev
-	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist worksteal
+	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder
 
 # One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
 SEED ?= 1
@@ -44,7 +44,7 @@ N ?= 60
 MINUTES ?= 15
 JOBS ?= 2
 mutants: $(VENV)/.dev
-	$(BIN)/python tests/mutants.py --seed $(SEED) --number $(N) --minutes $(MINUTES) --jobs $(JOBS)
+	$(BIN)/python tests/mutants/mutants.py --seed $(SEED) --number $(N) --minutes $(MINUTES) --jobs $(JOBS)
 
 # Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
 golden: $(VENV)/.dev

@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
@@ -47,16 +48,27 @@ def cli(capsys, monkeypatch):
     return run
 
 
-# Files that take longest for a single test begin, so that no worker ends with them: the pages, built once,
-# and the simulations.
-SLOW_FIRST = ("docs", "harmonic_coverage", "balancing_coverage", "balancing_discrete", "fem_campbell")
+# The files that take longest begin, so that no worker ends with them: stored outputs, the pages, simulations.
+SLOW_FIRST = (
+    "golden/test_balance.py",
+    "golden/test_models.py",
+    "golden/test_rotor.py",
+    "docs/test_docs.py",
+    "rotorid/harmonic/test_coverage.py",
+    "balancing/correction/test_coverage.py",
+    "balancing/mounting/test_discrete.py",
+    "fem/test_campbell.py",
+)
+TESTS = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items):
-    """Slow files first, otherwise in the order of the files."""
+    """Slow files first, otherwise in the order of the files; a file is run by one worker."""
 
     def rank(item):
-        stem = item.path.stem.removeprefix("test_")
-        return SLOW_FIRST.index(stem) if stem in SLOW_FIRST else len(SLOW_FIRST)
+        name = item.path.relative_to(TESTS).as_posix()
+        return SLOW_FIRST.index(name) if name in SLOW_FIRST else len(SLOW_FIRST)
 
     items.sort(key=rank)
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(item.path.relative_to(TESTS).as_posix()))

@@ -40,6 +40,12 @@ def test_a_folder_holds_what_a_reader_can_look_through():
     assert wrong == {}
 
 
+def test_folders_of_tests_are_no_larger():
+    tests = ROOT / "tests"
+    folders = {path.parent for path in tests.rglob("*.py")}
+    assert [path for path in folders if len(list(path.glob("*.py"))) > MOST] == []
+
+
 def test_rooms_are_two_levels_deep():
     assert [p for p in folders() if len(p.relative_to(ROOT).parts) > 3] == []
 

@@ -1,0 +1,196 @@
+"""The scripts of `examples/` run, print, write pictures only when asked to, and their numbers stay."""
+
+import contextlib
+import functools
+import importlib.util
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rotorid import read_ode_model
+
+FOLDER = Path(__file__).parents[2] / "examples"
+PINNED = {
+    "balance_a_machine": {
+        "left_g_mm": 416.928801,
+        "left_deg": 171.556173,
+        "largest_before_um_pp": 59.7,
+        "largest_after_um_pp": 0.649873363,
+        "largest_with_pieces_um_pp": 1.03466542,
+        "largest_in_check_um_pp": 0.96,
+        "trim_left_g_mm": 13.1967605,
+    },
+    "plan_a_trial_weight": {
+        "plain_g": 24.8405346,
+        "aimed_deg": 345,
+        "modelled_g_mm": 340.033712,
+        "modelled_deg": 188.354075,
+        "rms_ratio": 0.648286754,
+    },
+    "rotor_critical_speeds": {
+        "first_critical_rpm": 4066.83591,
+        "second_critical_rpm": 4375.18551,
+        "first_of_campbell_rpm": 4176.22143,
+        "peak_rpm": 4391.83902,
+        "peak_um": 3.23613447,
+        "amplification": 8.2880193,
+        "stability_threshold_rpm": 10932.3852,
+    },
+    "reduce_for_control": {
+        "m7_kg": 134.203177,
+        "m12_kg": 196.616759,
+        "m18_kg": 157.082577,
+        "second_frequency_error": -0.00310917753,
+        "states": 12,
+        "slowest_decay": -1.35235759,
+        "largest_response_error": 0.0471078292,
+    },
+    "identify_bearings": {
+        "kxx": 89446567.2,
+        "kxy": 30189073.8,
+        "kyx": -80283272.4,
+        "kyy": 160399371,
+        "bxx": 499890.834,
+        "bxy": -148301.027,
+        "byx": -152711.932,
+        "byy": 804743.576,
+        "intervals_that_hold_the_truth": 8,
+        "condition_number": 5.65612548,
+        "worse_kyy_std": 55.5954149,
+    },
+    "fit_a_record": {
+        "d_x7": 880.813588,
+        "d_x12": 1595.42826,
+        "d_x18": 1333.92006,
+        "m_x12": 196.590976,
+        "blow": 0.050019356,
+        "residual_rms": 1.90598228,
+        "largest_difference_of_methods_in_std": 0,
+    },
+    "book_walkthrough": {
+        "1.6 alpha1": 50,
+        "1.8 T2": 0.822730425,
+        "1.8 T1*T2": 0.39960544,
+        "1.9 mass": 2.95138061,
+        "1.9 angle": 50.1889187,
+        "5.1 c": 999.935367,
+        "5.1 alpha": 10.0013588,
+        "4.1 rank": 2,
+        "6.1 T2": 0.808005253,
+        "7.1 c1": 9954.32263,
+        "7.1 c3": 5006.68023,
+        "8.1 c1": 2154583.45,
+        "8.1 c2": 2905177.71,
+        "rotor omega1": 135.24041,
+        "rotor omega2": 540.732885,
+        "rotor omega3": 1163.80513,
+        "9.1_printed m1": 95.8785284,
+        "9.1_printed omega2": 592.927271,
+        "9.2_printed m1": 130.049782,
+        "9.2_printed omega2": 541.259782,
+        "9.1 m1": 140.357385,
+        "9.1 omega2": 530.681803,
+        "9.2 m1": 134.203177,
+        "9.2 omega2": 539.051651,
+        "theta1": 1,
+        "theta2": -1,
+        "theta3": -1,
+        "c1": 0.13999975,
+        "m1": 11.99998962,
+        "m2": 28.00000273,
+    },
+}
+# What the references print; half a unit of the last digit (1.001e4 -> 5), or why not.
+PRINTED = {
+    "1.8 T2": (0.823, 5e-4),
+    "1.8 T1*T2": (0.400, 5e-4),
+    "5.1 c": (999.935, 5e-4),
+    "5.1 alpha": (10.001, 5e-4),
+    "6.1 T2": (0.808, 5e-4),
+    "7.1 c1": (9.954e3, 0.5),
+    "7.1 c3": (5.007e3, 0.5),
+    "8.1 c1": (2.155e6, 500.0),
+    "8.1 c2": (2.905e6, 500.0),
+    "rotor omega1": (135.2394, 1.1e-3),  # single precision in the original
+    "rotor omega2": (540.7326, 3e-4),
+    "rotor omega3": (1163.804, 1.2e-3),
+    "9.1_printed m1": (95.879, 5e-4),
+    "9.2_printed m1": (130.050, 5e-4),
+    "9.2_printed omega2": (541.261, 1.3e-3),  # the root of an eigenvalue cut to five digits
+}
+PICTURES = ("balance_a_machine", "rotor_critical_speeds", "identify_bearings", "fit_a_record")
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(f"examples_{name}", FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_example_is_pinned():
+    names = {path.stem for path in FOLDER.glob("*.py") if not path.stem.startswith("coverage_")}
+    assert names == set(PINNED)
+
+
+@pytest.fixture(scope="session")
+def ran(tmp_path_factory):
+    """What an example gives, prints and writes, as a function of its name; each runs once."""
+
+    @functools.cache
+    def run(name):
+        folder, printed = tmp_path_factory.mktemp(name), io.StringIO()
+        with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
+            found = load(name).main()
+        return found, printed.getvalue(), list(folder.iterdir())
+
+    return run
+
+
+@pytest.mark.parametrize("name", PINNED)
+def test_the_numbers_of_an_example(name, ran):
+    found, text, files = ran(name)
+    assert found == pytest.approx(PINNED[name], rel=1e-6, abs=1e-6)
+    assert all(type(value) in (int, float) for value in found.values())
+    assert len(text.splitlines()) >= 10
+    assert files == []
+
+
+def test_the_walk_through_the_book_meets_what_is_printed(ran):
+    found, text, _ = ran("book_walkthrough")
+    for key, (value, tolerance) in PRINTED.items():
+        assert abs(found[key] - value) <= tolerance, key
+    assert "only c and b*(1 - delta) are determined" in text
+    assert "1.9 % too low, and not 10 % too high" in text
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_on_request(name, tmp_path):
+    module = load(name)
+    module.main(str(tmp_path / "p.png"))
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_model_file_of_a_reduction_is_read_by_fit(tmp_path):
+    load("reduce_for_control").main(str(tmp_path / "small.toml"))
+    model = read_ode_model(tmp_path / "small.toml")
+    assert list(model.parameters) == ["d_x7", "d_x12", "d_x18"]
+
+
+def test_an_example_runs_as_a_script(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-W", "error", FOLDER / "plan_a_trial_weight.py"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert "24.84 g at the radius 200 mm" in done.stdout
+    assert "rms with the trial weight: 64.8% of what it was" in done.stdout

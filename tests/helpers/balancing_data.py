@@ -1,0 +1,75 @@
+"""Jobs that several tests of balancing use."""
+
+import numpy as np
+
+from balancing import Labels, Trials
+
+GRAM = 1e-3
+
+
+def polar(amplitude, degrees):
+    return amplitude * np.exp(1j * np.deg2rad(degrees))
+
+
+def job(
+    readings, weights, *, errors=None, labels=None, speeds=(100.0,), sensors=None, planes=None, runs=None
+):
+    """Trials from readings (…, R, S, C) or (R, C) at one speed, and weights (R, P)."""
+    readings, weights = np.asarray(readings, dtype=complex), np.asarray(weights, dtype=complex)
+    if readings.ndim == 2:
+        readings = readings[:, None, :]
+    R, P = weights.shape
+    return Trials(
+        runs=runs or tuple(f"run {r}" for r in range(R)),
+        speeds=np.asarray(speeds, dtype=float),
+        sensors=sensors or tuple(f"s{c}" for c in range(readings.shape[-1])),
+        planes=planes or tuple("ABCDEFGHIJKLMN"[:P]),
+        readings=readings,
+        weights=weights,
+        errors=errors,
+        labels=labels or Labels(vibration_unit="", weight_unit="g", weight_scale=1 / GRAM),
+    )
+
+
+def bruel_kjaer(**options):
+    """Application note 17-227, two planes; trial weights removed."""
+    readings = [
+        [polar(7.2, 238), polar(13.5, 296)],
+        [polar(4.9, 114), polar(9.2, 347)],
+        [polar(4.0, 79), polar(12.0, 292)],
+    ]
+    return job(readings, [[0, 0], [2.5 * GRAM, 0], [0, 2.5 * GRAM]], **options)
+
+
+def feese_grazier(**options):
+    """Four probes, two planes; the first trial weight stays in."""
+    readings = [
+        [polar(0.68, 32), polar(0.56, 86), polar(1.94, 231), polar(2.07, 335)],
+        [polar(1.31, 1), polar(1.25, 75), polar(0.93, 251), polar(1.00, 342)],
+        [polar(0.54, 9), polar(0.52, 75), polar(0.81, 196), polar(0.90, 296)],
+    ]
+    first, second = polar(11.1, 35) * GRAM, polar(3.7, 135) * GRAM
+    return job(readings, [[0, 0], [first, 0], [first, second]], **options)
+
+
+def synthetic(rng, *, planes=2, sensors=4, speeds=3, weights=None, **options):
+    """An exact linear rotor: trials, its W (S, C, P) and Y₀ (S, C)."""
+    W = complex_normal(rng, (speeds, sensors, planes)) * 1e3
+    Y0 = complex_normal(rng, (speeds, sensors))
+    if weights is None:
+        weights = np.vstack((np.zeros(planes), np.eye(planes))) * GRAM
+    readings = Y0 + np.einsum("scp,rp->rsc", W, weights)
+    made = job(readings, weights, speeds=100.0 * np.arange(1, speeds + 1), **options)
+    return made, W, Y0
+
+
+def complex_normal(rng, shape):
+    return rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+
+
+def noisy(rng, Y, errors, shape=()):
+    """Readings with radial, tangential and floor errors, drawn without using the code under test."""
+    unit = Y / np.abs(Y)
+    radial, tangential = rng.standard_normal((2, *shape, *Y.shape))
+    floor = complex_normal(rng, (*shape, *Y.shape)) * errors.floor
+    return Y + unit * np.abs(Y) * (errors.amplitude * radial + 1j * errors.phase * tangential) + floor

@@ -1,0 +1,141 @@
+"""Rotors for the tests of `fem`."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from hypothesis import strategies as st
+
+import fem
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def rotor23(damping=0.0):
+    with (ROOT / "sample_data" / "rotor23.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    column = {name: [float(row[name] or 0) for row in rows] for name in rows[0]}
+    return fem.Rotor(
+        column["length_m"],
+        column["diameter_m"],
+        discs=[fem.Disc(n, m) for n, m in enumerate(column["mass_kg"], 1) if m],
+        supports=[
+            fem.Support(n, k, damping) for n, k in enumerate(column["support_stiffness_N_per_m"], 1) if k
+        ],
+    )
+
+
+def printed_shapes():
+    """Mode shapes printed in [S], task 9.1, shape (24, 3)."""
+    path = ROOT / "tests" / "data" / "rotor23_modes.csv"
+    return np.loadtxt(path, delimiter=",", skiprows=1)[:, 1:]
+
+
+def uniform(n, *, length=1.0, diameter=0.1, **others):
+    return fem.Rotor(np.full(n, length / n), diameter, density=7850.0, **others)
+
+
+def refined(rotor, times):
+    """The same rotor with each element cut into equal parts."""
+
+    def renumbered(item):
+        return {"node": times * (item.node - 1) + 1}
+
+    return fem.Rotor(
+        np.repeat(rotor.length, times) / times,
+        *(
+            np.repeat(getattr(rotor, name), times)
+            for name in ("outer_diameter", "inner_diameter", "youngs_modulus", "density")
+        ),
+        discs=[fem.Disc(mass=disc.mass, **renumbered(disc)) for disc in rotor.discs],
+        supports=[
+            fem.Support(stiffness=s.stiffness, damping=s.damping, **renumbered(s)) for s in rotor.supports
+        ],
+    )
+
+
+def mirrored(rotor):
+    last = rotor.n_nodes + 1
+    return fem.Rotor(
+        *(
+            getattr(rotor, name)[::-1]
+            for name in ("length", "outer_diameter", "inner_diameter", "youngs_modulus", "density")
+        ),
+        discs=[fem.Disc(last - disc.node, disc.mass) for disc in rotor.discs],
+        supports=[fem.Support(last - s.node, s.stiffness, s.damping) for s in rotor.supports],
+    )
+
+
+@st.composite
+def rotors(draw, elements=(2, 20), damped=True):
+    """Rotors as machines have them: 2 or 3 supports, some discs, some sections hollow."""
+    n = draw(st.integers(*elements))
+    seed = draw(st.integers(0, 2**32 - 1))
+    rng = np.random.default_rng(seed)
+    outer = rng.uniform(0.04, 0.2, n)
+    supported = rng.choice(np.arange(1, n + 2), size=min(n + 1, int(rng.integers(2, 4))), replace=False)
+    return fem.Rotor(
+        rng.uniform(0.03, 0.3, n),
+        outer,
+        np.where(rng.random(n) < 0.3, outer * rng.uniform(0.2, 0.8, n), 0.0),
+        youngs_modulus=rng.uniform(1e11, 2.2e11, n),
+        density=rng.uniform(2700, 8000, n),
+        discs=[
+            fem.Disc(int(node), rng.uniform(0.1, 100)) for node in rng.integers(1, n + 2, rng.integers(0, 6))
+        ],
+        supports=[
+            fem.Support(int(node), 10 ** rng.uniform(6, 9), 10 ** rng.uniform(2, 5) if damped else 0.0)
+            for node in supported
+        ],
+    )
+
+
+@st.composite
+def machines(draw, elements=(2, 24), kinds=("symmetric", "anisotropic"), tables=True, pedestals=True):
+    """Rotors with everything: any model, discs with inertia, cross-coupled and tabulated damped bearings."""
+    n = draw(st.integers(*elements))
+    kind = draw(st.sampled_from(kinds))
+    model = fem.Model(draw(st.booleans()), draw(st.booleans()), draw(st.booleans()))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+
+    def matrix(size):
+        if kind == "symmetric":
+            cross = size * rng.uniform(-0.2, 0.2)
+            return ((size, cross), (-cross, size))
+        return (
+            (size, size * rng.uniform(-0.3, 0.3)),
+            (size * rng.uniform(-0.3, 0.3), size * rng.uniform(0.4, 2)),
+        )
+
+    def pedestal():
+        if not pedestals or rng.random() < 0.6:
+            return None
+        k, c = 10 ** rng.uniform(7, 9), 10 ** rng.uniform(3, 4)
+        if kind == "symmetric":
+            return fem.Pedestal(rng.uniform(0, 50), k, c)
+        return fem.Pedestal(rng.uniform(0, 50), (k, k * rng.uniform(0.3, 1)), (c, c * rng.uniform(0, 1)))
+
+    supports = []
+    for node in rng.choice(np.arange(1, n + 2), size=min(n + 1, int(rng.integers(2, 4))), replace=False):
+        k, c = 10 ** rng.uniform(6, 8.5), 10 ** rng.uniform(3, 4.5)
+        speeds = ()
+        stiffness, damping = matrix(k), matrix(c)
+        if tables and rng.random() < 0.4:
+            speeds = (0.0, 500.0, 1500.0, 6000.0)
+            stiffness = [matrix(k * rng.uniform(0.5, 2)) for _ in speeds]
+            damping = [matrix(c * rng.uniform(0.5, 2)) for _ in speeds]
+        supports.append(fem.Support(int(node), stiffness, damping, speeds=speeds, pedestal=pedestal()))
+    outer = rng.uniform(0.04, 0.12, n)
+    return fem.Rotor(
+        rng.uniform(0.05, 0.25, n),
+        outer,
+        np.where(rng.random(n) < 0.3, outer * rng.uniform(0.2, 0.8, n), 0.0),
+        poisson_ratio=rng.uniform(0.2, 0.35, n),
+        material_damping=draw(st.sampled_from([0.0, 2e-6])),
+        discs=[
+            fem.Disc.from_geometry(int(node), rng.uniform(0.02, 0.1), rng.uniform(0.15, 0.4))
+            for node in rng.integers(1, n + 2, rng.integers(0, 4))
+        ],
+        supports=supports,
+        model=model,
+    )

@@ -1,0 +1,292 @@
+"""Options of `rotorid fit`, standard deviations in records, and what the README shows of it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from cases import each_of
+
+from rotorid.samples import sample_data
+from rotorid.tables import read_ode_model, read_record
+from rotorid.timedomain import Record, simulate
+
+ROOT = sample_data().parent
+FOLDER = sample_data() / "fit"
+PRINTED = Path(__file__).parents[2] / "data" / "f_printed.csv"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DECAY = '[states]\nx = "-a*x"\n[initial]\nx = "x0"\n[estimate]\na = 0.5\nx0 = 0.8\n[bounds]\na = [0, 5]\n'
+OWN = f'per_record = ["x0"]\n{DECAY}'
+TWO = '[states]\nx = "-a*x"\n[initial]\nx = 1\n[outputs]\ny = "x"\nz = "2*x"\n[estimate]\na = 0.5\n'
+
+
+def files(folder):
+    return FOLDER / folder / "model.toml", FOLDER / folder / "record.csv"
+
+
+def saved(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def decay(x0=1.0, a=1.3, n=30):
+    t = np.arange(n) / 10
+    x = x0 * np.exp(-a * t) + 1e-3 * (-1.0) ** np.arange(n)
+    return "t_s,x\n" + "".join(f"{s:.3f},{v:.6f}\n" for s, v in zip(t, x, strict=True))
+
+
+def values(document):
+    return {name: entry["value"] for name, entry in document["parameters"].items()}
+
+
+def refused(outcome, *said):
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert "Traceback" not in outcome.err
+    for text in said:
+        assert text in outcome.err
+
+
+def test_starting_values_and_iterations(cli):
+    found = cli("fit", *files("three_masses"), "--start", "m1=10, c1=0.2", "--json").json
+    assert found["history"][0]["parameters"] == {"c1": 0.2, "m1": 10.0, "m2": 23.0}
+    assert values(found)["m1"] == pytest.approx(11.99998962, rel=1e-7)
+    options = found["provenance"]["options"]
+    assert options["start"] == "m1=10, c1=0.2"
+    assert options["max_iterations"] == 100
+
+
+def test_too_few_iterations_are_said(cli):
+    found = cli(
+        "fit", *files("three_masses"), "--method", "gauss-newton", "--max-iterations", 1, "--json"
+    ).json
+    assert found["converged"] is False
+    assert found["parameters"]["c1"]["std"] is None
+    assert found["provenance"]["options"]["max_iterations"] == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--method", "quasilinearization", "--trajectory", "data"),
+        ("--method", "multiple-shooting", "--trajectory", "model"),
+        ("--method", "multiple-shooting", "--pieces", "4"),
+        ("--integrator", "dop853", "--rtol", "1e-08"),
+        ("--starts", "3", "--seed", "7"),
+    ],
+)
+def test_options_reach_the_fit_and_its_provenance(cli, arguments):
+    found = cli("fit", *files("quasilinearization"), *arguments, "--json").json
+    for name, truth in {"theta1": 1, "theta2": -1, "theta3": -1}.items():
+        assert values(found)[name] == pytest.approx(truth, rel=1e-6)
+    options = found["provenance"]["options"]
+    for option, value in zip(arguments[::2], arguments[1::2], strict=True):
+        assert str(options[option.strip("-")]) == value
+
+
+def test_a_loose_integration_is_another_one(cli):
+    one, two = (
+        cli("fit", *files("limit_cycle"), "--rtol", rtol, "--json").json for rtol in ("1e-3", "1e-11")
+    )
+    assert values(one)["lambda"] != values(two)["lambda"]
+    assert values(one)["lambda"] == pytest.approx(values(two)["lambda"], rel=1e-2)
+
+
+def test_seeds_choose_other_places(cli, tmp_path):
+    model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
+    none, zero, one = (
+        cli("fit", model, record, "--starts", 4, *seed, "--json").json
+        for seed in ((), ("--seed", 0), ("--seed", 1))
+    )
+    assert none["minima"] == zero["minima"]
+    assert sum(m["starts"] for m in one["minima"]) == 4
+
+
+@each_of(
+    ("arguments", "said"),
+    [
+        (("--start", "lambd=2"), "--start: 'lambd' is no parameter of the model (did you mean 'lambda'?)"),
+        (("--start", "q=2"), "parameters are lambda and x0"),
+        (("--start", "lambda"), "'lambda' is no NAME=NUMBER"),
+        (("--start", "lambda=2,5"), "'5' is no NAME=NUMBER"),
+        (("--start", "lambda=nan"), "lambda = 'nan' is no number"),
+        (("--start", "lambda="), "lambda = '' is no number"),
+        (("--start", "x0=1,x0=2"), "x0 is given twice"),
+        (("--method", "gauss-newtom"), "did you mean 'gauss-newton'?"),
+        (("--trajectory", "data"), "--trajectory belongs to --method quasilinearization"),
+        (("--method", "multiple-shooting", "--trajectory", "dat"), "did you mean 'data'?"),
+        (("--pieces", "3"), "--pieces belongs to --method multiple-shooting"),
+        (("--rtol", "0"), "--rtol takes a number from 1e-13 to 0.01, not 0"),
+        (("--rtol", "nan"), "--rtol takes a number from 1e-13 to 0.01, not nan"),
+        (("--rtol", "1e-8", "--integrator", "rk4"), "rk4 has none"),
+        (("--seed", "3"), "--seed belongs to --starts N"),
+        (("--max-iterations", "0"), "--max-iterations"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_refused(cli, arguments, said):
+    outcome = cli("fit", *files("limit_cycle"), *arguments)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert said in re.sub(r"\s+", " ", outcome.err)
+
+
+def test_a_start_outside_the_bounds(cli, tmp_path):
+    model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
+    refused(cli("fit", model, record, "--start", "a=7"), "--start: a = 7 is outside its bounds 0 to 5")
+
+
+def test_each_record_may_have_its_own_start(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", OWN)
+    records = [saved(tmp_path, f"{x0}.csv", decay(x0)) for x0 in (1.0, 2.0)]
+    found = cli("fit", model, *records, "--start", "x0_2=3,x0=0.9", "--json").json
+    assert found["history"][0]["parameters"] == {"a": 0.5, "x0_1": 0.9, "x0_2": 3.0}
+    assert values(found) == pytest.approx({"a": 1.3, "x0_1": 1, "x0_2": 2}, rel=5e-3)
+    refused(cli("fit", model, *records, "--start", "x0_3=1"), "'x0_3' is no parameter of the model")
+
+
+def test_the_same_record_twice(cli, tmp_path):
+    model, record = saved(tmp_path, "m.toml", DECAY), saved(tmp_path, "r.csv", decay())
+    refused(cli("fit", model, record, record), f"{record}: this record is given twice; its samples would")
+    link = tmp_path / "link.csv"
+    link.symlink_to(record)
+    refused(cli("fit", model, record, link), f"(it is {record}, too)")
+    missing = tmp_path / "no.csv"
+    refused(cli("fit", model, missing, missing), "given twice")
+
+
+def printed(folder, separator=","):
+    """The intact printed values of [F] as a record with the standard deviations of their rounding."""
+    table = pd.read_csv(PRINTED, comment="#")
+    table["half_unit"] /= np.sqrt(3)
+    wide = table.pivot(index="t_s", columns="state", values=["value", "half_unit"])
+    wide.columns = [name if kind == "value" else f"{name}_std" for kind, name in wide.columns]
+    path = folder / "printed.csv"
+    wide.to_csv(path, sep=separator, decimal="," if separator == ";" else ".")
+    return path
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_intact_printed_values_of_f_weighted_by_their_rounding(cli, tmp_path, separator):
+    record = printed(tmp_path, separator)
+    outcome = cli("fit", files("three_masses")[0], record, "--allow-missing", "--json")
+    assert outcome.code == 0, outcome.err
+    found = outcome.json
+    shown = [
+        f"{entry['value']:.{n}f} ± {entry['std']:.{n}f}"
+        for entry, n in zip(found["parameters"].values(), (5, 4, 5), strict=True)
+    ]
+    assert shown == ["0.13994 ± 0.00014", "11.9988 ± 0.0028", "27.99998 ± 0.00003"]
+    assert 2 * found["history"][-1]["cost"] == pytest.approx(97, abs=0.5)
+    read = read_record(record, read_ode_model(files("three_masses")[0]), allow_missing=True)
+    assert sum(np.isfinite(samples).sum() for samples in read.outputs.values()) == 101
+
+
+def with_std(rows, header="t_s,y,z,y_std,z_std"):
+    return f"{header}\n" + "".join(f"{row}\n" for row in rows)
+
+
+ROWS = ["0,1,2,0.1,0.2", "1,0.5,1,0.1,0.3", "2,0.26,0.5,0.2,0.2", "3,0.12,0.25,0.1,0.2"]
+
+
+def test_standard_deviations_beside_the_outputs(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", TWO)
+    path = saved(tmp_path, "r.csv", with_std(ROWS))
+    record = read_record(path, read_ode_model(model))
+    np.testing.assert_array_equal(record.sigma["y"], [0.1, 0.1, 0.2, 0.1])
+    np.testing.assert_array_equal(record.sigma["z"], [0.2, 0.3, 0.2, 0.2])
+    small = cli("fit", model, path, "--json").json["parameters"]["a"]
+    tenfold = [
+        ",".join([*row.split(",")[:3], *(f"{10 * float(s)}" for s in row.split(",")[3:])]) for row in ROWS
+    ]
+    large = cli("fit", model, saved(tmp_path, "l.csv", with_std(tenfold)), "--json").json["parameters"]["a"]
+    assert large["value"] == pytest.approx(small["value"], rel=1e-6)
+    assert large["std"] == pytest.approx(10 * small["std"], rel=1e-5)
+
+
+@each_of(
+    ("old", "new", "said"),
+    [
+        (ROWS[1], "1,0.5,1,0,0.3", "row 3, column y_std: found '0', expected a standard deviation above 0"),
+        (ROWS[1], "1,0.5,1,0.1,-0.3", "row 3, column z_std: found '-0.3'"),
+        (ROWS[1], "1,0.5,1,,0.3", "row 3, column y_std: found nothing (a blank), expected a standard"),
+        (ROWS[1], "1,0.5,1,nan,0.3", "row 3, column y_std: found 'nan', expected a finite number"),
+        ("y_std,z_std", "y_std,note", "column z_std: expected such a column, as y_std is there"),
+        ("t_s,y,z,", "t_s,y,note,", "column z: expected a column z"),
+        ("y_std", "y_sd", "column y_sd: found 'y_sd', expected the name of the model alone"),
+        ("y_std,z_std", "y_std,z_sdt", "of an output NAME in a column NAME_std)"),
+        ("y_std", "y_std_mm", "without a unit"),
+    ],
+)
+def test_complaints_about_standard_deviations(cli, tmp_path, old, new, said):
+    text = with_std(ROWS)
+    assert old in text
+    record = saved(tmp_path, "r.csv", text.replace(old, new, 1))
+    refused(cli("fit", saved(tmp_path, "m.toml", TWO), record), said)
+
+
+def test_all_problems_of_a_record_with_standard_deviations_at_once(cli, tmp_path):
+    rows = [ROWS[0], "1,much,1,0,0.3", "0.5,1,1,0.1,0", "3,1,1,0.1,little"]
+    outcome = cli("fit", saved(tmp_path, "m.toml", TWO), saved(tmp_path, "r.csv", with_std(rows)))
+    refused(outcome, "row 3, column y:", "row 4, column t_s", "row 4, column z_std", "row 5, column z_std")
+    assert outcome.err.count("z_std") == 2
+
+
+def test_standard_deviations_where_nothing_was_measured(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", TWO)
+    rows = [*ROWS, "4,,0.13,,0.2", "5,NaN,0.06,NaN,0.2", "6,,0.03,0,0.2"]
+    record = saved(tmp_path, "r.csv", with_std(rows))
+    assert cli("fit", model, record, "--allow-missing").code == 0
+    bad = saved(tmp_path, "b.csv", with_std([*ROWS, "4,0.06,0.13,NaN,0.2"]))
+    refused(cli("fit", model, bad, "--allow-missing"), "wherever y was measured")
+    alone = saved(tmp_path, "a.csv", "t_s,z,y_std,z_std\n0,2,1,1\n1,1,1,1\n")
+    refused(cli("fit", model, alone, "--allow-missing"), "column y_std: expected a column y beside it")
+
+
+def test_standard_deviations_are_stated_once(cli, tmp_path):
+    model = saved(tmp_path, "m.toml", TWO)
+    record = saved(tmp_path, "r.csv", with_std(ROWS))
+    refused(cli("fit", model, record, "--sigma", "0.1"), "column y_std", "together with --sigma")
+    refused(cli("fit", model, record, "--sigma", "auto"), "either the columns NAME_std or --sigma auto")
+    bare = saved(tmp_path, "bare.csv", "t_s,y,z\n0,1,2\n1,0.5,1\n2,0.26,0.5\n")
+    refused(cli("fit", model, record, bare), f"{bare} has no columns NAME_std, but {record} has")
+
+
+def test_an_output_may_be_called_like_a_standard_deviation(tmp_path):
+    model = read_ode_model(saved(tmp_path, "m.toml", TWO.replace('z = "2*x"', 'y_std = "2*x"')))
+    record = read_record(saved(tmp_path, "r.csv", "t_s,y,y_std\n0,1,-2\n1,0.5,1\n"), model)
+    assert record.sigma is None
+    np.testing.assert_array_equal(record.outputs["y_std"], [-2, 1])
+
+
+def test_help_says_what_is_assumed(cli):
+    said = re.sub(r"[\s│]+", " ", cli("fit", "--help").out)
+    for text in ("Inputs are taken as exact", "NAME_std", "auto: estimate the error of each output"):
+        assert text in said
+
+
+def test_the_readme_shows_what_the_command_prints(cli, monkeypatch):
+    """Parameters, to the last digit that is shown."""
+    command, shown = re.search(r"```\nrotorid (fit .*?)\n.*?```text\n(.*?)```", README, re.DOTALL).groups()
+    monkeypatch.chdir(ROOT)
+    outcome = cli(*[word for word in command.split() if word not in ("--plot", "run_down.png")])
+    lines = [line for line in shown.splitlines() if "±" in line]
+    assert lines == [line for line in outcome.out.splitlines() if "±" in line]
+
+
+def test_the_model_file_of_the_readme(cli, tmp_path):
+    text = re.search(r"```toml\n(per_record.*?)```", README, re.DOTALL).group(1)
+    model = saved(tmp_path, "m.toml", text)
+    equations, t = read_ode_model(model), np.arange(60) / 100
+    truth = {"d": 25.0, "k": 5000.0}
+    paths = []
+    for x0 in (1.0, 2.5):
+        theta = [{**truth, "x0": x0}[name] for name in equations.parameters]
+        y = simulate(equations, theta, Record(t)).y
+        frame = pd.DataFrame(y, columns=list(equations.outputs))
+        frame.insert(0, "t_s", t)
+        paths.append(tmp_path / f"{x0}.csv")
+        frame.to_csv(paths[-1], index=False)
+    found = cli("fit", model, *paths, "--json").json
+    assert values(found) == pytest.approx({**truth, "x0_1": 1.0, "x0_2": 2.5}, rel=1e-6)

@@ -1,0 +1,63 @@
+"""Intervals contain the truth as often as they say: simulated repetitions of tests whose truth is known."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from repetitions import highest_share, lowest_share, of_a_mean, repetitions
+
+PATH = Path(__file__).parents[3] / "examples" / "coverage_identify.py"
+
+
+@pytest.fixture(scope="module")
+def example():
+    spec = importlib.util.spec_from_file_location("coverage_identify", PATH)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[spec.name]
+
+
+@pytest.mark.parametrize("case", ["task_5_1", "two_masses"])
+def test_intervals_of_output_error_contain_the_truth_in_95_percent(example, case):
+    n = repetitions(2000)
+    found = example.repeat(getattr(example, case)(), "output-error", n)
+    assert (found.coverage >= lowest_share(n, 0.95)).all(), found.coverage
+    assert (found.coverage <= highest_share(n, 0.95)).all(), found.coverage
+    # a nonlinear estimate has a bias of its own, of second order in the errors: 0.01 deviations
+    assert (np.abs(found.bias) < of_a_mean(n) + 0.01).all(), found.bias
+
+
+def test_without_stated_errors_the_residuals_give_honest_intervals(example):
+    found = example.repeat(example.two_masses(), "output-error", 200, stated=False)
+    assert (found.coverage > 0.91).all(), found.coverage
+
+
+def test_in_task_5_1_the_linear_estimate_is_as_good(example):
+    found = example.repeat(example.task_5_1(), "equation-error", 300)
+    assert (np.abs(found.bias) < 0.2).all(), found.bias
+    assert (found.coverage > 0.91).all(), found.coverage
+
+
+def test_near_a_resonance_the_linear_estimate_is_biased_and_output_error_is_not(example):
+    case = example.near_resonance()
+    plain = example.repeat(case, "equation-error", 150, stated=False)
+    assert (plain.coverage < 0.4).all(), plain.coverage
+    assert (np.abs(plain.bias) > 1.5).all(), plain.bias
+    weighted = example.repeat(case, "equation-error", 100)
+    assert (np.abs(weighted.bias) > 0.5).all(), weighted.bias
+    assert (weighted.coverage < 0.9).all(), weighted.coverage
+    output = example.repeat(case, "output-error", 200)
+    assert (np.abs(output.bias) < 0.3).all(), output.bias
+    assert (output.coverage > 0.91).all(), output.coverage
+
+
+def test_the_figures_are_printed(example, capsys):
+    example.main(3)
+    text = capsys.readouterr().out
+    assert "two masses near a resonance, 5 % and 3°" in text
+    assert text.count("output-error, errors stated") == 3
+    assert text.count(" bias ") == 2 * 2 * (2 + 3 + 3) + 1

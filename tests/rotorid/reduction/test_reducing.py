@@ -1,0 +1,222 @@
+"""Formula (50) against the book's tasks 9.1 and 9.2, printed and full-precision inputs."""
+
+import numpy as np
+import pytest
+from book_task_9 import (
+    COMPLIANCE,
+    FREQUENCIES,
+    PRINTED_COMPLIANCE,
+    PRINTED_FREQUENCIES,
+    PRINTED_SHAPES,
+    SHAPES,
+)
+
+import fem
+from rotorid.reduction import equivalent_masses, mac, mass_sensitivity, natural_frequencies, reduce
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+
+FULL_PRECISION = {
+    1: ([140.357, 191.941, 160.680], [135.2404, 530.68, 1062.8]),
+    2: ([134.203, 196.617, 157.083], [135.2358, 539.05, 1069.3]),
+    3: ([133.760, 197.102, 156.497], [135.2377, 539.99, 1069.8]),
+}
+
+
+@pytest.fixture(scope="module")
+def rotor():
+    return read_rotor(sample_data() / "rotor23.csv")
+
+
+def test_task_9_1_printed_inputs_give_the_printed_masses():
+    masses = equivalent_masses(PRINTED_COMPLIANCE, PRINTED_FREQUENCIES[:1], PRINTED_SHAPES[:, :1]).values
+    # printed 95.879, 224.283, and 136.375 in one place, 136.58 in another: erratum, 136.575 is right
+    np.testing.assert_allclose(masses, [95.879, 224.283, 136.575], atol=5e-4)
+    omega, _ = natural_frequencies(PRINTED_COMPLIANCE, masses)
+    # printed 135.209 and 593.391; the second one does not follow from the printed inputs (592.93)
+    assert omega[0] == pytest.approx(135.209, abs=5e-4)
+    assert omega[1] == pytest.approx(592.9, abs=0.05)
+
+
+def test_task_9_2_printed_inputs_give_the_printed_masses():
+    masses = equivalent_masses(PRINTED_COMPLIANCE, PRINTED_FREQUENCIES, PRINTED_SHAPES).values
+    np.testing.assert_allclose(masses, [130.050, 199.191, 154.698], atol=5e-4)
+    omega, _ = natural_frequencies(PRINTED_COMPLIANCE, masses)
+    assert omega[0] == pytest.approx(135.23, abs=5e-3)
+    # printed 541.261; from the printed inputs 541.2598, one unit of the last digit lower
+    assert omega[1] == pytest.approx(541.261, abs=2e-3)
+
+
+@pytest.mark.parametrize("modes", [1, 2, 3])
+def test_full_precision_masses_and_frequencies(rotor, modes):
+    reduction = reduce(rotor, (7, 12, 18), modes)
+    masses, frequencies = FULL_PRECISION[modes]
+    np.testing.assert_allclose(reduction.masses.values, masses, atol=1e-3)
+    np.testing.assert_allclose(reduction.frequencies, frequencies, rtol=5e-5)
+    np.testing.assert_allclose(reduction.compliance, COMPLIANCE, rtol=1e-7)
+    exact = equivalent_masses(COMPLIANCE, FREQUENCIES[:modes], SHAPES[:, :modes])
+    # the book/README inputs have 9 digits; condition 64 turns them into 7
+    np.testing.assert_allclose(reduction.masses.values, exact.values, rtol=1e-5)
+    expected, _ = natural_frequencies(COMPLIANCE, exact.values)
+    np.testing.assert_allclose(reduction.frequencies, expected, rtol=1e-6)
+
+
+def test_the_one_mode_regression_says_that_it_is_ill_conditioned(rotor):
+    one, two, three = (reduce(rotor, (7, 12, 18), k) for k in (1, 2, 3))
+    # column-scaled condition numbers; unscaled they are 64, 20 and 1.8
+    assert [round(r.masses.condition_number, 1) for r in (one, two, three)] == [63.2, 18.3, 1.4]
+    assert any("ill-conditioned" in w for w in one.warnings)
+    assert three.warnings == ()
+    assert (one.sensitivity > 30).all()
+    assert (three.sensitivity < 1.2).all()
+
+
+def test_sensitivity_predicts_what_the_printed_rounding_of_one_compliance_does():
+    """α12 printed 1.3 % high moves a one-mode mass by 15 %: the first-order sensitivity knows it."""
+    sensitivity = mass_sensitivity(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1])
+    good = equivalent_masses(COMPLIANCE, FREQUENCIES[:1], SHAPES[:, :1]).values
+    rng = np.random.default_rng(0)
+    draws = []
+    for _ in range(1500):
+        noise = rng.normal(scale=1e-4, size=(3, 3))
+        alpha = COMPLIANCE * (1 + np.tril(noise) + np.tril(noise, -1).T)
+        U = SHAPES[:, :1] * (1 + np.array([[0.0], *rng.normal(scale=1e-4, size=(2, 1))]))
+        draws.append(equivalent_masses(alpha, FREQUENCIES[:1], U).values)
+    # 1500 draws know a standard deviation to 1.8 %
+    np.testing.assert_allclose(np.std(draws, axis=0) / good / 1e-4, sensitivity, rtol=0.08)
+    printed = COMPLIANCE.copy()
+    printed[0, 1] = printed[1, 0] = 1.12e-7
+    moved = equivalent_masses(printed, FREQUENCIES[:1], SHAPES[:, :1]).values / good - 1
+    assert np.abs(moved).max() > 0.15
+    assert (np.abs(moved) < 0.0134 * sensitivity).all()
+
+
+def test_a_rotor_that_is_three_masses_gets_them_back():
+    rng = np.random.default_rng(4)
+    A = rng.normal(size=(3, 3))
+    alpha, truth = (A @ A.T + np.eye(3)) * 1e-8, np.array([50.0, 120.0, 80.0])
+    omega, shapes = natural_frequencies(alpha, truth)
+    for modes in (1, 2, 3):
+        estimate = equivalent_masses(alpha, omega[:modes], shapes[:, :modes])
+        np.testing.assert_allclose(estimate.values, truth, rtol=1e-8)
+
+
+def test_natural_frequencies_solve_the_direct_problem_with_a_seal():
+    alpha, m, c = COMPLIANCE, np.array([134.0, 197.0, 157.0]), np.array([0.0, 2e6, 0.0])
+    omega, shapes = natural_frequencies(alpha, m, seal_stiffness=c)
+    stiffness = np.linalg.inv(alpha) + np.diag(c)
+    np.testing.assert_allclose(stiffness @ shapes, np.diag(m) @ shapes * omega**2, rtol=1e-9, atol=1e-3)
+    estimate = equivalent_masses(alpha, omega[:2], shapes[:, :2], seal_stiffness=c)
+    np.testing.assert_allclose(estimate.values, m, rtol=1e-8)
+
+
+def test_masses_that_are_not_positive_are_said(rotor):
+    reduction = reduce(rotor, (2, 3, 4), 1)
+    assert (reduction.masses.solution <= 0).any()
+    assert any("not positive" in w for w in reduction.warnings)
+    document = reduction.to_dict()
+    assert all(f is None or f > 0 for f in document["natural_frequencies_rad_s"])
+
+
+def test_mac_is_one_for_the_rotor_itself(rotor):
+    reduction = reduce(rotor, (7, 12, 18), 3)
+    assert reduction.mac.shape == (3,)
+    assert (reduction.mac > [0.99999, 0.999, 0.985]).all()
+    np.testing.assert_allclose(np.diag(mac(reduction.rotor_shapes, -2 * reduction.rotor_shapes)), 1.0)
+
+
+def test_document_frame_and_text(rotor):
+    reduction = reduce(rotor, (7, 12, 18), 2)
+    document = reduction.to_dict()
+    assert {
+        "nodes", "positions_m", "masses_kg", "compliance_m_per_N", "natural_frequencies_rad_s",
+        "rotor_frequencies_rad_s", "relative_error", "mac", "condition_number", "warnings",
+    } <= set(document)  # fmt: skip
+    np.testing.assert_allclose(document["positions_m"], np.array([0.655, 1.34, 2.105]) + 0.318, atol=1e-9)
+    frame = reduction.to_frame()
+    masses, modes = (frame[frame["table"] == name] for name in ("masses", "modes"))
+    np.testing.assert_allclose(masses["mass_kg"].astype(float), document["masses_kg"])
+    assert masses["node"].tolist() == document["nodes"]
+    assert modes["mode"].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(modes["frequency_rad_s"].astype(float), document["natural_frequencies_rad_s"])
+    assert modes[["node", "position_m", "mass_kg"]].isna().all(axis=None)
+    assert masses[["mode", "frequency_rad_s", "mac"]].isna().all(axis=None)
+    text = reduction.summary()
+    assert "134.203 kg" in text
+    assert max(map(len, text.splitlines())) <= 110
+
+
+@pytest.mark.parametrize(
+    ("nodes", "modes", "message"),
+    [
+        ((), 1, "different nodes"),
+        ((7, 7, 18), 1, "different nodes"),
+        ((7, 12, 30), 1, "node 30 does not exist"),
+        ((0, 12), 1, "node 0 does not exist"),
+        ((7, 12), 3, "can use 1 … 2 modes"),
+        ((7, 12), 0, "can use 1 … 2 modes"),
+    ],
+)
+def test_bad_choices_are_refused(rotor, nodes, modes, message):
+    with pytest.raises(ValueError, match=message):
+        reduce(rotor, nodes, modes)
+
+
+def test_a_free_rotor_has_no_compliance(rotor):
+    free = fem.Rotor(rotor.length, rotor.outer_diameter, discs=rotor.discs)
+    with pytest.raises(ValueError, match="support"):
+        reduce(free, (7, 12, 18), 1)
+
+
+def test_wrong_shapes_are_refused():
+    with pytest.raises(ValueError, match="compliance must be"):
+        equivalent_masses(np.eye(3), [1.0], np.ones((2, 1)))
+    with pytest.raises(ValueError, match="positive"):
+        equivalent_masses(np.eye(2), [0.0], np.ones((2, 1)))
+    with pytest.raises(ValueError, match="node at the first mass"):
+        equivalent_masses(np.eye(2), [1.0], [[0.0], [1.0]])
+
+
+def test_the_plane_at_rest_of_an_anisotropic_gyroscopic_rotor():
+    parts = {"discs": [fem.Disc(4, 30.0, 2.0, 1.0), fem.Disc(8, 20.0, 1.0, 0.6)]}
+    stand = fem.Pedestal(5.0, (3e8, 1e8), 1e3)
+    turning = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        **parts,
+        supports=[
+            fem.Support(1, ((2e7, 3e6), (-3e6, 5e7)), 2e3),
+            fem.Support(11, [1e7, 3e7], 1e3, speeds=(100.0, 500.0), pedestal=stand),
+        ],
+        model=fem.Model(shear=True, rotary_inertia=True, gyroscopic=True),
+    )
+    still = fem.Rotor(
+        [0.1] * 10,
+        0.06,
+        **parts,
+        supports=[fem.Support(1, 2e7), fem.Support(11, 1e7, pedestal=fem.Pedestal(5.0, 3e8))],
+        model=fem.Model(shear=True, rotary_inertia=True),
+    )
+    a, b = reduce(turning, [4, 8], 2), reduce(still, [4, 8], 2)
+    np.testing.assert_allclose(a.masses.solution, b.masses.solution, rtol=1e-9)
+    np.testing.assert_allclose(a.rotor_frequencies, b.rotor_frequencies, rtol=1e-9)
+    assert "plane x of the rotor at rest" in a.warnings[0]
+    assert "masses of the pedestals are left out" in a.warnings[1]
+    assert "not the same in x and y" in a.warnings[2]
+    assert "100 rad/s, the lowest of their tables" in a.warnings[3]
+    assert not any("gyroscopic" in text for text in a.warnings[1:])
+    assert not any("at rest" in text for text in b.warnings)
+    stiffer = reduce(turning, [4, 8], 2, speed=500.0)
+    assert (stiffer.rotor_frequencies > a.rotor_frequencies).all()
+    assert "500 rad/s, chosen in their tables" in stiffer.warnings[3]
+    with pytest.raises(ValueError, match="its table holds 100 to 500"):
+        reduce(turning, [4, 8], 2, speed=50.0)
+
+
+def test_a_mode_of_another_shape_is_said(rotor):
+    result = reduce(rotor, [7, 12, 18], 2)
+    assert not any("MAC" in text for text in result.warnings)
+    clumsy = reduce(rotor, [3, 4, 5], 3)
+    low = clumsy.mac < 0.9
+    assert low.any()
+    assert [f"mode {k + 1} of the model" in " ".join(clumsy.warnings) for k in range(3)] == low.tolist()

@@ -1,0 +1,96 @@
+"""Quasilinearization against the tables of [Q], and from all kinds of first trajectories."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from timedomain_cases import book_model, book_record, decay, decay_record
+
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.record import Record
+
+DATA = Path(__file__).parents[3] / "data"
+FIRST = {"x1": 1.5, "x2": "1 + sin(t)"}
+
+
+def table(name):
+    return np.loadtxt(DATA / f"quasilinearization_{name}.csv", delimiter=",", skiprows=1)[:, 1:]
+
+
+def test_tables_of_the_book_with_heun():
+    found = fit(book_model(), book_record(), method="quasilinearization", integrator="heun", trajectory=FIRST)
+    parameters = table("table_2_3")
+    assert found.history[:7] == pytest.approx(parameters, abs=0.005 * np.ptp(parameters))
+    states = table("table_2_2")
+    for k in range(6):
+        assert found.trajectories[k][0] == pytest.approx(states[:, 2 * k : 2 * k + 2], abs=5e-3)
+    assert any("more accurate integration" in text for text in found.warnings)
+
+
+def test_truth_in_seven_iterations_with_error_control():
+    found = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST)
+    assert found.converged
+    assert found.iterations <= 7
+    assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize("trajectory", ["data", "model", "arrays"])
+def test_other_first_trajectories(trajectory):
+    record = book_record()
+    given = {"x1": np.full(31, 1.5), "x2": 1 + np.sin(record.t)} if trajectory == "arrays" else trajectory
+    found = fit(
+        book_model(),
+        record,
+        method="quasilinearization",
+        trajectory=given,
+        start={"theta1": 0.7, "theta2": -0.7, "theta3": -0.7},
+    )
+    assert found.converged
+    assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-8)
+
+
+def test_unknown_initial_value_agrees_with_the_default_method():
+    record = decay_record()
+    one = fit(decay(), record, method="quasilinearization")
+    other = fit(decay(), record)
+    assert one.values == pytest.approx(other.values, rel=1e-7)
+    assert one.std == pytest.approx(other.std, rel=1e-5)
+
+
+def test_several_records_and_gaps():
+    record = decay_record()
+    x = record.outputs["x"].copy()
+    x[3:9] = np.nan
+    pair = [record, Record(record.t, {"x": x}, name="second")]
+    one, other = (fit(decay(), pair, method=m) for m in ("quasilinearization", "gauss-newton"))
+    assert len(one.estimate.residuals) == 2 * 41 - 6
+    assert one.values == pytest.approx(other.values, rel=1e-7)
+
+
+def test_curve_without_states():
+    t = np.linspace(0, 3, 30)
+    model = ode_model({}, outputs={"y": "b*exp(-a*t)"}, estimate={"a": 0.7, "b": 1.5})
+    record = Record(t, {"y": 2 * np.exp(-0.9 * t)})
+    assert fit(model, record, method="quasilinearization").values == pytest.approx([0.9, 2.0], abs=1e-9)
+
+
+def test_divergence_is_said():
+    model = ode_model({"x": "a*x**2"}, initial={"x": 1.0}, estimate={"a": 5.0})
+    record = Record(np.linspace(0, 1, 21), {"x": np.ones(21)})
+    with pytest.raises(ValueError, match="diverge"):
+        fit(model, record, method="quasilinearization")
+    found = fit(model, record, method="quasilinearization", trajectory="data")
+    assert found.values == pytest.approx([0.0], abs=1e-8)
+
+
+def test_what_it_does_not_know():
+    with pytest.raises(ValueError, match="no bounds"):
+        fit(decay(), decay_record(), method="quasilinearization", bounds={"a": (0, 1)})
+    with pytest.raises(ValueError, match="no robust loss"):
+        fit(decay(), decay_record(), method="quasilinearization", loss="huber")
+    with pytest.raises(ValueError, match="every state"):
+        fit(book_model(), book_record(), method="quasilinearization", trajectory={"x1": 1.0})
+    with pytest.raises(ValueError, match="heun"):
+        fit(decay(), decay_record(), method="quasilinearization", integrator="rk4")

@@ -1,0 +1,357 @@
+"""The proof table: its rule, its numbers, and that it notices a wrong formula."""
+
+import csv
+import json
+import math
+from decimal import ROUND_HALF_EVEN, Decimal
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import each_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fem.matrices.elements
+from rotorid.reduction import equivalent_masses
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+from rotorid.validation import PROVIDERS, Group, Validation, masses, row, validate
+from rotorid.validation.row import half_unit, number, printed_table, tables
+
+DATA = Path(__file__).parents[2] / "data"
+DIGITS = st.integers(min_value=-99999, max_value=99999)
+EXPONENTS = st.integers(min_value=-12, max_value=8)
+
+
+@pytest.fixture(scope="module")
+def proof():
+    return validate()
+
+
+def group(proof, name):
+    return next(g.rows for g in proof.groups if g.name == name)
+
+
+def from_source(proof, start):
+    return [r for r in proof.rows if r.source.startswith(start)]
+
+
+# the rule
+
+
+def written(digits, decimals, exponent):
+    """ "-1.25e-7" from -125, 2 and -7."""
+    text = f"{Decimal(digits).scaleb(-decimals):f}"
+    return f"{text}e{exponent}" if exponent else text
+
+
+@given(DIGITS, st.integers(0, 5), EXPONENTS, st.fractions(min_value=-0.499, max_value=0.499))
+def test_what_rounds_to_the_printed_number_agrees(digits, decimals, exponent, part):
+    text = written(digits, decimals, exponent)
+    unit = Decimal(1).scaleb(exponent - decimals)
+    value = Decimal(text) + unit * Decimal(part.numerator) / Decimal(part.denominator)
+    assert value.quantize(unit, ROUND_HALF_EVEN) == Decimal(text)
+    assert row("a source", "a number", text, float(value)).status == "agrees"
+
+
+@given(DIGITS, st.integers(0, 5), EXPONENTS, st.floats(0.501, 50), st.sampled_from([-1, 1]))
+def test_what_rounds_to_another_number_differs(digits, decimals, exponent, part, sign):
+    text = written(digits, decimals, exponent)
+    unit = float(f"1e{exponent - decimals}")
+    found = row("a source", "a number", text, number(text) + sign * part * unit)
+    assert found.status == "differs"
+    assert found.misfit > 1
+
+
+@given(DIGITS, st.integers(0, 5), EXPONENTS)
+def test_half_a_unit_is_that_of_the_last_printed_digit(digits, decimals, exponent):
+    text = written(digits, decimals, exponent)
+    assert half_unit(text) == pytest.approx(0.5 * 10.0 ** (exponent - decimals), rel=1e-14)
+    assert number(text) == float(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "half"),
+    [
+        ("135.2394", 135.2394, 5e-5),
+        ("1.003e4", 1.003e4, 5.0),
+        ("8.92e-8", 8.92e-8, 5e-11),
+        ("-1.119810467E-1", -0.1119810467, 5e-11),
+        (".41", 0.41, 0.005),
+        ("−0.5", -0.5, 0.05),
+        ("10", 10.0, 0.5),
+    ],
+)
+def test_printed_texts(text, value, half):
+    assert number(text) == value
+    assert half_unit(text) == half
+
+
+@each_of("text", ["", "1,5", "1.5.2", "1e", "nan", "inf", "0x10", "5 kg", " 5", ".", "1e999", 5.0])
+def test_what_is_no_printed_number_is_refused(text):
+    with pytest.raises(ValueError, match="number"):
+        number(text)
+
+
+@each_of(
+    ("options", "message"),
+    [
+        ({"tolerance": 0.1}, "needs a reason"),
+        ({"tolerance": 0.1, "reason": " "}, "needs a reason"),
+        ({"tolerance": 0.0, "reason": "because"}, "positive and finite"),
+        ({"tolerance": math.nan, "reason": "because"}, "positive and finite"),
+        ({"reason": "because"}, "belongs to a stated tolerance"),
+        ({"corrected": "2.0"}, "reason of its erratum"),
+        ({"erratum": " "}, "needs its reason"),
+        ({"erratum": "wrong", "corrected": "two"}, "no printed number"),
+        ({"quantity": ""}, "its source and its quantity"),
+    ],
+)
+def test_a_row_without_its_reason_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        row(**{"source": "a source", "quantity": "a number", "printed": "1.0", "computed": 1.0, **options})
+
+
+def test_an_erratum_really_differs_and_is_what_the_correction_says():
+    def status(computed, **more):
+        return row("a source", "a number", "1.0", computed, erratum="a wrong digit", **more).status
+
+    assert status(2.0) == "erratum"
+    assert status(1.04) == "differs"  # agrees with the print: no erratum
+    assert status(2.04, corrected="2.0") == "erratum"
+    assert status(2.06, corrected="2.0") == "differs"
+    assert status(1.04, corrected="1.04") == "differs"
+    assert status(math.nan) == "differs"
+    wide = {"tolerance": 0.5, "reason": "read off a figure"}
+    assert status(1.4, **wide) == "differs"
+    assert status(1.6, **wide) == "erratum"
+
+
+def test_what_was_not_computed_differs_and_is_null():
+    lost = row("a source", "a number", "1.0", math.nan)
+    assert lost.status == "differs"
+    assert lost.to_dict()["computed"] is lost.to_dict()["difference"] is None
+    assert "nothing was computed" in lost.note
+
+
+# the numbers
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("rotor", 75), ("masses", 20), ("lessons", 25), ("balancing", 15)]
+)
+def test_every_printed_number_is_there(proof, name, least):
+    assert len(group(proof, name)) >= least
+
+
+def test_time_records_are_there(proof):
+    assert len(from_source(proof, "[Q]")) >= 300
+    assert len(from_source(proof, "[F]")) >= 6
+
+
+def test_no_number_differs(proof):
+    assert [(r.source, r.quantity, r.text, r.computed) for r in proof.rows if r.status == "differs"] == []
+    assert proof.holds
+    assert sum(proof.counts.values()) == len(proof.rows)
+    assert len({(r.source, r.quantity) for r in proof.rows}) == len(proof.rows)
+
+
+def test_every_erratum_and_every_other_tolerance_has_its_reason(proof):
+    for r in proof.rows:
+        where = (r.source, r.quantity)
+        assert (r.status == "erratum") is bool(r.erratum), where
+        assert (r.tolerance != half_unit(r.text)) <= bool(r.reason), where
+        assert r.erratum in r.note, where
+        assert r.reason in r.note, where
+        if r.erratum:
+            assert len(r.erratum.split()) >= 4, where
+            assert abs(r.difference) > r.tolerance, where
+        if r.reason:
+            assert len(r.reason.split()) >= 4, where
+
+
+def test_the_rotor_is_all_there(proof):
+    rows = {(r.source, r.quantity): r for r in group(proof, "rotor")}
+    with (DATA / "rotor23_modes.csv").open(encoding="utf-8", newline="") as file:
+        for line in csv.DictReader(file):
+            for k, name in enumerate(list(line)[1:], start=1):
+                shown = rows["[S] task 9.1, mode shapes", f"mode {k}, node {line['node']}"]
+                assert shown.printed == float(line[name])
+                assert abs(shown.difference) <= 4e-5
+    speeds = [rows["[S] task 9.1, critical speeds", f"critical speed {k}, rad/s"] for k in (1, 2, 3)]
+    assert [r.printed for r in speeds] == [135.2394, 540.7326, 1163.804]
+    np.testing.assert_allclose([r.computed for r in speeds], [135.24041, 540.73289, 1163.80513], atol=6e-6)
+
+
+@pytest.mark.parametrize(
+    ("source", "quantity", "printed", "corrected"),
+    [
+        ("[S] task 9.1, inputs", "l, distance of the supports, m", 2.74, 2.76),
+        ("[S] task 9.1, inputs", "alpha12, m/N", 11.2e-8, 1.10521909e-7),
+        ("[S] task 9.1, inputs", "alpha22 of the running text, m/N", 9.35e-8, 1.64475623e-7),
+        ("[S] task 9.1, one mode", "m3, kg", 136.375, 136.575),
+        ("[S] task 9.1, one mode", "omega2, rad/s", 593.391, 592.92),
+        ("[S] task 9.1, with all digits", "omega2, rad/s", 593.391, 530.68),
+        ("[S] task 9.1, with all digits", "omega2 above that of the rotor, %", 10, -1.9),
+        ("[S] task 6.1", "Re S at omega = 2, table", -0.31, -0.37),
+        ("[S] task 7.1", "c3 of the direct problem, N/m", 5e4, 5e3),
+    ],
+)
+def test_known_errata(proof, source, quantity, printed, corrected):
+    (found,) = (r for r in proof.rows if (r.source, r.quantity) == (source, quantity))
+    assert found.status == "erratum"
+    assert (found.printed, number(found.corrected)) == (printed, corrected)
+    assert found.misfit <= 1
+
+
+def test_the_condition_numbers_of_the_reasons():
+    exact = masses.of_rotor(read_rotor(sample_data() / "rotor23.csv"))
+    for modes, reason, condition in ((1, masses.THREE_DIGITS, 63), (2, masses.TWO_MODES, 18)):
+        assert f"condition number {condition})" in reason
+        estimate = equivalent_masses(exact.alpha, exact.omega[:modes], exact.shapes[:, :modes])
+        assert estimate.condition_number == pytest.approx(condition, abs=0.5)
+
+
+# a wrong formula is noticed
+
+
+def scaled(function, factor):
+    """The same function with its first result multiplied."""
+
+    def changed(*args, **kwargs):
+        first, *others = function(*args, **kwargs)
+        return (first * factor, *others)
+
+    return changed
+
+
+def times(function, factor):
+    return lambda *args, **kwargs: function(*args, **kwargs) * factor
+
+
+def conjugate(function):
+    return lambda *args, **kwargs: {k: v.conj() for k, v in function(*args, **kwargs).items()}
+
+
+def unstretched(function):
+    """Imaginary rows with the wrong sign of what multiplies the unknowns."""
+
+    def changed(self):
+        K, Y, experiment = function(self)
+        return K * np.where(np.arange(len(K)) % 2, -1.0, 1.0)[:, None], Y, experiment
+
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("target", "wrong", "name", "least"),
+    [
+        ("fem.matrices.elements._BENDING", lambda form: form * 1.0003, "rotor", 3),
+        ("fem.matrices.elements._MASS", lambda form: form * 1.001, "rotor", 3),
+        ("fem.matrices.elements._MASS", lambda form: form * 1.03, "rotor", 60),
+        ("fem.matrices.elements._BENDING", lambda form: form * 1.01, "masses", 10),
+        ("rotorid.reduction.equivalent.masses.design", lambda f: scaled(f, 1.0001), "masses", 8),
+        ("rotorid.validation.masses.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
+        ("rotorid.harmonic.rows.Rows.real_rows", unstretched, "lessons", 15),
+        ("rotorid.harmonic.model.HarmonicModel.predict", conjugate, "lessons", 8),
+        ("rotorid.validation.lessons.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
+        (
+            "rotorid.timedomain.methods.quasilinearization._heun",
+            lambda f: times(f, 1.01),
+            "time_records",
+            100,
+        ),
+        (
+            "rotorid.timedomain.integration.matrix_exponential._pade",
+            lambda f: scaled(f, 1.0001),
+            "time_records",
+            50,
+        ),
+        ("balancing.coefficients.influence.gain", lambda f: times(f, np.exp(0.05j)), "balancing", 4),
+        ("balancing.solvers.solve._closed_form", lambda f: times(f, np.exp(0.05j)), "balancing", 8),
+    ],
+)
+def test_a_wrong_formula_makes_numbers_differ(monkeypatch, target, wrong, name, least):
+    owner, attribute = _place(target)
+    monkeypatch.setattr(owner, attribute, wrong(getattr(owner, attribute)))
+    found = validate([name])
+    assert found.counts["differs"] >= least
+    assert not found.holds
+    assert "Differ:" in found.summary()
+
+
+def _place(target):
+    """Module or class, and the name in it; a module even where a function of its package hides it."""
+    owner, _, attribute = target.rpartition(".")
+    if owner.rpartition(".")[2][0].isupper():
+        module, _, name = owner.rpartition(".")
+        return getattr(import_module(module), name), attribute
+    return import_module(owner), attribute
+
+
+def test_a_formula_that_is_right_again_agrees_again():
+    """Nothing of a tampered run is kept."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fem.matrices.elements, "_BENDING", fem.matrices.elements._BENDING * 1.01)
+        assert validate(["rotor"]).counts["differs"] >= 70
+    assert validate(["rotor"]).holds
+
+
+def test_the_summary_has_a_line_for_each_source_and_every_reason(proof):
+    text = proof.summary()
+    lines = text.splitlines()
+    n = proof.counts
+    assert lines[-1] == (
+        f"{len(proof.rows)} numbers: {n['agrees']} agree, {n['erratum']} errata, {n['differs']} differ"
+    )
+    for r in proof.rows:
+        assert any(line.startswith(f"  {r.source} ") for line in lines)
+    flat = " ".join(text.split()).lower()
+    for r in proof.rows:
+        assert " ".join(r.erratum.lower().split()) in flat
+        assert " ".join(r.reason.lower().split()) in flat
+    assert max(map(len, lines)) <= 110
+    assert "Differ:" not in text
+    shown = proof.summary(every=True)
+    assert all(r.quantity in shown for r in proof.rows)
+    assert len(shown.splitlines()) == len(lines) + len(proof.rows)
+
+
+def test_numbers_that_differ_are_all_named():
+    rows = tuple(row("a source", f"number {i}", "1.0", 2.0 + i) for i in range(20))
+    text = Validation((Group("one", "One group", rows),)).summary()
+    assert all(
+        f"number {i}: printed 1.0, computed {2.0 + i:.5g}" in " ".join(text.split()) for i in range(20)
+    )
+    assert text.endswith("20 numbers: 0 agree, 0 errata, 20 differ")
+
+
+def test_documents_and_frames_hold_every_row(proof):
+    document = proof.to_dict()
+    json.dumps(document, allow_nan=False)
+    assert len(document["rows"]) == document["counts"]["numbers"] == len(proof.rows)
+    assert [g["group"] for g in document["groups"]] == list(PROVIDERS)
+    keys = {"source", "quantity", "printed", "computed", "difference", "tolerance", "status", "note"}
+    for shown, r in zip(document["rows"], proof.rows, strict=True):
+        assert keys <= set(shown)
+        assert shown["difference"] == shown["computed"] - shown["printed"]
+        assert shown["printed"] == number(shown["printed_text"]) == r.printed
+    frame = proof.to_frame()
+    assert list(frame.columns) == list(document["rows"][0])
+    assert len(frame) == len(proof.rows)
+
+
+def test_an_unknown_group_is_refused():
+    with pytest.raises(ValueError, match="no group 'rotors'"):
+        validate(["rotors"])
+
+
+def test_tables_of_printed_numbers_say_where_they_are_printed():
+    assert tables()
+    for path in tables():
+        first = path.read_text(encoding="utf-8").splitlines()[0]
+        assert first.startswith("# ")
+        assert len(first.split()) >= 5
+        assert len(printed_table(path.name)) >= 1
