@@ -1,8 +1,8 @@
 """What differs between a stored outcome and one of now, beyond rounding.
 
 Keys, their order, words, whole numbers and exit statuses are compared exactly; decimals to 1e-9 of the
-largest number of their array, or to one unit of the last printed digit. `TOLERANCES` names what may differ
-more.
+largest number of their array (all numbers of one path, whatever the indices), or to one unit of the last
+printed digit. `TOLERANCES` names what may differ more.
 """
 
 from __future__ import annotations
@@ -97,8 +97,7 @@ def _structure(
             yield f"{where}: {len(old)} items are now {len(new)}"
             return
         for i, (a, b) in enumerate(zip(old, new, strict=True)):
-            inner = array if array.endswith("[*]") else f"{array}[*]"
-            yield from _structure(a, b, f"{path}[{i}]", inner, arrays)
+            yield from _structure(a, b, f"{path}[{i}]", array, arrays)
     elif isinstance(old, float):
         arrays.setdefault(array, []).append((where, old, new))
     elif old != new:

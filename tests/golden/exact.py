@@ -56,7 +56,7 @@ def _differences(name: str, old: dict[str, Any], new: dict[str, Any]) -> list[st
 
 def flat(found: dict[str, Any]) -> dict[str, str]:
     """All that a case gave as named texts."""
-    texts = {}
+    texts = {"copied": found["copied"]}
     for form in (TEXT, JSON):
         if form in found:
             texts |= {f"{form} {key}": str(found[form][key]) for key in ("status", "output", "error")}

@@ -87,7 +87,8 @@ def outcome(case: Case, place: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        "command"; for each form "status", "output", "error", "seconds"; "files": name → {"hash", "content"}.
+        "command"; for each form "status", "output", "error", "seconds"; "copied": names of files,
+        "files": name → {"hash", "content"}.
     """
     import rotorid.cli
 
@@ -109,6 +110,7 @@ def outcome(case: Case, place: Path) -> dict[str, Any]:
         if TEXT in case.forms:
             found[TEXT] = _call(rotorid.cli.main, case.words)
         made = sorted(_files(place) - given)
+        found["copied"] = "\n".join(name for name in made if not _written(name))
         found["files"] = {name: _content(place / name) for name in made if _written(name)}
         return found
     finally:

@@ -45,6 +45,7 @@ def parts(found: dict[str, Any]) -> tuple[dict[str, str], str | None]:
             texts["status"] += f", with --json {other['status']}"
         if other["error"] != first["error"]:
             texts["error with --json"] = other["error"]
+    texts["copied"] = found["copied"]
     texts |= {f"file {name}": file["content"] for name, file in found["files"].items()}
     document = found[JSON]["output"] if JSON in found else ""
     if document and not document.startswith("{"):

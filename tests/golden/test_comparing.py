@@ -28,6 +28,7 @@ def outcome(document=None, text=TEXT, table=CSV, status=0, error=""):
             "command": "balance job.toml",
             "text": {"status": status, "output": text, "error": error},
             "json": {"status": status, "output": json.dumps(document or DOCUMENT, indent=1), "error": error},
+            "copied": "",
             "files": {"w.csv": {"content": table}},
         }
     )
@@ -142,7 +143,7 @@ def test_an_exit_status_and_an_error_are_found():
 
 def test_a_named_tolerance_holds_for_its_case_and_place_only():
     document = changed("corrections", 0, "mass", to=12.5 * (1 + 1e-7))
-    named = Tolerance("cas*", "corrections[[]*].mass", "a reason", relative=1e-6)
+    named = Tolerance("cas*", "corrections.mass", "a reason", relative=1e-6)
     assert differences((named,), document=document) == []
     assert differences((Tolerance("other", named.place, "a reason", relative=1e-6),), document=document)
     assert differences((Tolerance("case", "*.angle", "a reason", relative=1e-6),), document=document)
@@ -167,6 +168,7 @@ def test_what_is_written_is_what_is_read(tmp_path):
         "command": "balance job.toml",
         "text": {"status": 0, "output": TEXT, "error": "rotorid: a complaint\n\n"},
         "json": {"status": 0, "output": json.dumps(DOCUMENT), "error": "rotorid: a complaint\n\n"},
+        "copied": "",
         "files": {"w.csv": {"content": CSV}},
     }
     write("case", found, tmp_path)

@@ -14,8 +14,8 @@ class Tolerance:
     case
         Pattern of names of cases.
     place
-        Pattern (`fnmatch`) of the path of an array in a document, as `*.covariance?[*]`, or of a line of text
-        with `#` for every decimal.
+        Pattern (`fnmatch`) of the path of an array in a document, as `corrections.covariance`, or of a line
+        of text with `#` for every decimal.
     reason
         Why.
     relative
