@@ -11,7 +11,7 @@ import numpy as np
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
-from rotorid.base.units import RPM
+from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,7 +82,7 @@ class TrialWeight:
             "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
             "basis": self.basis,
             "radius_m": self.radius,
-            "speed_rpm": round(self.speed * RPM, 9),
+            "speed_rpm": rpm(self.speed),
             "force_N": self.force,
             "load_N": self.load,
             "force_percent": None
@@ -152,7 +152,7 @@ class TrialWeight:
         change = np.abs(self.expected - self.before) * self.labels.vibration_scale
         return [
             {
-                "speed_rpm": round(speed * RPM, 9),
+                "speed_rpm": rpm(speed),
                 "sensor": name,
                 "before": float(old[s, c]),
                 "before_phase_deg": float(old_phase[s, c]),

@@ -9,6 +9,7 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.style import BLUE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -191,9 +192,9 @@ class Unbalance:
         if ax is None:
             ax = Figure(figsize=(7.0, 3.6), layout="constrained").add_subplot()
         size, x, sure = self.labels.weight(self.unbalance)[0], np.arange(len(self.stations)), self.determined
-        for those, colour, label in ((sure, "#0072B2", "determined"), (~sure, "none", "not determined")):
+        for those, colour, label in ((sure, BLUE, "determined"), (~sure, "none", "not determined")):
             if those.any():
-                ax.bar(x[those], size[those], 0.7, color=colour, edgecolor="#0072B2", label=label)
+                ax.bar(x[those], size[those], 0.7, color=colour, edgecolor=BLUE, label=label)
         if self.std is not None and sure.any():
             error = 1.96 * self.std[sure] * self.labels.weight_scale
             ax.errorbar(x[sure], size[sure], yerr=error, fmt="none", ecolor="black", capsize=2, lw=1.2)

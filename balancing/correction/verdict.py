@@ -32,7 +32,7 @@ from balancing.iso21940 import Tolerance
 from balancing.solvers.error_propagation import correction_covariance, prediction_covariance
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
-from rotorid.base.units import RPM
+from rotorid.base.units import rpm
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ class Verdict:
         return {
             "kind": row.kind,
             "name": row.name,
-            "speed_rpm": None if row.speed is None else round(row.speed * RPM, 9),
+            "speed_rpm": None if row.speed is None else rpm(row.speed),
             "size": row.size * scale,
             "angle_deg": float(angle) if row.size else None,
             "low": None if row.low is None else row.low * scale,

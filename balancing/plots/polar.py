@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.style import COLORS, VERMILION
 from rotorid.base.text import figures
 from rotorid.base.units import RPM, rpm_text
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 
 # Okabe and Ito: told apart with every kind of colour vision
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 BEFORE = "#7F7F7F"
 SPEEDS_SHOWN = 6
@@ -63,12 +63,12 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     mass, angle = c.labels.weight(c.weights)
     regions = _regions(c)
     for p, plane in enumerate(c.planes):
-        _arrow(polar, np.deg2rad(angle[p]), mass[p], COLOURS[p % len(COLOURS)], MARKERS[p % len(MARKERS)])
+        _arrow(polar, np.deg2rad(angle[p]), mass[p], COLORS[p % len(COLORS)], MARKERS[p % len(MARKERS)])
         label = f"{plane}: {figures(mass[p])} {c.labels.weight_unit} at {angle[p]:.1f}°"
-        polar.plot([], [], color=COLOURS[p % len(COLOURS)], marker=MARKERS[p % len(MARKERS)], label=label)
+        polar.plot([], [], color=COLORS[p % len(COLORS)], marker=MARKERS[p % len(MARKERS)], label=label)
         if regions is not None:
             size, around = c.labels.weight(regions[p])
-            colour = COLOURS[p % len(COLOURS)]
+            colour = COLORS[p % len(COLORS)]
             polar.plot(np.unwrap(np.deg2rad(around)), size, color=colour, lw=1.0, zorder=2)
     largest = max(float(mass.max()), np.finfo(float).tiny)
     if regions is not None:
@@ -116,7 +116,7 @@ def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
             polar.plot(
                 np.unwrap(np.deg2rad(along)),
                 np.full(91, (1.03 + 0.03 * p) * reach),
-                color=COLOURS[p % len(COLOURS)],
+                color=COLORS[p % len(COLORS)],
                 lw=4.0,
                 alpha=0.45,
                 solid_capstyle="butt",
@@ -124,7 +124,7 @@ def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
     turn = np.linspace(0.0, 2 * np.pi, 181)
     for p, limit in enumerate(c.limits.max_weight * c.labels.weight_scale):
         if np.isfinite(limit):
-            polar.plot(turn, np.full_like(turn, limit), ls="--", lw=0.9, color=COLOURS[p % len(COLOURS)])
+            polar.plot(turn, np.full_like(turn, limit), ls="--", lw=0.9, color=COLORS[p % len(COLORS)])
 
 
 def _legend_words(c: Correction, regions: ComplexArray | None) -> str:
@@ -146,7 +146,7 @@ def _amplitude_limits(ax: Axes, c: Correction, x: FloatArray) -> None:
     limit = c.limits.residual.ravel() * c.labels.vibration_scale
     there = np.isfinite(limit)
     if there.any():
-        ax.hlines(limit[there], x[there] - 0.45, x[there] + 0.45, color="#D55E00", lw=1.8, label="limit")
+        ax.hlines(limit[there], x[there] - 0.45, x[there] + 0.45, color=VERMILION, lw=1.8, label="limit")
 
 
 def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: bool = True) -> Axes:
@@ -155,7 +155,7 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
     old, old_phase = (v[speed] for v in c.labels.vibration(c.before))
     new, new_phase = (v[speed] for v in c.labels.vibration(c.after))
     for k, sensor in enumerate(c.sensors):
-        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[(k + k // len(COLOURS)) % len(MARKERS)]
+        colour, marker = COLORS[k % len(COLORS)], MARKERS[(k + k // len(COLORS)) % len(MARKERS)]
         polar.plot(
             np.deg2rad([old_phase[k], new_phase[k]]), [old[k], new[k]], color=colour, lw=0.8, ls=":", zorder=2
         )
@@ -190,7 +190,7 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
         error = [np.minimum(reach, new), reach]
         note += ", 95 % of a check run"
     _amplitude_limits(ax, c, x)
-    ax.errorbar(x, new, yerr=error, fmt="o", ms=4, color=COLOURS[0], capsize=2, lw=1.2, label=note)
+    ax.errorbar(x, new, yerr=error, fmt="o", ms=4, color=COLORS[0], capsize=2, lw=1.2, label=note)
     positive = old[old > 0]
     wide = (
         positive.size > 0

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from balancing.plots.polar import COLOURS, MARKERS
+from balancing.plots.polar import MARKERS
+from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -62,7 +63,7 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
     scale = v.labels.weight_scale
     largest = max(max(row.limit, row.size) for row in rows) * scale
     for k, row in enumerate(rows):
-        colour = COLOURS[k % len(COLOURS)]
+        colour = COLORS[k % len(COLORS)]
         size, angle = v.labels.weight(row.value)
         _circle(polar, row.limit * scale, k, f"{row.name}: {row.verdict}")
         polar.plot([np.deg2rad(float(angle))], [float(size)], MARKERS[k % len(MARKERS)], color=colour)
@@ -90,12 +91,12 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
     polar = _axes(ax, t.labels.angle_sign * t.labels.drawn_sign)
     size, angle = t.labels.weight(t.amount * np.exp(1j * t.angle))
     theta, radius = np.deg2rad(float(angle)), float(size)
-    polar.plot([theta, theta], [0, radius], color=COLOURS[0], lw=2.2)
+    polar.plot([theta, theta], [0, radius], color=COLORS[0], lw=2.2)
     label = f"{t.plane}: {radius:.4g} {t.labels.weight_unit} at {float(angle):.0f}°"
-    polar.plot([theta], [radius], MARKERS[0], color=COLOURS[0], label=label)
+    polar.plot([theta], [radius], MARKERS[0], color=COLORS[0], label=label)
     if t.angle_reach:
         arc = theta + np.linspace(-t.angle_reach, t.angle_reach, 91)
-        polar.plot(arc, np.full_like(arc, radius), color=COLOURS[0], lw=4.0, alpha=0.4)
+        polar.plot(arc, np.full_like(arc, radius), color=COLORS[0], lw=4.0, alpha=0.4)
     polar.set_rlim(0, 1.2 * radius)
     polar.set_title(
         f"Trial weight, {t.labels.weight_unit}, angles {t.labels.angle_words}", fontsize="medium", pad=14
@@ -107,9 +108,7 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
 def _circle(polar: PolarAxes, limit: float, k: int, label: str) -> None:
     turn = np.linspace(0.0, 2 * np.pi, 361)
     style = ("-", "--", ":")[k % 3]
-    polar.plot(
-        turn, np.full_like(turn, limit), ls=style, lw=1.4, color=COLOURS[k % len(COLOURS)], label=label
-    )
+    polar.plot(turn, np.full_like(turn, limit), ls=style, lw=1.4, color=COLORS[k % len(COLORS)], label=label)
 
 
 def _legend(polar: PolarAxes) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from balancing.plots.polar import COLOURS, MARKERS
+from balancing.plots.polar import MARKERS
+from rotorid.base.style import COLORS
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def curve(t: TradeOff, ax: Axes) -> Axes:
     """Residual over total weight, rms and largest amplitude, the knee marked."""
     scale, unit = t.labels.vibration_scale, t.labels.vibration_unit
     x = t.totals * t.labels.weight_scale
-    shown = {"max": ("largest amplitude", t.largest, COLOURS[1]), "rms": ("rms", t.rms, COLOURS[0])}
+    shown = {"max": ("largest amplitude", t.largest, COLORS[1]), "rms": ("rms", t.rms, COLORS[0])}
     for kind, (name, values, colour) in shown.items():
         main = kind == t.criterion
         label = f"{name} (made as small as possible)" if main else f"{name} at the same weights"
@@ -57,7 +58,7 @@ def planes(t: TradeOff, ax: Axes) -> Axes:
     """Size of the weight in each plane over the total weight."""
     x, mass = t.totals * t.labels.weight_scale, t.labels.weight(t.weights)[0]
     for p, plane in enumerate(t.planes):
-        colour, marker = COLOURS[p % len(COLOURS)], MARKERS[p % len(MARKERS)]
+        colour, marker = COLORS[p % len(COLORS)], MARKERS[p % len(MARKERS)]
         ax.plot(x, mass[:, p], color=colour, marker=marker, ms=3.5, lw=1.2, label=plane)
     if t.knee is not None:
         ax.axvline(x[t.knee], color="#7F7F7F", lw=0.8, ls="--", zorder=1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, QUIET, hertz_beside, new_axes, plain, rpm_above
+from rotorid.base.style import COLORS, QUIET, VERMILION, hertz_beside, new_axes, plain, rpm_above
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -130,7 +130,7 @@ def draw_log_decrements(campbell: CampbellLike, ax: Axes | None = None) -> Axes:
     low = float(min(1.2 * finite.min(initial=0.0), -0.12 * high))
     ax.set(xlim=_range(campbell), ylim=(max(low, -HIGHEST), high))
     ax.axhline(0.0, color="black", linewidth=1.1)
-    ax.axhspan(-1e3, 0.0, facecolor="#D55E00", alpha=0.10, hatch="///", edgecolor="#D55E00", linewidth=0)
+    ax.axhspan(-1e3, 0.0, facecolor=VERMILION, alpha=0.10, hatch="///", edgecolor=VERMILION, linewidth=0)
     ax.annotate("unstable", (0.01, 0.02), xycoords="axes fraction", fontsize="small", color="#8a3d00")
     plain(ax)
     ax.set(xlabel="speed, rad/s", ylabel="logarithmic decrement")

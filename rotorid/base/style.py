@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # Okabe and Ito: told apart by every eye.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BLUE, VERMILION = COLORS[:2]
 STYLES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GRID, QUIET = "#e4e7eb", "#6b7480"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,8 +104,6 @@ def draw_phases(result: Identification, axes: Axes) -> None:
 
 def draw_shapes(result: Identification, axes: Axes) -> None:
     """Measured and fitted mode shapes, one line per natural frequency."""
-    from fem.plots import COLORS
-
     outputs = result.model.outputs
     place = np.arange(len(outputs))
     table = _table(result)
@@ -125,8 +124,6 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
 
 def draw_residuals(result: Identification, axes: Axes) -> None:
     """Residuals of each equation (or output) and experiment: real part filled, imaginary part open."""
-    from fem.plots import COLORS
-
     place = np.arange(len(result.experiments))
     width = min(0.6, 0.12 * len(result.residual_names))
     for j, name in enumerate(result.residual_names):
@@ -190,8 +187,6 @@ def _table(result: Identification) -> ComplexArray:
 
 def _outputs(result: Identification) -> list[tuple[str, str, ComplexArray, BoolArray]]:
     """Color, name, measured amplitudes and which experiments, forced ones only, of every output."""
-    from fem.plots import COLORS
-
     table, forced = _table(result), ~result.experiments.free
     return [
         (COLORS[j % len(COLORS)], name, table[forced, j], forced)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import COLORS
 from rotorid.reduction.plots import LINE, SAME_SHAPE, SMALLEST_ERROR
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.colors import LogNorm
 
-    from rotorid.base.style import COLORS, new_axes, plain
+    from rotorid.base.style import new_axes, plain
 
     axes = new_axes((9.5, 6.4)) if ax is None else ax
     plain(axes)
@@ -85,8 +86,6 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
 
 def _named(placement: Placement, x: FloatArray, y: FloatArray, axes: Axes) -> None:
     """Mark the choices that have a name; one with several names is marked once."""
-    from rotorid.base.style import COLORS
-
     names = (
         ("best by frequency", placement.best_by_frequency, "s", COLORS[0]),
         ("best by MAC", placement.best_by_mac, "^", COLORS[3]),

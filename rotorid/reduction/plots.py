@@ -10,6 +10,7 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import COLORS, VERMILION
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     ax
         Where; default new axes.
     """
-    from fem.plots import COLORS, draw_rotor, new_axes
+    from fem.plots import draw_rotor, new_axes
     from rotorid.base.style import MARKERS, STYLES
 
     axes = new_axes((10, 5.6)) if ax is None else ax
@@ -160,7 +161,7 @@ def _masses_above(reduction: Reduction, rotor: fem.Rotor, axes: Axes) -> int:
             textcoords="offset points",
             ha="center",
             fontsize="small",
-            color=DARK if mass > 0 else "#D55E00",
+            color=DARK if mass > 0 else VERMILION,
         )
     return len(ends)
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -309,7 +310,6 @@ def _refined(record: Record) -> Record:
 
 
 def _color(i: int) -> str:
-    from fem.plots import COLORS
 
     return COLORS[i % len(COLORS)]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.style import BLUE, VERMILION
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ CLOSE = 8.0
 LEAST = 1e-4
 """Smallest difference, %, that the picture shows."""
 DARK, LINE = "#2f3640", "#6b7480"
-FULL, SMALL = "#0072B2", "#D55E00"
+FULL, SMALL = BLUE, VERMILION
 DASHED = (0, (4, 2))
 
 
