@@ -311,7 +311,7 @@ EDITS = {
 
 
 EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all"}
-"""Cases that take long and whose code others run, too."""
+"""Cases that take long or say much, and whose code others run, too."""
 
 
 TEXT_ONLY = ("response-compressor", "fit-run-down-plot", "holes-plot", "influence-rotor23", "validate")
@@ -339,13 +339,14 @@ def _all() -> list[Case]:
         + _listed(BALANCE_COMMANDS, "balance")
         + _listed(MODEL_COMMANDS, "models")
     )
-    for name in EXERCISES:
+    for name in EXERCISES:  # of task 4.1 without errors the deviations are rounding, or 0 on some machines
         data = ["data"] if name in PRINTED_ONLY else ["data", "data_exact"]
         cases += [
             Case(
                 f"identify-{name}" + table.removeprefix("data").replace("_", "-"),
                 f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv",
                 "models",
+                stored=f"{name}-{table}" != "task_4_1-data_exact",
             )
             for table in data
         ]
