@@ -138,7 +138,7 @@ checked-grade-positions     balance {TURBO}/checked.toml --planes left,right --g
 holes-report                balance {TURBO}/holes.toml --split --report sheet.html
 holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
 holes-minmax                balance {TURBO}/holes.toml --split --method minmax --split-seconds 60
-holes-unsplit               balance {TURBO}/holes.toml --output sheet.xlsx
+holes-unsplit               balance {TURBO}/holes.toml
 model-job                   balance {MODEL_JOB} --model-error 2
 model-job-assumed           balance {MODEL_JOB}
 model-job-10                balance {MODEL_JOB} --model-error 10
