@@ -138,7 +138,7 @@ checked-grade-positions     balance {TURBO}/checked.toml --planes left,right --g
 holes-report                balance {TURBO}/holes.toml --split --report sheet.html
 holes-plot                  balance {TURBO}/holes.toml --split --plot discs.png
 holes-minmax                balance {TURBO}/holes.toml --split --method minmax --split-seconds 60
-holes-unsplit               balance {TURBO}/holes.toml --output sheet.xlsx
+holes-unsplit               balance {TURBO}/holes.toml
 model-job                   balance {MODEL_JOB} --model-error 2
 model-job-assumed           balance {MODEL_JOB}
 model-job-10                balance {MODEL_JOB} --model-error 10
@@ -230,7 +230,8 @@ fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
 fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
 fit-gauss-newton            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4
-fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8 --starts 3 --seed 1
+fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --loss huber --sigma 0.02 --start theta1=0.8,theta2=-0.8
+fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
@@ -310,8 +311,9 @@ EDITS = {
 }
 
 
-EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all"}
-"""Cases that take long and whose code others run, too."""
+EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all", "fit-starts"}
+"""Cases that take long or say much, and whose code others run, too; of several starts that end alike, which is
+the best and how many iterations it took is rounding."""
 
 
 TEXT_ONLY = ("response-compressor", "fit-run-down-plot", "holes-plot", "influence-rotor23", "validate")
@@ -339,13 +341,14 @@ def _all() -> list[Case]:
         + _listed(BALANCE_COMMANDS, "balance")
         + _listed(MODEL_COMMANDS, "models")
     )
-    for name in EXERCISES:
+    for name in EXERCISES:  # of task 4.1 without errors the deviations are rounding, or 0 on some machines
         data = ["data"] if name in PRINTED_ONLY else ["data", "data_exact"]
         cases += [
             Case(
                 f"identify-{name}" + table.removeprefix("data").replace("_", "-"),
                 f"identify {IDENTIFY}/{name}/model.toml {IDENTIFY}/{name}/{table}.csv",
                 "models",
+                stored=f"{name}-{table}" != "task_4_1-data_exact",
             )
             for table in data
         ]

@@ -44,6 +44,7 @@ TREE = Path(os.environ.get("GOLDEN_TREE", HERE)).resolve()
 MASKS = (
     (re.compile(r"\b20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(\+00:00|Z)?"), "DATE"),
     (re.compile(r"\b20\d\d-\d\d-\d\d[ ,]+\d\d:\d\d(:\d\d)?( UTC)?"), "DATE"),
+    (re.compile(r"^rotorid: .* s so far\n", re.M), ""),  # a sign of life after ten seconds
     (re.compile(r"^(rotorid: time: .*) [\d.]+ s$", re.M), r"\1 SECONDS s"),
     (re.compile(r"^(rotorid: versions:) .*$", re.M), r"\1 VERSIONS"),
     (re.compile(r'("version": )"[\w.+]+"'), r'\1"VERSION"'),

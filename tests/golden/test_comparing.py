@@ -159,6 +159,7 @@ def test_every_tolerance_has_its_reason():
 
 def test_dates_versions_and_seconds_are_masked():
     assert masked("rotorid 0.1.0, 2026-11-22T09:05:29+00:00") == "rotorid VERSION, DATE"
+    assert masked("rotorid: fit, 10 s so far\nrotorid: no\n") == "rotorid: no\n"
     assert masked("rotorid: time: all 0.123 s\n") == "rotorid: time: all SECONDS s\n"
 
 

@@ -31,4 +31,35 @@ class Tolerance:
     absolute: float = 0.0
 
 
-TOLERANCES: tuple[Tolerance, ...] = ()
+_CONSTRAINED = "what an active limit counts follows from the last multipliers of the solver"
+_CERTIFICATE = "the gap at which the solver stops is rounding, divided by what it began with"
+_WEIGHTED = "weights and solution are found in turn until they stand still to seven digits or so"
+_EXACT = "the data have no errors: residuals, and the deviations that follow from them, are rounding"
+
+TOLERANCES: tuple[Tolerance, ...] = (
+    # rounding residues
+    Tolerance("identify-*-exact", "*", _EXACT, absolute=1e-9),
+    Tolerance("identify-task_8_2", "residual*", "as many equations as unknowns: " + _EXACT, absolute=1e-12),
+    Tolerance("fit-quasi*", "parameters.*.std", _EXACT, absolute=1e-13),
+    Tolerance("fit-quasi*", "residual_rms", _EXACT, absolute=1e-12),
+    Tolerance("fit-quasi-method", "rotorid: *", _EXACT, absolute=1e-12),
+    Tolerance("fit-*", "integration_change.*", "the difference of two integrations", absolute=1e-12),
+    Tolerance("*", "*correlation.*", "of parameters that do not hang together", absolute=1e-12),
+    Tolerance("campbell-rotor23", "*log_decrement*", "the rotor has no damping", absolute=1e-12),
+    Tolerance("bk-weighted", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
+    # certificates, and what an iterative solver leaves
+    Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
+    Tolerance("*", "certified: at most # better is possible.", _CERTIFICATE, absolute=1e-7),
+    Tolerance("*minmax*", "*", "a conic solver stops within 5e-9 of the best", relative=1e-7),
+    Tolerance("turbo-trade-off", "trade_off.points.*", "a conic solver, along a flat optimum", relative=1e-4),
+    # covariances
+    Tolerance("*minmax*", "corrections.*std*", _CONSTRAINED, relative=5e-4),
+    Tolerance("*minmax*", "corrections.covariance", _CONSTRAINED, relative=5e-4),
+    Tolerance("turbo-max-mass", "corrections.*std*", _CONSTRAINED, relative=5e-4),
+    Tolerance("turbo-max-mass", "corrections.covariance", _CONSTRAINED, relative=5e-4),
+    Tolerance("*weighted*", "*", _WEIGHTED, relative=1e-6),
+    Tolerance("*-mesh", "mesh_check.rate", "a quotient of small differences of frequencies", relative=1e-6),
+    # the path of an iteration, not its end
+    Tolerance("fit-*", "history.parameters.*", "steps on the way to the solution", relative=1e-6),
+    Tolerance("fit-*", "autocorrelation", "of residuals near the optimum, not at it", absolute=1e-8),
+)
