@@ -1,4 +1,4 @@
-"""constraints.txt and `make test-lowest`: every promise of pyproject.toml in its tested and its lowest version."""
+"""Every promise of pyproject.toml: its tested version in constraints.txt, its lowest in `make test-lowest`."""
 
 import re
 import subprocess
