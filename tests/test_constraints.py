@@ -1,4 +1,4 @@
-"""Every promise of pyproject.toml: its tested version in constraints.txt, its lowest in `make test-lowest`."""
+"""Every promise of pyproject.toml: tested versions in constraints.txt, the lowest for `make test-lowest`."""
 
 import re
 import subprocess
