@@ -124,9 +124,5 @@ $(HSBALANCE_VENV)/.peer: pyproject.toml $(CONSTRAINTS)
 	touch $@
 
 clean:
-<<<<<<< HEAD
 	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) $(LATEST_VENV) $(LOWEST_VENV) $(UV_VENV) build dist demo docs/_build
-	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
-=======
-	rm -rf $(VENV) $(BENCH_VENV) $(HSBALANCE_VENV) build dist demo docs/_build .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants
->>>>>>> suite
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .mutants

@@ -1,5 +1,4 @@
-"""Print constraints for `make test-lowest`: what pyproject.toml promises, at the lowest version of the
-promise.
+"""Print constraints for `make test-lowest`: what pyproject.toml promises, in the lowest version promised.
 
 That is what rotorid needs, what builds it, and the groups test and docs, which the tests use. All else (what
 these need in turn) is no newer than in constraints.txt.

@@ -39,7 +39,11 @@ class Search:
         if not self.path or not np.array_equal(self.path[-1], x):
             self.path.append(x.copy())
             self.costs.append(self.cost(np.asarray(self.residual(x))))
-        return np.asarray(self.slopes(x), dtype=np.float64)
+        return np.array(self.slopes(x), dtype=np.float64)  # a copy: the driver scales it in place
+
+    def residuals(self, x: FloatArray) -> FloatArray:
+        """Residuals at x, for the driver to scale in place."""
+        return np.array(self.residual(x), dtype=np.float64)
 
     def cost(self, r: FloatArray) -> float:
         """Half the sum of the loss."""
@@ -71,7 +75,7 @@ def drive(
         search.loss = name
         with np.errstate(all="ignore"):  # the driver shortens steps that overflow
             found = driver(
-                search.residual,
+                search.residuals,
                 inside(x, lower, upper, 1e-10),
                 jac=search.jacobian,
                 bounds=(lower, upper),

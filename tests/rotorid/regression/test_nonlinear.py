@@ -229,6 +229,26 @@ def test_spread_of_a_robust_estimate_is_the_spread_of_repetitions(loss):
     np.testing.assert_array_less(np.abs(np.log(ratio)), 0.2)
 
 
+@pytest.mark.parametrize("loss", ["linear", "huber"])
+def test_what_the_functions_return_stays_as_it_is(loss):
+    K, _ = line(m=20)
+    y = K @ [1.0, 2.0] + np.random.default_rng(1).standard_t(2, 20)
+    last = {}
+
+    def residual(x):
+        last["given"] = K @ x - y
+        last["kept"] = last["given"].copy()
+        return last["given"]
+
+    def jacobian(x):
+        np.testing.assert_array_equal(last["given"], last["kept"])
+        return K
+
+    kept = K.copy()
+    nonlinear_least_squares(residual, jacobian, [0, 0], names="ab", sigma_stated=False, loss=loss)
+    np.testing.assert_array_equal(K, kept)
+
+
 def test_no_convergence_is_said():
     residual, jacobian, names = thurber()
     fit = nonlinear_least_squares(

@@ -45,7 +45,8 @@ def response(motion, dampers, forces):
     """Amplitudes (frequencies, n) of a motion with dampers to the ground, solved here."""
     C = motion.C + np.diag([dampers.get(f"d_{name}", 0.0) for name in motion.coordinates])
     w = FREQUENCIES[:, None, None]
-    return np.linalg.solve(-w * w * motion.M + 1j * w * C + motion.K, forces[:, None])[:, :, 0]
+    dynamic = -w * w * motion.M + 1j * w * C + motion.K
+    return np.stack([np.linalg.solve(one, forces) for one in dynamic])
 
 
 def amplitude_table(columns):
