@@ -70,7 +70,7 @@ def run(names: Iterable[str], tree: Path = HERE, environment: dict[str, str] | N
         env = {k: v for k, v in os.environ.items() if k not in ("PYTHONWARNINGS", "FORCE_COLOR", "LC_ALL")}
         env |= (
             ENVIRONMENT
-            | {"PYTHONPATH": f"{tree}{os.pathsep}{Path(__file__).parents[1]}"}
+            | {"GOLDEN_TREE": str(tree), "PYTHONPATH": f"{tree}{os.pathsep}{Path(__file__).parents[1]}"}
             | (environment or {})
         )
         subprocess.run(

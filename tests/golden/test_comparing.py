@@ -2,12 +2,14 @@
 
 import copy
 import json
+import shutil
+import subprocess
 
 import pytest
 
 from golden.cases import CASES, COMMANDS, EXERCISES
 from golden.comparing import compare
-from golden.running import masked
+from golden.running import HERE, masked, run
 from golden.storing import STORED, parts, read, write
 from golden.tolerances import TOLERANCES, Tolerance
 from rotorid.samples import sample_data
@@ -161,6 +163,14 @@ def test_dates_versions_and_seconds_are_masked():
     assert masked("rotorid 0.1.0, 2026-11-22T09:05:29+00:00") == "rotorid VERSION, DATE"
     assert masked("rotorid: fit, 10 s so far\nrotorid: no\n") == "rotorid: no\n"
     assert masked("rotorid: time: all 0.123 s\n") == "rotorid: time: all SECONDS s\n"
+
+
+def test_the_product_of_another_tree_is_run_or_none(tmp_path, capfd):
+    """An editable installation of this tree must not take the place of the other one."""
+    shutil.copytree(HERE / "rotorid" / "cli", tmp_path / "rotorid" / "cli")
+    with pytest.raises(subprocess.CalledProcessError):
+        run(["version"], tmp_path)
+    assert f"is not in {tmp_path}" in capfd.readouterr().err
 
 
 def test_what_is_written_is_what_is_read(tmp_path):
