@@ -2,14 +2,13 @@
 
 import copy
 import json
-import shutil
 import subprocess
 
 import pytest
 
 from golden.cases import CASES, COMMANDS, EXERCISES
 from golden.comparing import compare
-from golden.running import HERE, masked, run
+from golden.running import masked, run
 from golden.storing import STORED, parts, read, write
 from golden.tolerances import TOLERANCES, Tolerance
 from rotorid.samples import sample_data
@@ -167,7 +166,6 @@ def test_dates_versions_and_seconds_are_masked():
 
 def test_the_product_of_another_tree_is_run_or_none(tmp_path, capfd):
     """An editable installation of this tree must not take the place of the other one."""
-    shutil.copytree(HERE / "rotorid" / "cli", tmp_path / "rotorid" / "cli")
     with pytest.raises(subprocess.CalledProcessError):
         run(["version"], tmp_path)
     assert f"is not in {tmp_path}" in capfd.readouterr().err
