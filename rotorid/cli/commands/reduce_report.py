@@ -231,7 +231,7 @@ class Report:
             named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}
             savemat(stream, arrays | named)
         else:
-            np.savez(stream, allow_pickle=False, **arrays)
+            np.savez(stream, **arrays)  # numpy before 2.1 would store allow_pickle= as an array
         return stream.getvalue()
 
     def _motion(self) -> fem.Motion:
