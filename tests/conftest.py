@@ -62,6 +62,7 @@ SLOW_FIRST = (
 TESTS = Path(__file__).parent
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
     """Slow files first, otherwise in the order of the files; a file is run by one worker."""
 

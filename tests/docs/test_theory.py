@@ -110,7 +110,7 @@ def record_less_model(*arguments):
         ("balancing", "balancing.correct", heavy_spot_for_light_spot),
         ("reduction", "rotorid.equivalent_masses", pushing_seal),
         ("identification", "rotorid.harmonic.experiments.experiments", lagging_amplitudes),
-        ("records", "rotorid.timedomain.integration.simulate", record_less_model),
+        ("records", "rotorid.timedomain.simulate", record_less_model),
     ],
 )
 def test_a_wrong_sign_is_found(page, place, wrong, monkeypatch):

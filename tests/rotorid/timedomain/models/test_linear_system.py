@@ -14,8 +14,7 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
 from rotorid.tables.models.motion_file import read_motion
-from rotorid.timedomain import ode_model
-from rotorid.timedomain.models import second_order
+from rotorid.timedomain import ode_model, second_order
 from rotorid.timedomain.models.linear_system import state_space
 
 SPEED = 150.0

@@ -9,9 +9,8 @@ import fem
 from rotorid.reduction import reduce
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
-from rotorid.timedomain import Record, simulate
+from rotorid.timedomain import Record, second_order, simulate
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models import second_order
 
 ROTOR = sample_data() / "rotor23.csv"
 

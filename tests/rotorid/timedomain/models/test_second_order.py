@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from cases import each_of
 
-from rotorid.timedomain import Record, SimulationError, ode_model, simulate
-from rotorid.timedomain.models import second_order
+from rotorid.timedomain import Record, SimulationError, ode_model, second_order, simulate
 
 M = [["m1", "a"], ["a", 18.0]]
 C = [["c1 + c2", "-c2"], ["-c2", "c2"]]
