@@ -271,7 +271,9 @@ def run(drawn: list[mutations.Mutation], jobs: int, minutes: float) -> tuple[lis
         base = copy_of(ROOT, work / "base")
         begun = time.monotonic()
         suite = trace(base, jobs)
-        print(f"{len(suite.seconds)} tests pass without mutation ({time.monotonic() - begun:.0f} s)")
+        print(
+            f"{len(suite.seconds)} tests pass without mutation ({time.monotonic() - begun:.0f} s)", flush=True
+        )
         for test in suite.failing:
             print(f"  left out, fails without mutation: {test}")
         sys.path.insert(0, str(ROOT))
@@ -285,8 +287,16 @@ def run(drawn: list[mutations.Mutation], jobs: int, minutes: float) -> tuple[lis
                     pool.submit(turn, mutant, base, work / f"{round_number}-{n}", suite, seconds, deadline)
                     for n, mutant in enumerate(alive)
                 ]
-                for each in turns:
-                    each.result()
+                try:
+                    for each in turns:
+                        each.result()
+                except BaseException:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    raise
+            alive = [mutant for mutant in mutants if not mutant.killer]
+            print(
+                f"turn {round_number + 1}: {len(alive)} alive ({time.monotonic() - begun:.0f} s)", flush=True
+            )
     return mutants, suite
 
 

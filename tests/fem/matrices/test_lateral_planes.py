@@ -279,6 +279,13 @@ def test_results_as_tables_and_text():
     forces = response.bearing_forces()
     table = forces.to_frame()
     assert table.shape == (4, 8)
+    for axis in "xy":
+        size, phase = table[f"force_{axis}_N"].to_numpy(), np.radians(table[f"phase_{axis}_deg"].to_numpy())
+        np.testing.assert_allclose(size, np.abs(getattr(forces, axis)).ravel(), rtol=1e-12)
+        assert np.isrealobj(size)
+        # the phase is that of the force or its lag
+        real = getattr(forces, axis).real.ravel()
+        np.testing.assert_allclose(np.cos(phase) * size, real, atol=1e-9 * size.max())
     assert table.support.tolist() == ["b2", "b22"] * 2
     assert forces.to_dict()["force_x_N"][1][0] == pytest.approx(abs(forces.x[0, 1]), rel=1e-12)
     assert "b22" in forces.summary()

@@ -1,3 +1,4 @@
+import dataclasses
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -103,6 +104,11 @@ def turbine():
         ],
         stations={"wheel": 3},
     )
+
+
+def test_a_disc_without_mass_is_no_mass():
+    light = dataclasses.replace(turbine(), discs=[fem.Disc(3, 40.0, 1.25, 0.7, "wheel"), fem.Disc(2, 0.0)])
+    assert not [text for text in labels(fem.draw_rotor(light)) if text.startswith("mass")]
 
 
 def test_drawing_tells_bearings_seals_pedestals_planes_and_sensors_apart():

@@ -155,6 +155,22 @@ def test_overdetermined_recovery_weighs_by_the_errors():
     np.testing.assert_allclose(found.values, [2.0, 3.0], rtol=1e-8)
 
 
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_units_of_a_combination_change_nothing(unit):
+    """The first combination in other units, and its error with it: the same parameters."""
+    values, covariance = np.array([2.0, 3.0, 6.0002]), np.diag([1e-8, 4e-8, 1e-8])
+    inputs = system("xy", [[1, 0], [0, 1], [1, 1]], values, covariance)
+    plain, scale = recover(inputs), np.array([unit, 1.0, 1.0])
+    stated = covariance * np.outer(scale, scale)
+    other = recover(System(inputs.names, inputs.exponents, np.diag(scale), values * scale, stated))
+    np.testing.assert_allclose(other.values, plain.values, rtol=1e-9)
+    np.testing.assert_allclose(other.gain * scale, plain.gain, rtol=1e-6, atol=1e-9)
+    # by hand: the least squares of (x − 2)/1, (y − 3)/2, (x·y − 6.0002)/1, first order about x = 2, y = 3
+    J = np.array([[1.0, 0.0], [0.0, 0.5], [3.0, 2.0]])
+    first = np.linalg.lstsq(J, np.array([0.0, 0.0, 2e-4]), rcond=None)[0]
+    np.testing.assert_allclose(plain.values, [2 + first[0], 3 + first[1]], rtol=1e-8)
+
+
 def test_gain_is_the_derivative_of_the_recovery():
     names, monomials, values = "xyz", [[1, 0, 0], [1, 1, 0], [0, 1, 1]], np.array([2.0, 6.0, 15.0])
     found = recover(system(names, monomials, values))

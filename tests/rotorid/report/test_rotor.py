@@ -207,6 +207,9 @@ def test_stability_thresholds_of_both_models_are_shown():
     sheet = read_sheet(make("reduce unstable").html)
     assert {f"stability.{which}.threshold_rpm" for which in ("full", "small")} <= sheet.keys
     assert "Modal damping of the first modes: 1 % and 0.5 % of critical." in sheet.text
+    # what its shaft or bearings drive whirls forward, in both models
+    row = next(row for row in sheet.text.split("<tr>") if ">direction</td>" in row)
+    assert re.findall(r"<td[^>]*>([^<]*)</td>", row) == ["direction", "forward", "forward"]
 
 
 def test_shares_of_bearings_are_shown_where_they_were_taken_apart():

@@ -123,3 +123,15 @@ def test_gauss_newton_that_does_not_converge_gives_no_interval():
     assert not found.converged
     assert found.std is None
     assert "no intervals are given" in found.warnings[0]
+    # not for the reason that there are no more equations than parameters: there are
+    assert found.estimate.dof == 20
+    assert "no more equations" not in found.summary()
+
+
+def test_as_many_readings_as_parameters_give_no_interval_and_say_why():
+    model = ode_model({}, outputs={"y": "a+0*t"}, estimate={"a": 1.0})
+    found = fit(model, Record(np.array([1.0]), {"y": np.array([2.0])}))
+    assert found.values == pytest.approx([2.0])
+    assert found.estimate.dof == 0
+    assert found.std is None
+    assert "no intervals: no errors are stated and there are no more equations" in found.summary()

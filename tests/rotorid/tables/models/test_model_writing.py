@@ -132,6 +132,8 @@ def test_values_that_a_motion_does_not_take(tmp_path, three):
     path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, {}))
     with pytest.raises(ValueError, match="d_x8 is no parameter of the model"):
         read_motion(path, {"d_x8": 1.0})
+    with pytest.raises(ValueError, match=r"they are: d_x7, d_x12, d_x18$"):
+        read_motion(path, {"damping": 1.0})
     with pytest.raises(ValueError, match="d_x7 must be a finite number"):
         read_motion(path, {"d_x7": np.nan})
     states = saved(tmp_path, "s.toml", '[states]\nx = "-a*x"\n[initial]\nx = 1\n[estimate]\na = 1\n')
