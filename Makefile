@@ -32,11 +32,11 @@ demo: $(VENV)/.user
 	$(BIN)/rotorid demo demo
 
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 # Simulations with all their repetitions instead of 300.
 test-full: $(VENV)/.dev
-	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder
+	ROTORID_FULL_TEST=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile --no-loadscope-reorder
 
 # One-line defects drawn by SEED, N of them; does a test find each? MINUTES in all, on JOBS cores.
 SEED ?= 1

@@ -54,6 +54,8 @@ SLOW_FIRST = (
     "golden/test_models.py",
     "golden/test_rotor.py",
     "docs/test_docs.py",
+    "rotorid/report/test_browser.py",
+    "rotorid/report/test_balance.py",
     "rotorid/harmonic/test_coverage.py",
     "balancing/correction/test_coverage.py",
     "balancing/mounting/test_discrete.py",
@@ -62,14 +64,11 @@ SLOW_FIRST = (
 TESTS = Path(__file__).parent
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
-    """Slow files first, otherwise in the order of the files; a file is run by one worker."""
+    """Slow files first, otherwise in the order of the files."""
 
     def rank(item):
         name = item.path.relative_to(TESTS).as_posix()
         return SLOW_FIRST.index(name) if name in SLOW_FIRST else len(SLOW_FIRST)
 
     items.sort(key=rank)
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(item.path.relative_to(TESTS).as_posix()))

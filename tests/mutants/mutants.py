@@ -192,7 +192,7 @@ def trace(tree: Path, jobs: int) -> Suite:
     if not stored.is_file():
         folder = tree / "traces"
         folder.mkdir()
-        workers = ["-n", str(jobs), "--dist", "worksteal"]
+        workers = ["-n", str(jobs), "--dist", "loadfile"]
         code = pytest_in(tree, workers, 3600.0, MUTANTS_TRACE=str(folder))
         documents = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(folder.glob("*.json"))]
         if code not in (0, 1) or not documents:
