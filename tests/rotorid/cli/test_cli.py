@@ -193,18 +193,6 @@ def test_a_failing_command_leaves_an_old_picture_alone(cli, tmp_path):
     assert picture.read_bytes() == b"old"
 
 
-def test_demo_writes_the_job_and_says_where_the_pictures_are(cli, tmp_path):
-    outcome = cli("demo", tmp_path / "d")
-    assert outcome.code == 0, outcome.err
-    for name in ("modes.png", "reduction.png", "balance.png"):
-        assert (tmp_path / "d" / name).read_bytes().startswith(b"\x89PNG")
-        assert str(tmp_path / "d" / name) in outcome.out
-    assert "135.240" in outcome.out
-    assert "134.203 kg" in outcome.out
-    document = cli("demo", tmp_path / "d", "--json").json
-    assert document["balance"]["corrections"] == cli("balance", tmp_path / "d" / "turbo_job" / "job.toml", "--json").json["corrections"]  # fmt: skip  # noqa: E501
-
-
 def test_help_has_an_example_for_every_command(cli):
     listing = cli("--help").out
     for command in ("demo", "critical", "campbell", "response", "influence", "balance", "reduce", "identify"):

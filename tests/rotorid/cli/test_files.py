@@ -85,11 +85,11 @@ def test_a_disk_that_fails_leaves_nothing_and_names_the_users_file(cli, job, mon
 
 def test_demo_keeps_what_people_changed(cli, tmp_path):
     folder = tmp_path / "d"
-    assert cli("demo", folder).code == 0
-    assert cli("demo", folder).code == 0  # make demo, again
+    assert cli("demo", folder, "--sample", "holes").code == 0
+    assert cli("demo", folder, "--sample", "holes").code == 0  # make demo, again
     mine = folder / "turbo_job" / "job.toml"
     mine.write_text("mine", encoding="utf-8")
-    outcome = cli("demo", folder)
+    outcome = cli("demo", folder, "--sample", "holes")
     assert outcome.code == 2
     assert f"{mine}: differs from the sample and would be overwritten; delete it" in outcome.err
     assert mine.read_text(encoding="utf-8") == "mine"
