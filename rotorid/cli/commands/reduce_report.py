@@ -231,7 +231,8 @@ class Report:
             named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}
             savemat(stream, arrays | named)
         else:
-            np.savez(stream, **arrays)  # numpy before 2.1 would store allow_pickle= as an array
+            # numpy before 2.1 would store allow_pickle= as an array
+            np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
 
     def _motion(self) -> fem.Motion:
