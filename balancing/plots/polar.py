@@ -164,7 +164,7 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
         polar.plot([], [], marker=marker, color=colour, ls="none", label=sensor)
     polar.set_rlim(0, 1.15 * max(float(max(old.max(), new.max())), np.finfo(float).tiny))
     _quiet_radii(polar, old_phase, old)
-    polar.set_title(f"{rpm_text(c.speeds[speed])}", fontsize="medium")
+    polar.set_title(rpm_text(c.speeds[speed]), fontsize="medium")
     if legend:
         polar.legend(loc="upper right", bbox_to_anchor=(0.08, 1.12), fontsize="x-small", frameon=True)
     return polar

@@ -126,9 +126,9 @@ class ResponseCost:
                 "sensor": [label(sensor) for sensor in self.sensors for _ in self.nodes] * S,
                 "plane": list(self.nodes) * (S * C),
                 "full_m_per_kg_m": np.abs(self.full).ravel(),
-                "full_phase_deg": _phase(self.full).ravel(),
+                "full_phase_deg": phase_deg(self.full).ravel(),
                 "small_m_per_kg_m": np.abs(self.small).ravel(),
-                "small_phase_deg": _phase(self.small).ravel(),
+                "small_phase_deg": phase_deg(self.small).ravel(),
                 "relative_difference": self.relative_difference.ravel(),
                 "excluded": np.repeat(self.excluded, C * P),
             }
@@ -325,7 +325,3 @@ def _growing(small: SmallRotor, omega: FloatArray) -> list[str]:
 
 def _percent(part: float) -> str:
     return f"{100 * part:.2g} %" if part < 0.1 else f"{100 * part:.0f} %"
-
-
-def _phase(W: ComplexArray) -> FloatArray:
-    return np.asarray(phase_deg(W))
