@@ -5,12 +5,14 @@ outcome. `MUTANTS_RUN` is a file with the tests to run, one a line; the first th
 `MUTANTS_KILLER`.
 """
 
+import ast
+import builtins
 import json
 import os
 import resource
 import sys
-import threading
 from collections import defaultdict
+from importlib.machinery import PathFinder, SourceFileLoader
 from pathlib import Path
 
 import pytest
@@ -20,26 +22,75 @@ PACKAGES = ("fem", "balancing", "rotorid")
 MEMORY = 6 * 2**30
 
 
+class _Marks(ast.NodeTransformer):
+    """A call of `_ran_` at the beginning of every function, which tells its name."""
+
+    def __init__(self, path):
+        self.path, self.where, self.depth = path, [], 0
+
+    def visit_ClassDef(self, node):
+        self.where.append(node.name)
+        node.body = [self.visit(each) for each in node.body]
+        self.where.pop()
+        return node
+
+    def visit_FunctionDef(self, node):
+        before = list(self.where)
+        self.where += ["<locals>", node.name] if self.depth else [node.name]
+        self.depth += 1
+        body = [self.visit(each) for each in node.body]
+        place = 1 if ast.get_docstring(node, clean=False) is not None else 0
+        mark = ast.parse(f"_ran_({f'{self.path}::{chr(46).join(self.where)}'!r})").body[0]
+        for each in ast.walk(mark):
+            ast.copy_location(each, node.body[0])
+        node.body = [*body[:place], mark, *body[place:]]
+        self.depth -= 1
+        self.where = before
+        return node
+
+
+class _Loader(SourceFileLoader):
+    """Compiles a module with its marks, past the compiled files."""
+
+    def get_code(self, fullname):
+        path = Path(self.path)
+        tree = ast.parse(path.read_bytes())
+        marked = _Marks(path.relative_to(ROOT).as_posix()).visit(tree)
+        return compile(marked, self.path, "exec", dont_inherit=True)
+
+
+class _Finder:
+    """The product's modules get that loader."""
+
+    @staticmethod
+    def find_spec(fullname, path=None, target=None):
+        if fullname.partition(".")[0] not in PACKAGES:
+            return None
+        spec = PathFinder.find_spec(fullname, path, target)
+        if spec is not None and isinstance(spec.loader, SourceFileLoader):
+            spec.loader = _Loader(spec.loader.name, spec.loader.path)
+        return spec
+
+
 class Trace:
-    """Functions of the product that ran, by what asked for them: a test, a fixture or a test file."""
+    """Functions of the product that ran, by what asked for them: a test, a fixture or a test file.
+
+    The functions tell it themselves (`_Marks`): a trace of the interpreter sees every call of every library
+    and takes several times as long.
+    """
 
     def __init__(self, folder):
         self.folder = Path(folder)
-        self.codes = {}
         self.ran = defaultdict(set)
-        self.current = self.ran[""].add
+        self.current = self.ran[""]
         self.tests = {}
-        sys.settrace(self.call)
-        threading.settrace(self.call)
+        builtins._ran_ = self.mark
 
-    def call(self, frame, event, arg):
-        code = frame.f_code
-        self.codes.setdefault(id(code), code)
-        self.current(id(code))
+    def mark(self, name):
+        self.current.add(name)
 
     def within(self, context):
-        before, self.current = self.current, self.ran[context].add
-        sys.settrace(self.call)
+        before, self.current = self.current, self.ran[context]
         return before
 
     @pytest.hookimpl(wrapper=True)
@@ -77,19 +128,10 @@ class Trace:
                 self.tests[report.nodeid]["outcome"] = report.outcome
 
     def pytest_sessionfinish(self, session):
-        sys.settrace(None)
-        names, number = {}, {}
-        for key, code in self.codes.items():
-            path = Path(code.co_filename)
-            if path.is_relative_to(ROOT) and path.relative_to(ROOT).parts[0] in PACKAGES:
-                name = f"{path.relative_to(ROOT).as_posix()}::{code.co_qualname}"
-                number[key] = names.setdefault(name, len(names))
-        ran = {
-            context: sorted({number[key] for key in keys if key in number})
-            for context, keys in self.ran.items()
-        }
+        number = {name: n for n, name in enumerate(sorted(set().union(*self.ran.values())))}
+        ran = {context: sorted(number[name] for name in names) for context, names in self.ran.items()}
         worker = os.environ.get("PYTEST_XDIST_WORKER", "main")
-        document = {"functions": list(names), "ran": ran, "tests": self.tests}
+        document = {"functions": list(number), "ran": ran, "tests": self.tests}
         (self.folder / f"{worker}.json").write_text(json.dumps(document), encoding="utf-8")
 
 
@@ -118,9 +160,6 @@ class Chosen:
 
 
 def pytest_configure(config):
-    import fem
-
-    assert Path(fem.__file__).is_relative_to(ROOT), f"tests of another tree: {fem.__file__}"
     controller = config.pluginmanager.hasplugin("dsession")
     if os.environ.get("MUTANTS_TRACE") and not controller:
         config.pluginmanager.register(Trace(os.environ["MUTANTS_TRACE"]), "mutants-trace")
@@ -128,3 +167,13 @@ def pytest_configure(config):
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         chosen = Chosen(os.environ["MUTANTS_RUN"], os.environ["MUTANTS_KILLER"])
         config.pluginmanager.register(chosen, "mutants-chosen")
+    import fem
+
+    assert Path(fem.__file__).is_relative_to(ROOT), f"tests of another tree: {fem.__file__}"
+
+
+# a plugin is imported before the conftest that imports the product
+if os.environ.get("MUTANTS_TRACE"):
+    assert not any(name.partition(".")[0] in PACKAGES for name in sys.modules)
+    builtins._ran_ = len  # whatever runs before the trace begins
+    sys.meta_path.insert(0, _Finder)
