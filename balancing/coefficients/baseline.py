@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
+from balancing.coefficients.run_errors import influence_vector, marginal, run_columns
 from balancing.data.conventions import Labels
-from balancing.data.errors import ErrorModel, error_model, mean_covariance, reading_covariance
+from balancing.data.errors import ErrorModel, error_model, mean_covariance, reading_covariance, symmetric
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.base.units import RPM, rpm_text
@@ -25,7 +26,8 @@ class Start(NamedTuple):
     """What `correct` starts from.
 
     Y₀ (S, C), the covariance of (Y₀, W) per channel or None, errors of a reading, words for the user, how to
-    print, and what is mounted: run, planes, weights (None: nothing).
+    print, what is mounted: run, planes, weights (None: nothing), and what of the errors the channels have in
+    common (as `Influence.common`).
     """
 
     readings: ComplexArray
@@ -34,6 +36,14 @@ class Start(NamedTuple):
     warnings: tuple[str, ...]
     labels: Labels
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
+    common: ComplexArray | None = None
+
+    @property
+    def own(self) -> FloatArray | None:
+        """The covariance without what the channels have in common."""
+        if self.covariance is None or self.common is None:
+            return self.covariance
+        return symmetric(self.covariance - marginal(self.common))
 
 
 def match_speeds(wanted: ArrayLike, known: FloatArray, what: str = "coefficients") -> list[int]:
@@ -64,7 +74,7 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
     ValueError
         Without any baseline; for planes, sensors or speeds that do not fit.
     """
-    known = ErrorModel(influence.errors, influence.dof, influence.error_source)
+    known = ErrorModel(influence.errors, influence.reading_dof, influence.error_source)
     if baseline is None:
         if influence.baseline is None:
             raise ValueError(
@@ -72,7 +82,13 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
                 "give the readings of a baseline run"
             )
         return Start(
-            influence.baseline, influence.covariance, known, (), influence.labels, _last_run(influence)
+            influence.baseline,
+            influence.covariance,
+            known,
+            (),
+            influence.labels,
+            _last_run(influence),
+            influence.common,
         )
     if isinstance(baseline, Trials):
         return _from_runs(influence, baseline, known)
@@ -84,9 +100,8 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
     if known.errors is None:
         return Start(readings, None, known, (), influence.labels, None)
     variance = reading_covariance(readings, known.errors)
-    return _with_coefficients(
-        influence, readings, variance, np.zeros(len(influence.planes), dtype=complex), known
-    )
+    nothing = np.zeros(len(influence.planes), dtype=complex)
+    return _with_coefficients(influence, readings, readings[None], variance, nothing, known)
 
 
 def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start:
@@ -97,8 +112,8 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
     mean = mounted.mean(axis=0)
     readings = trials.mean[pick].mean(axis=0) - influence.W @ mean
     own = error_model(trials)
-    notes = trials.warnings + _disagreement(influence, trials, mounted, pick, own if own.errors else known)
-    model = own if own.errors is not None else known
+    model = known if own.source == "assumed" and known.errors is not None else own
+    notes = trials.warnings + _disagreement(influence, trials, mounted, pick, model)
     if model.errors is None:
         return Start(
             readings,
@@ -109,7 +124,7 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
             _mounted_last(influence, trials, mounted),
         )
     variance = mean_covariance(trials, model.errors)[pick].mean(axis=0) / len(trials.runs)
-    start = _with_coefficients(influence, readings, variance, mean, _joined(model, known))
+    start = _with_coefficients(influence, readings, trials.mean[pick], variance, mean, _joined(model, known))
     return start._replace(
         labels=trials.labels,
         mounted=_mounted_last(influence, trials, mounted),
@@ -189,11 +204,12 @@ def _mounted_weights(influence: Influence, trials: Trials) -> ComplexArray:
 def _with_coefficients(
     influence: Influence,
     readings: ComplexArray,
+    runs: ComplexArray,
     variance: FloatArray,
     mounted: ComplexArray,
     model: ErrorModel,
 ) -> Start:
-    """Covariance of (Y₀, W) per channel where Y₀ is a reading less the effect of what was mounted."""
+    """Covariance of (Y₀, W) per channel where Y₀ is the mean of runs (R, S, C) less what was mounted does."""
     S, C, P = influence.W.shape
     covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
     warnings = model.warnings
@@ -208,8 +224,18 @@ def _with_coefficients(
         change[:2, :2] = 0.0
         change[:2, 2:] = -effect
         covariance = change @ influence.covariance @ change.T
-    covariance[..., :2, :2] += variance
-    return Start(readings, covariance, model, warnings, influence.labels, None)
+    columns = run_columns(influence.run_errors, runs, influence_vector(influence.W))
+    R = len(runs)
+    further = columns.common.reshape(2, -1, S, C) / R
+    covariance[..., :2, :2] += variance + (columns.own.sum(axis=0) / R**2)[..., None, None] * np.eye(2)
+    common = np.zeros((2, further.shape[1], S, C, P + 1), dtype=complex)
+    common[..., 0] = further
+    covariance += marginal(common)
+    if influence.common is not None:
+        before = influence.common.copy()
+        before[..., 0] = -before[..., 1:] @ mounted
+        common = np.concatenate((before, common), axis=1)
+    return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common)
 
 
 def _joined(model: ErrorModel, known: ErrorModel) -> ErrorModel:

@@ -6,7 +6,7 @@ are all the same relation; nothing needs a special case. Source: [S] (34)–(39)
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +14,21 @@ from numpy.typing import NDArray
 
 from balancing.coefficients.identifiability import UndeterminedError, check_runs, refusal
 from balancing.coefficients.repeatability import describe, differences
+from balancing.coefficients.run_errors import ASSUMED as ASSUMED_RUN
+from balancing.coefficients.run_errors import (
+    EXPLAINED,
+    RunColumns,
+    RunErrors,
+    corrected_row,
+    estimated,
+    given,
+    influence_vector,
+    marginal,
+    run_columns,
+    scatter,
+    shares_of,
+    spare_rows,
+)
 from balancing.coefficients.significance import check_consistency, check_effects, weak_trials
 from balancing.data.conventions import Labels
 from balancing.data.errors import EQUAL, ErrorModel, Source, error_model, mean_covariance, symmetric
@@ -42,17 +57,28 @@ class Influence:
         Readings of the bare rotor, all weights of the runs removed, shape (S, C); None: stored coefficients.
     covariance
         Of (Re Y₀, Im Y₀, Re W₁, Im W₁, …) of each channel, shape (S, C, 2P + 2, 2P + 2); None: unknown.
-        Errors of different channels are independent.
+    common
+        What of it the channels have in common: (Y₀, W₁, …) errs by the sum of these columns, each times an
+        independent complex number of variance 1 in both directions; [0] a number for each column, [1] one
+        for each speed and column. Shape (2, M, S, C, P + 1).
     dof
-        Degrees of freedom of the errors; None for stated ones.
+        Degrees of freedom of the covariance; None for stated errors.
+    reading_dof
+        Degrees of freedom of the errors of a reading.
+    own_between
+        Share of what changes from run to run in the variance that is not common.
     errors
         Errors of a single reading that `covariance` is made of, and that further readings have.
     error_source
         Where the errors come from.
+    run_errors
+        What changes from run to run, also in further runs.
     labels
         Units and conventions to print results in.
     warnings
         What the user should know.
+    notes
+        What the user may want to know.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
     """
@@ -63,13 +89,18 @@ class Influence:
     W: ComplexArray
     baseline: ComplexArray | None = None
     covariance: FloatArray | None = None
-    dof: int | None = None
+    dof: float | None = None
     errors: ReadingErrors | None = None
     error_source: Source = "unknown"
     labels: Labels = field(default_factory=Labels)
     warnings: tuple[str, ...] = ()
     last_run: str | None = None
     last_weights: ComplexArray | None = None
+    common: ComplexArray | None = None
+    run_errors: RunErrors = field(default_factory=RunErrors)
+    reading_dof: float | None = None
+    own_between: float = 0.0
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -80,6 +111,8 @@ class Influence:
         self._frozen("baseline", (S, C), complex)
         self._frozen("covariance", (S, C, 2 * P + 2, 2 * P + 2), float)
         self._frozen("last_weights", (P,), complex)
+        if self.common is not None:
+            self._frozen("common", (2, np.shape(self.common)[1], S, C, P + 1), complex)
 
     def _frozen(self, name: str, shape: tuple[int, ...], kind: type) -> None:
         value = getattr(self, name)
@@ -160,24 +193,27 @@ def estimate_influence(trials: Trials) -> Influence:
     repeated = describe(differences(trials, model))
     A = np.column_stack((np.ones(R), trials.weights)).astype(complex)
     Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
-    G = np.broadcast_to(gain(A), (*Y.shape[:2], P + 1, R))
-    if model.errors is None and R > P + 1:
-        model = _errors_from_residuals(A, G, Y, model)
-    elif model.errors is not None and R > P + 1:
-        G = _weighted_gain(A, mean_covariance(trials, model.errors))
+    merged = model.source == "assumed" and R > P + 1  # the runs themselves tell all errors in one
+    reading = mean_covariance(trials, None if merged else model.errors)
+    theta = np.einsum("scpr,scr->scp", _gain(A, reading, trials.mean, RunErrors()), Y)
+    run = _between_runs(trials, A, theta, reading, model)
+    if merged:
+        model, run = _as_readings(run, trials, model)
+        reading = mean_covariance(trials, model.errors)
+    G = _gain(A, reading, trials.mean, run)
     theta = np.einsum("scpr,scr->scp", G, Y)
     # a rotor at rest is at rest: what is left of its readings is rounding
     theta[..., 0][np.abs(theta[..., 0]) < EQUAL * np.abs(Y).max(axis=-1)] = 0.0
-    covariance = None
-    if model.errors is not None:
-        covariance = _channel_covariance(G, mean_covariance(trials, model.errors))
+    covariance, common, dof, own_between = joint_covariance(
+        G, reading, run_columns(run, trials.mean, influence_vector(theta[..., 1:])), run, model
+    )
     try:
-        check_effects(trials, theta[..., 1:], covariance)
+        check_effects(trials, theta[..., 1:], covariance if known(model) else _digits(trials, G))
     except UndeterminedError as error:
         raise refusal(str(error), trials.warnings + repeated) from error
-    warnings = trials.warnings + repeated + model.warnings + weak_trials(trials, theta[..., 1:])
-    if model.errors is not None and model.source == "stated" and R > P + 1:
-        warnings += check_consistency(trials, A, theta, mean_covariance(trials, model.errors))
+    warnings = trials.warnings + repeated + model.warnings
+    if model.source == "stated" and R > P + 1:
+        warnings += check_consistency(trials, A, reading, run, influence_vector(theta[..., 1:]))
     return Influence(
         speeds=trials.speeds,
         sensors=trials.sensors,
@@ -185,20 +221,117 @@ def estimate_influence(trials: Trials) -> Influence:
         W=theta[..., 1:],
         baseline=theta[..., 0],
         covariance=covariance,
-        dof=model.dof,
+        dof=dof,
         errors=model.errors,
         error_source=model.source,
         labels=trials.labels,
         warnings=warnings,
         last_run=trials.runs[-1],
         last_weights=trials.weights[-1],
+        common=common,
+        run_errors=run,
+        reading_dof=model.dof,
+        own_between=own_between,
+        notes=weak_trials(trials, theta[..., 1:]) + unseen(run),
     )
 
 
-def _weighted_gain(A: ComplexArray, covariance: FloatArray) -> ComplexArray:
-    """Gain (S, C, P + 1, R) with rows weighted by the mean variance of both directions, (R, S, C, 2, 2)."""
-    variance = np.moveaxis(np.trace(covariance, axis1=-2, axis2=-1) / 2, 0, -1)
+def unseen(run: RunErrors) -> tuple[str, ...]:
+    """Note that nothing measures the errors between runs."""
+    if run.origin not in ("assumed", "none"):
+        return ()
+    taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
+    return (
+        f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: repeated readings "
+        "do not show them; one more baseline run at the end, or one more trial run, would measure them",
+    )
+
+
+def known(model: ErrorModel) -> bool:
+    """Whether something was stated or measured: only that may refuse a job."""
+    return model.errors is not None and model.source != "assumed"
+
+
+def _digits(trials: Trials, G: ComplexArray) -> FloatArray | None:
+    """Covariance of the coefficients by the digits of the readings alone; None where they have no end."""
+    rounding = mean_covariance(trials, None)
+    return _channel_covariance(G, rounding) if rounding.any() else None
+
+
+def _between_runs(
+    trials: Trials, A: ComplexArray, theta: ComplexArray, reading: FloatArray, model: ErrorModel
+) -> RunErrors:
+    """Errors between runs: stated, estimated from redundant runs, assumed, or none beside stated errors."""
+    one_direction = np.trace(reading, axis1=-2, axis2=-1) / 2
+    Y, pattern = trials.mean, influence_vector(theta[..., 1:])
+    spare = spare_rows(A, Y, one_direction)
+    rows = (spare, *corrected_row(A, Y, one_direction, theta))
+    stated = trials.run_errors
+    if stated is not None and (spare.dof == 0 or scatter([spare], Y, pattern, *stated)[1] > 1 - EXPLAINED):
+        return given(rows, Y, pattern, *stated, "stated")
+    if spare.dof:
+        return estimated(rows, Y, pattern)
+    if model.source == "stated":
+        return RunErrors()
+    return given(rows, Y, pattern, ASSUMED_RUN, 0.0, "assumed")
+
+
+def _as_readings(run: RunErrors, trials: Trials, model: ErrorModel) -> tuple[ErrorModel, RunErrors]:
+    """What each reading has of its own between runs read once cannot be told from its own error."""
+    p, f = float(run.relative[0]), float(run.floor[0])
+    if max(p * np.abs(trials.mean).max(), f) < EQUAL * np.abs(trials.mean).max():
+        words = "the runs agree to the last digit: they say nothing about the errors of the readings"
+        return replace(model, warnings=(*model.warnings, words)), RunErrors()
+    rest = np.array([0.0, 1.0, 1.0])
+    return (
+        ErrorModel(ReadingErrors(p, p, f), None, "residuals", model.warnings),
+        replace(run, relative=run.relative * rest, floor=run.floor * rest, merged=True),
+    )
+
+
+def joint_covariance(
+    G: ComplexArray, reading: FloatArray, columns: RunColumns, run: RunErrors, model: ErrorModel
+) -> tuple[FloatArray, ComplexArray, float | None, float]:
+    """Covariance of (Y₀, W), what of it the channels have in common, its degrees of freedom, `own_between`.
+
+    Parameters
+    ----------
+    G
+        (Y₀, W₁, …) = G Y, shape (S, C, P + 1, R).
+    reading
+        Covariance of the mean readings, (R, S, C, 2, 2).
+    columns
+        Errors between the runs.
+    run, model
+        Where the two come from.
+    """
+    own = reading + columns.own[..., None, None] * np.eye(2)
+    common = np.einsum("scpr,krmsc->krmscp", G, columns.common).reshape(2, -1, *G.shape[:2], G.shape[2])
+    parts = _channel_covariance(G, reading), _channel_covariance(G, own) - _channel_covariance(G, reading)
+    each = [*parts, *(marginal(common[[kind]]) for kind in (1, 0))]
+    total = sum(each[1:], each[0])
+    shares = shares_of(each, total)
+    own_between = float(shares[1] / (shares[0] + shares[1])) if shares[:2].any() else 0.0
+    return symmetric(total), common, run.degrees(shares, 2, model.dof)[1], own_between
+
+
+def _gain(A: ComplexArray, reading: FloatArray, Y: ComplexArray, run: RunErrors) -> ComplexArray:
+    """(Y₀, W₁, …) = G Y, (S, C, P + 1, R), with rows weighted by the mean variance of both directions.
+
+    Parameters
+    ----------
+    reading
+        Covariances by the errors of the readings, (R, S, C, 2, 2).
+    Y
+        Readings, (R, S, C).
+    """
+    R, n = A.shape
+    variance = np.trace(reading, axis1=-2, axis2=-1) / 2
+    variance += np.sum(run.relative**2) * np.abs(Y) ** 2 + np.sum(run.floor**2)
+    variance = np.moveaxis(variance, 0, -1)
     largest = variance.max(axis=-1, keepdims=True)
+    if n == R or not largest.any():
+        return np.broadcast_to(gain(A), (*Y.shape[1:], n, R))
     # a reading near zero would otherwise count infinitely much
     variance = np.where(largest > 0, np.maximum(variance, 1e-4 * largest), 1.0)
     root = 1 / np.sqrt(variance)
@@ -215,27 +348,3 @@ def _channel_covariance(G: ComplexArray, covariance: FloatArray) -> FloatArray:
     B = B.reshape(S, C, 2 * n, R, 2)
     left = np.einsum("scark,rsckl->scarl", B, covariance).reshape(S, C, 2 * n, 2 * R)
     return symmetric(left @ np.swapaxes(B.reshape(S, C, 2 * n, 2 * R), -1, -2))
-
-
-def _errors_from_residuals(
-    A: ComplexArray, G: ComplexArray, Y: ComplexArray, model: ErrorModel
-) -> ErrorModel:
-    """One relative error, alike in both directions, from the residuals of all channels.
-
-    Each channel counts in proportion to its own mean square reading, so that the resonance does not decide
-    alone; the estimate is unbiased for errors proportional to the readings.
-    """
-    R, n = A.shape
-    size = np.mean(np.abs(Y) ** 2, axis=-1)
-    used = size > 0
-    if not used.any():
-        return model
-    M = np.eye(R) - A @ G[0, 0]
-    found = np.sum(np.abs(np.einsum("qr,scr->scq", M, Y)) ** 2, axis=-1)
-    expected = 2 * np.einsum("qr,scr->sc", np.abs(M) ** 2, np.abs(Y) ** 2)
-    relative = float(np.sqrt(np.sum(found[used] / size[used]) / np.sum(expected[used] / size[used])))
-    if relative < EQUAL:
-        words = "the runs agree to the last digit: they say nothing about the errors of the readings"
-        return ErrorModel(warnings=(*model.warnings, words))
-    dof = 2 * int(np.count_nonzero(used)) * (R - n)
-    return ErrorModel(ReadingErrors(relative, relative), dof, "residuals", model.warnings)

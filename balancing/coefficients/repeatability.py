@@ -14,8 +14,10 @@ from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 LEVEL = 0.99
-NOTICEABLE_AMPLITUDE, NOTICEABLE_PHASE = 0.10, np.deg2rad(10)
-"""Without known errors, readings of one state of the rotor that differ by more deserve a question."""
+NOTICEABLE_AMPLITUDE, NOTICEABLE = 0.10, 0.20
+"""Readings of one state of the rotor that differ by more deserve a question, where errors are not tested."""
+CLEAR = 3.0
+"""Standard deviations that it must be as well."""
 
 
 class Difference(NamedTuple):
@@ -43,17 +45,17 @@ def differences(trials: Trials, model: ErrorModel, largest: bool = False) -> lis
     trials
         The runs.
     model
-        Errors of a reading: where they are known, a χ² test (F where they are estimated) at 99 %.
+        Errors of a reading: where they are stated, and none between runs, a χ² test at 99 %.
     largest
-        Without known errors: compare with the largest reading of all (10 %), instead of each with its own
-        (10 % of its amplitude or 10°, for readings of at least a tenth of the group's largest at a speed).
+        Else: one reading counts that changes by 10 % of the largest of all, instead of all together (20 %).
     """
     found = []
+    tested = model.source == "stated" and trials.run_errors is None
     for group in same_state(trials.weights):
         pair = (
             _beyond_errors(trials, group, model)
-            if model.errors is not None
-            else _noticeable(trials, group, largest=largest)
+            if tested
+            else _noticeable(trials, group, model, largest=largest)
         )
         if pair is not None:
             found.append(pair)
@@ -69,9 +71,13 @@ def describe(found: Sequence[Difference]) -> tuple[str, ...]:
     )
 
 
-def _noticeable(trials: Trials, group: list[int], *, largest: bool) -> Difference | None:
+def _noticeable(trials: Trials, group: list[int], model: ErrorModel, *, largest: bool) -> Difference | None:
     Y = trials.mean
     worst, pair = 0.0, None
+    relative, floor = trials.run_errors or (0.0, 0.0)
+    variance = (relative * np.abs(Y)) ** 2 + floor**2
+    if model.errors is not None:
+        variance += np.trace(reading_covariance(Y, model.errors), axis1=-2, axis2=-1) / 2
     top = np.abs(Y).max() if largest else np.abs(Y[group]).max(axis=(0, 2))[:, None]
     for k, a in enumerate(group):
         for b in group[k + 1 :]:
@@ -82,9 +88,9 @@ def _noticeable(trials: Trials, group: list[int], *, largest: bool) -> Differenc
                 counts = share > NOTICEABLE_AMPLITUDE
             else:
                 share = change / np.where(larger > 0, larger, 1.0)
-                amplitude = np.abs(np.abs(Y[a]) - np.abs(Y[b])) > NOTICEABLE_AMPLITUDE * larger
-                phase = np.abs(np.angle(Y[a] * np.conj(Y[b]))) > NOTICEABLE_PHASE
-                counts = (amplitude | phase) & (larger > 0.1 * top)
+                whole = np.sqrt(np.sum(change**2) / (np.sum(larger**2) or 1.0))
+                counts = (larger > 0.1 * top) & (whole > NOTICEABLE)
+            counts &= change > CLEAR * np.sqrt(variance[a] + variance[b])
             if counts.any() and share[counts].max() > worst:
                 worst, pair = float(share[counts].max()), (a, b)
     if pair is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.run_errors import RunErrors, scatter, spare_rows
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
@@ -103,9 +104,9 @@ def weak_trials(trials: Trials, W: ComplexArray) -> tuple[str, ...]:
 
 
 def check_consistency(
-    trials: Trials, A: ComplexArray, theta: ComplexArray, covariance: FloatArray
+    trials: Trials, A: ComplexArray, reading: FloatArray, run: RunErrors, pattern: ComplexArray
 ) -> tuple[str, ...]:
-    """Warn where runs disagree with each other by more than the stated errors explain (χ², 99 %).
+    """Warn where runs disagree with each other by more than the stated errors explain (95 %).
 
     Parameters
     ----------
@@ -113,22 +114,23 @@ def check_consistency(
         The runs, more than baseline and planes need.
     A
         (1 T), shape (R, P + 1).
-    theta
-        (Y₀, W₁, …), shape (S, C, P + 1).
-    covariance
-        Of the mean readings, shape (R, S, C, 2, 2).
+    reading
+        Covariance of the mean readings by their errors, shape (R, S, C, 2, 2).
+    run
+        Errors between runs: those that are stated explain, those that were estimated only widen.
+    pattern
+        `influence_vector`.
     """
-    residual = trials.mean - np.einsum("rp,scp->rsc", A, theta)
-    variance = np.trace(covariance, axis1=-2, axis2=-1) / 2
-    known = variance > 0
-    R, n = A.shape
-    dof = 2 * (R - n) * int(np.count_nonzero(known.any(axis=0)))
-    chi_square = float(np.sum(np.abs(residual[known]) ** 2 / variance[known]))
-    if dof == 0 or _tail(chi_square, dof) > 0.01:
+    spare = spare_rows(A, trials.mean, np.trace(reading, axis1=-2, axis2=-1) / 2)
+    stated = trials.run_errors or (0.0, 0.0)
+    ratio, chance = scatter([spare], trials.mean, pattern, *stated)
+    if chance > 1 - LEVEL:
         return ()
-    worst = np.sum(np.abs(residual) ** 2 / np.where(known, variance, np.inf), axis=(1, 2))
+    fit = np.linalg.lstsq(A, trials.mean.reshape(len(A), -1), rcond=None)[0]
+    residual = np.abs(trials.mean.reshape(len(A), -1) - A @ fit) ** 2
+    worst = np.sum(residual / np.mean(np.abs(trials.mean) ** 2, axis=0).ravel(), axis=1)
     return (
-        f"the runs disagree by {np.sqrt(chi_square / dof):.2g} times the stated errors, most of all in run "
+        f"the runs disagree by {ratio:.2g} times the stated errors, most of all in run "
         f"{trials.runs[int(np.argmax(worst))]!r}: the rotor does not repeat itself or is not linear, "
         "or the errors are larger than stated",
     )

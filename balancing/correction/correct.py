@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import check_planes, check_resolution
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_errors import RunErrors, chance_of_more, shares_of
 from balancing.correction.choice import coefficients_of, plane_indices, rows_of
 from balancing.correction.correction_warnings import (
     EMPTY,
@@ -20,17 +21,19 @@ from balancing.correction.correction_warnings import (
     binding,
     cautions,
     left_out,
+    notes,
     reading_names,
     weight_words,
 )
 from balancing.correction.region_coverage import optimism
 from balancing.data.conventions import Labels
-from balancing.data.errors import Source, reading_covariance
+from balancing.data.errors import Source, reading_covariance, symmetric
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.solvers.conditioning import conditioning
+from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
-from balancing.solvers.methods import Stack, fit_weights
+from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
 
@@ -61,6 +64,8 @@ class Correction:
         Degrees of freedom of the errors; None for stated ones.
     errors, error_source
         Of a single reading, and where they come from.
+    run_errors
+        What changes from run to run.
     condition_number
         Of the stacked, column-scaled W.
     rank
@@ -72,7 +77,11 @@ class Correction:
     labels
         Units and conventions to print in.
     warnings
-        What the user should know.
+        What changes what a person does.
+    notes
+        What the user may want to know.
+    explained
+        Of the method "weighted": whether errors alone explain what the weights leave.
     singular_values
         Of the stacked, column-scaled W, largest first.
     gap
@@ -93,15 +102,18 @@ class Correction:
     after: ComplexArray
     covariance: FloatArray | None
     after_covariance: FloatArray | None
-    dof: int | None
+    dof: float | None
     errors: ReadingErrors | None
     error_source: Source
+    run_errors: RunErrors
     condition_number: float
     rank: int
     method: str
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
     labels: Labels
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    explained: bool
     singular_values: FloatArray
     gap: float | None = None
     chi_square: float | None = None
@@ -230,7 +242,7 @@ def correct(  # noqa: PLR0913
     speeds: ArrayLike | None = None,
     *,
     refuse: bool = True,
-    method: str = "least-squares",
+    method: str | None = None,
     limits: Limits | None = None,
     row_weights: ArrayLike | None = None,
     strength: float | str | None = None,
@@ -254,8 +266,9 @@ def correct(  # noqa: PLR0913
         Whether to refuse planes that the measured coefficients tell apart only by their errors; else that is
         a warning. Planes that act alike exactly are always refused.
     method
-        "least-squares"; "weighted": each reading counts by the inverse of its error, that of the coefficients
-        included (`balancing.solvers.effective_variance`); "minmax": the smallest largest amplitude.
+        "weighted": each reading counts by the inverse of its error, that of the coefficients included
+        (`balancing.solvers.effective_variance`); the default where errors are known, without ridge and
+        truncation. "least-squares"; "minmax": the smallest largest amplitude.
     limits
         Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
         influence coefficients.
@@ -295,6 +308,8 @@ def correct(  # noqa: PLR0913
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
     soft = strength is not None or keep is not None
+    if method is None:
+        method = "weighted" if start.covariance is not None and not soft else "least-squares"
     unclear: tuple[str, ...] = ()
     unclear_regions: tuple[str, ...] = ()
     if not soft:
@@ -308,7 +323,11 @@ def correct(  # noqa: PLR0913
     errors, channels = start.model.errors, None
     if start.covariance is not None and errors is not None:
         index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
-        channels = start.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
+        own, n = start.own, len(index)
+        assert own is not None
+        channels = own[used][..., index[:, None], index].reshape(-1, n, n)
+        total = start.covariance[used][..., index[:, None], index].reshape(-1, n, n)
+    common = None if start.common is None else start.common[:, :, used][..., [0, *(1 + p for p in chosen)]]
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
@@ -320,16 +339,21 @@ def correct(  # noqa: PLR0913
         reading_names(influence.sensors, influence.speeds[used]),
         partial(amplitude_words, start.labels),
         partial(weight_words, start.labels),
+        common,
+        None if channels is None else partial(_explained, influence, W, Y, channels, common),
     )
     fitted = fit_weights(stack, method, strength=strength, keep=keep)
     D = fitted.weights
     if stack.limits is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
-    after_covariance = None
+    after_covariance, covariance, dof, run = None, fitted.covariance, start.model.dof, influence.run_errors
+    if covariance is not None and fitted.parts:
+        scale, dof = run.degrees(_shares(influence, fitted), len(covariance), start.model.dof)
+        covariance = covariance * scale
     if channels is not None and errors is not None:
-        own = reading_covariance(after, errors)
-        after_covariance = own + prediction_covariance(D, channels).reshape(own.shape)
+        single = reading_covariance(after, errors) + run.variance(after)[..., None, None] * np.eye(2)
+        after_covariance = single + prediction_covariance(D, total).reshape(single.shape)
     result = Correction(
         speeds=influence.speeds[used],
         sensors=influence.sensors,
@@ -337,17 +361,20 @@ def correct(  # noqa: PLR0913
         weights=D,
         before=Y,
         after=after,
-        covariance=fitted.covariance,
+        covariance=covariance,
         after_covariance=after_covariance,
-        dof=start.model.dof,
+        dof=dof,
         errors=errors,
         error_source=start.model.source,
+        run_errors=run,
         condition_number=planes_told.condition_number,
         rank=planes_told.rank,
         method=method if not soft else "ridge" if strength is not None else "truncated",
         mounted=start.mounted,
         labels=start.labels,
         warnings=(),
+        notes=(),
+        explained=fitted.explained,
         singular_values=planes_told.singular_values,
         gap=fitted.gap,
         chi_square=fitted.chi_square,
@@ -359,21 +386,44 @@ def correct(  # noqa: PLR0913
     warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
     warnings += cautions(result, W, alike=not unclear)
     warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
-    return _with_warnings(result, warnings)
+    return _with_words(result, warnings, influence.notes + notes(result))
 
 
-def region_radius(dof: int | None) -> float:
+def _explained(
+    influence: Influence,
+    W: ComplexArray,
+    Y: ComplexArray,
+    channels: FloatArray,
+    common: ComplexArray | None,
+    D: ComplexArray,
+) -> bool:
+    """Whether errors explain what weights leave (95 %)."""
+    own = np.trace(prediction_covariance(D, channels), axis1=1, axis2=2).reshape(Y.shape) / 2
+    shared = None if common is None else common @ np.concatenate(([1.0], D))
+    residual, free = Y + (W @ D).reshape(Y.shape), W.reshape(*Y.shape, -1)
+    chance = chance_of_more(influence.run_errors, residual, own, influence.own_between, shared, free)
+    return chance > 1 - UNEXPLAINED
+
+
+def _shares(influence: Influence, fitted: Fitted) -> FloatArray:
+    """Of the readings' own errors and the three kinds between runs in the covariance of the weights."""
+    own, speed, run = shares_of(fitted.parts, symmetric(sum(fitted.parts[1:], fitted.parts[0])))
+    between = influence.own_between
+    return np.array([own * (1 - between), own * between, speed, run])
+
+
+def region_radius(dof: float | None) -> float:
     """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
     from scipy.special import chdtri, fdtri
 
     return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
 
 
-def _with_warnings(result: Correction, warnings: tuple[str, ...]) -> Correction:
+def _with_words(result: Correction, warnings: tuple[str, ...], notes: tuple[str, ...]) -> Correction:
     from dataclasses import replace
 
     for name in ("weights", "before", "after", "covariance", "after_covariance"):
         array = getattr(result, name)
         if array is not None:
             array.flags.writeable = False
-    return replace(result, warnings=warnings)
+    return replace(result, warnings=warnings, notes=notes)

@@ -25,8 +25,6 @@ EMPTY = 1e-7
 _RISES_NAMED = 3
 _TOUCHES = 2e-3
 """Relative distance below which a limit with a price is touched (the solver stays a little inside)."""
-POOR = 1e-3
-"""Probability of χ² below which weights in the planes do not explain the vibration."""
 
 
 def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
@@ -95,14 +93,7 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
         for p, nothing in zip(result.planes, empty, strict=True)
         if nothing
     ]
-    std = result.angle_std
-    if std is not None:
-        out += [
-            f"the weight in plane {p!r} lies within its own error: its angle is not determined"
-            for p, s, nothing in zip(result.planes, std, empty, strict=True)
-            if np.isnan(s) and not nothing
-        ]
-    if result.chi_square is not None and result.fit_dof and _chance(result) < POOR:
+    if result.chi_square is not None and result.fit_dof and not result.explained:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
@@ -110,7 +101,28 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
             "not linear) is likely, and the errors of the weights allow for it; if the readings have larger "
             f"errors than stated instead, those of the weights are up to {ratio:.2g} times larger"
         )
-    return tuple(out) + _rises(result.speeds, result.sensors, result.before, result.after, result.labels, "")
+    if np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
+        out += _rises(result)
+    return tuple(out)
+
+
+def notes(result: Correction) -> tuple[str, ...]:
+    """Weights within their errors, readings that rise but stay below the largest one today."""
+    out = []
+    std = result.angle_std
+    if std is not None:
+        out += [
+            f"the weight in plane {p!r} lies within its own error: its angle is not determined"
+            for p, s, weight in zip(result.planes, std, result.weights, strict=True)
+            if np.isnan(s) and weight
+        ]
+    if np.abs(result.after).max() <= np.abs(result.before).max() * (1 + 1e-6):
+        out += _rises(result)
+    return tuple(out)
+
+
+def _rises(result: Correction) -> tuple[str, ...]:
+    return _rising(result.speeds, result.sensors, result.before, result.after, result.labels, "")
 
 
 def left_out(
@@ -125,7 +137,7 @@ def left_out(
     """Readings at speeds that were left out and are predicted to rise, or to pass their limits."""
     rest = [s for s in range(len(influence.speeds)) if s not in used]
     after = Y[rest] + influence.W[rest][..., chosen] @ D
-    words = _rises(influence.speeds[rest], influence.sensors, Y[rest], after, labels, ", a speed left out")
+    words = _rising(influence.speeds[rest], influence.sensors, Y[rest], after, labels, ", a speed left out")
     if limits is None:
         return words
     over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
@@ -137,7 +149,7 @@ def left_out(
     )
 
 
-def _rises(
+def _rising(
     speeds: FloatArray,
     sensors: tuple[str, ...],
     before: ComplexArray,
@@ -156,10 +168,3 @@ def _rises(
     if len(places) > _RISES_NAMED:
         words[-1] += f"; {len(places) - _RISES_NAMED} more readings{where} rise less"
     return tuple(words)
-
-
-def _chance(result: Correction) -> float:
-    """Probability of a larger χ²."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(result.fit_dof, result.chi_square))

@@ -15,9 +15,10 @@ Rules:
    repeated groups, Student's with the degrees of freedom of one direction.
 3. Without both, the residuals of over-determined runs give one relative error, alike in both directions
    (`balancing.coefficients.influence`).
-4. Otherwise errors are unknown, and so are all standard deviations.
+4. Otherwise 2 % and 2° are assumed, and named so.
 
-The mean of n repeats has 1/n of the variance of one reading.
+The mean of n repeats has 1/n of the variance of one reading. The digits in which a reading is written add an
+error that repeats do not make smaller. What changes from run to run: `balancing.coefficients.run_errors`.
 """
 
 from __future__ import annotations
@@ -31,7 +32,10 @@ from numpy.typing import ArrayLike
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-Source = Literal["stated", "repeats", "stated, enlarged by repeats", "residuals", "unknown"]
+Source = Literal["stated", "repeats", "stated, enlarged by repeats", "residuals", "assumed", "unknown"]
+
+ASSUMED = ReadingErrors(amplitude=0.02, phase=float(np.deg2rad(2.0)))
+"""Of a reading, where nothing says more."""
 
 CONTRADICTION = 0.99
 """Level of the test by which repeated readings overrule stated errors."""
@@ -47,7 +51,7 @@ class ErrorModel:
     Attributes
     ----------
     errors
-        None: unknown.
+        None: unknown (stored coefficients without errors).
     dof
         Degrees of freedom of the estimated errors; None for stated errors (taken as known).
     source
@@ -57,7 +61,7 @@ class ErrorModel:
     """
 
     errors: ReadingErrors | None = None
-    dof: int | None = None
+    dof: float | None = None
     source: Source = "unknown"
     warnings: tuple[str, ...] = field(default=())
 
@@ -78,9 +82,14 @@ def reading_covariance(readings: ArrayLike, errors: ReadingErrors) -> FloatArray
     """
     z = np.asarray(readings, dtype=complex)
     size = np.abs(z)
+    floor = errors.floor**2
+    return _turned(z, (errors.amplitude * size) ** 2 + floor, (errors.phase * size) ** 2 + floor)
+
+
+def _turned(z: ComplexArray, radial: FloatArray, tangential: FloatArray) -> FloatArray:
+    """Covariances (…, 2, 2) from variances along z and across."""
+    size = np.abs(z)
     unit = np.where(size > 0, z, 1.0) / np.where(size > 0, size, 1.0)
-    radial = (errors.amplitude * size) ** 2 + errors.floor**2
-    tangential = (errors.phase * size) ** 2 + errors.floor**2
     c, s = unit.real, unit.imag
     out = np.empty((*z.shape, 2, 2))
     out[..., 0, 0] = radial * c**2 + tangential * s**2
@@ -94,9 +103,21 @@ def symmetric(covariance: FloatArray) -> FloatArray:
     return np.asarray((covariance + np.swapaxes(covariance, -1, -2)) / 2)
 
 
-def mean_covariance(trials: Trials, errors: ReadingErrors) -> FloatArray:
-    """Covariance (R, S, C, 2, 2) of the means of repeated readings."""
-    return reading_covariance(trials.mean, errors) / trials.repeats[..., None, None]
+def mean_covariance(trials: Trials, errors: ReadingErrors | None) -> FloatArray:
+    """Covariance (R, S, C, 2, 2) of the means of repeated readings; without errors that of their digits."""
+    rounding = _rounding(trials)
+    if errors is None:
+        return rounding
+    return reading_covariance(trials.mean, errors) / trials.repeats[..., None, None] + rounding
+
+
+def _rounding(trials: Trials) -> FloatArray:
+    """Variance of uniform errors of half the last digit of amplitude and phase."""
+    mean = trials.mean
+    if getattr(trials, "steps", None) is None:
+        return np.zeros((*mean.shape, 2, 2))
+    amplitude, phase = np.nanmean(trials.steps, axis=1) / np.sqrt(12.0)
+    return _turned(mean, amplitude**2, (phase * np.abs(mean)) ** 2)
 
 
 def error_model(trials: Trials) -> ErrorModel:
@@ -106,11 +127,11 @@ def error_model(trials: Trials) -> ErrorModel:
         return _checked_by_repeats(trials, stated)
     scatter = _scatter(trials)
     if scatter is None:
-        return ErrorModel()
+        return ErrorModel(ASSUMED, source="assumed")
     radial, tangential, dof = scatter
     if max(radial, tangential) < EQUAL:
         words = "all repeated readings are equal to the last digit: they say nothing about the errors"
-        return ErrorModel(warnings=(words,))
+        return ErrorModel(ASSUMED, source="assumed", warnings=(words,))
     said: tuple[str, ...] = ()
     if min(radial, tangential) < EQUAL:  # read in whole degrees, say
         equal, other = ("amplitudes", "phases") if radial < EQUAL else ("phases", "amplitudes")
@@ -152,7 +173,7 @@ def _checked_by_repeats(trials: Trials, stated: ReadingErrors) -> ErrorModel:
         known = variance > 0
         chi_square += float(np.nansum(part[:, known] ** 2 / variance[known]))
         dof += int(np.sum(count[known] - 1))
-    errors, degrees, warnings = stated, None, []
+    errors, degrees, warnings = stated, None, list[str]()
     if dof > 0 and chi_square > float(chdtri(dof, 1 - CONTRADICTION)):
         ratio = float(np.sqrt(chi_square / dof))
         errors = ReadingErrors(stated.amplitude * ratio, stated.phase * ratio, stated.floor * ratio)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -47,6 +48,13 @@ class ReadingErrors:
             )
 
 
+class RunScatter(NamedTuple):
+    """One standard deviation of what changes from run to run: of a reading, and in the unit inside."""
+
+    relative: float
+    floor: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class Trials:
     """Readings of R runs at S speeds by C sensors, and the weights in P planes during each run.
@@ -65,6 +73,8 @@ class Trials:
         Mounted in each run, angle with the rotation, kg or kg·m, shape (R, P).
     errors
         Stated errors of a reading, or None.
+    run_errors
+        Stated errors between runs, or None.
     labels
         Units and conventions to print results in.
     warnings
@@ -85,6 +95,7 @@ class Trials:
     errors: ReadingErrors | None = None
     labels: Labels = field(default_factory=Labels)
     warnings: tuple[str, ...] = ()
+    run_errors: RunScatter | None = None
 
     def __post_init__(self) -> None:
         for name in ("runs", "sensors", "planes"):

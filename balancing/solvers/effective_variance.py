@@ -33,6 +33,7 @@ from balancing.solvers.likelihood import (
     State,
     constraint,
     covariance,
+    derivatives,
     evaluate,
     gradient,
     hessian,
@@ -45,7 +46,7 @@ from rotorid.regression import gain, stretch, unstretch
 FLOOR = 1e-4
 """Every residual gets a further error of this share of the root mean square error of all residuals."""
 
-UNEXPLAINED = 0.999
+UNEXPLAINED = 0.95
 """Level of the χ² test beyond which the residuals are larger than the errors explain."""
 
 _STEPS, _HALVINGS = 100, 40
@@ -71,7 +72,7 @@ class Effective:
     dof
         2N − 2P, with N readings of weight > 0.
     inflation
-        √(chi_square / dof) where chi_square is beyond its 99.9 % quantile, else 1.
+        √(chi_square / dof) where chi_square is beyond what errors explain (95 %), else 1.
     model_error
         Where it is beyond: standard deviation of what else stands in both parts of every reading, in the unit
         of Y, as large as the residuals say; weights and covariance allow for it. Else 0.
@@ -91,6 +92,8 @@ class Effective:
     model_error: float
     iterations: int
     converged: bool
+    derivatives: FloatArray
+    """Of (Re D₁, Im D₁, …) by (Re Y, Im Y, Re W₁, …) of each reading of weight > 0, else 0; (N, 2P, 2P + 2)."""
 
 
 def effective_variance(
@@ -100,6 +103,7 @@ def effective_variance(
     *,
     row_weights: ArrayLike | None = None,
     start: ArrayLike | None = None,
+    explained: Callable[[ComplexArray], bool] | None = None,
 ) -> Effective:
     """Corrections D that minimise Σ w² rᵀ Σ(D)⁻¹ r, the residuals r = Y + W D in units of their errors.
 
@@ -115,6 +119,8 @@ def effective_variance(
         w ≥ 0 of each reading, shape (N,); a reading of weight 0 is left out of the fit. Default 1.
     start
         Corrections to begin with, shape (P,); default least squares.
+    explained
+        Whether errors explain what the corrections leave; default: χ² within its 95 % quantile.
 
     Returns
     -------
@@ -138,7 +144,7 @@ def effective_variance(
 
     Unbalance outside the planes leaves residuals that no error of the readings explains. Large weights
     would excuse them by the errors of W: weights of the plain fit are up to a third too large. Where
-    chi_square is beyond its 99.9 % quantile, every reading of Y therefore gets a further error, alike for
+    chi_square is beyond what errors explain (95 %), every reading of Y therefore gets a further error, alike for
     all, such that χ² equals its degrees of freedom. The fit is close to least squares then, and as good. If
     the cause is errors of the trial runs that are larger than stated, the covariance is too small: times
     `inflation`² it holds the truth for either cause.
@@ -161,11 +167,16 @@ def effective_variance(
     best = fit(0.0, given)
     chi_square, dof = best.chi_square, 2 * (len(weight) - P)
     share, steps = 0.0, best.steps
-    unexplained = dof > 0 and chi_square > _quantile(dof)
+    unexplained = dof > 0 and chi_square > dof
+    if unexplained:
+        within = explained is not None and best.converged and explained(unstretch(best.d))
+        unexplained = not within if explained is not None else chi_square > _quantile(dof)
     if unexplained:
         best, share, more = _explained(fit, first, chi_square / dof, dof)
         steps += more
     D = unstretch(best.d)
+    moved = np.zeros((len(y), 2 * P, 2 * P + 2))
+    moved[used] = derivatives(best.problem, best.at, best.d)
     return Effective(
         weights=D,
         residual=y + w @ D,
@@ -176,6 +187,7 @@ def effective_variance(
         model_error=float(np.sqrt(share * variance)),
         iterations=steps,
         converged=best.converged,
+        derivatives=moved,
     )
 
 

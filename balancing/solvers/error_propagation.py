@@ -66,6 +66,25 @@ def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray
     return symmetric(B @ covariance @ B.T)
 
 
+def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Covariances (2P, 2P) by errors that readings have in common: those of the whole run, of each speed.
+
+    Parameters
+    ----------
+    J
+        Derivatives of the stretched D by (Re Y₀, Im Y₀, Re W₁, …) of each reading, (N, 2P, 2P + 2).
+    common
+        As `balancing.Influence.common`, (2, M, S, C, P + 1), N = S C.
+    """
+    _, M, S, C, n = common.shape
+    columns = np.stack((common, 1j * common), axis=-1).view(np.float64).reshape(2, M, S, C, n, 2, 2)
+    F = np.swapaxes(columns, -1, -2).reshape(2, M, S * C, 2 * n, 2)
+    moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, -1, 2).sum(axis=3)
+    run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, -1, 2)
+    first, second = (np.einsum("mqu,mpu->qp", part, part) for part in (run, speed))
+    return first, second
+
+
 def _block(z: ComplexArray) -> FloatArray:
     """Stretch every number of an array (…) into its 2 × 2 block, (…, 2, 2)."""
     out = np.empty((*z.shape, 2, 2))

@@ -126,6 +126,17 @@ def covariance(problem: Problem, at: State) -> FloatArray:
     return symmetric(rows.T @ rows)
 
 
+def derivatives(problem: Problem, at: State, d: FloatArray) -> FloatArray:
+    """Of the stretched D at the minimum by the data z of each reading, (N, 2P, 2P + 2), first order."""
+    root = _inverse_root(_gram(at.J, problem.weight))
+    l11, l21, l22 = at.L
+    first = problem.weight[:, None] * at.J[:, 0] / l11[:, None]
+    second = problem.weight[:, None] * at.J[:, 1] / l22[:, None]
+    # Ŵᵀ Σ⁻¹ = Jᵀ L⁻¹, the columns of L⁻¹: (1/l11, −l21/(l11 l22)) and (0, 1/l22)
+    rows = np.stack((first - second * (l21 / l11)[:, None], second), axis=-1)
+    return np.asarray(-(root @ root.T) @ rows @ constraint(d))
+
+
 def _blocks(C: FloatArray) -> FloatArray:
     """W part of covariances (N, 2P + 2, 2P + 2), a row for each pair of planes, (P², 4N)."""
     N, P = len(C), C.shape[1] // 2 - 1

@@ -12,9 +12,10 @@ import numpy as np
 
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.resolution import HOPELESS
+from balancing.data.errors import symmetric
 from balancing.data.limits import Limits
 from balancing.solvers.effective_variance import FLOOR, effective_variance
-from balancing.solvers.error_propagation import correction_covariance
+from balancing.solvers.error_propagation import common_covariance, correction_jacobian
 from balancing.solvers.regularised import ridge, truncated
 from balancing.solvers.sampling import sampled_covariance
 from balancing.solvers.sectors import allowed_sectors, stands_in
@@ -37,7 +38,12 @@ class Stack:
     W, Y
         Influence coefficients (N, P) and vibration of the bare rotor (N,).
     channels
-        Covariance of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2); None: unknown.
+        Covariance of (Re Y, Im Y, Re W₁, …) of each reading by errors of its own, (N, 2P + 2, 2P + 2); None:
+        unknown.
+    common
+        What the readings have in common, as `balancing.Influence.common`.
+    explained
+        Whether the errors explain what weights leave.
     row_weights
         How much each reading counts, (N,); None: all alike.
     limits
@@ -57,6 +63,8 @@ class Stack:
     readings: tuple[str, ...]
     amplitude: Callable[[float], str]
     weight: Callable[[float], str]
+    common: ComplexArray | None = None
+    explained: Callable[[ComplexArray], bool] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +77,14 @@ class Fitted:
         Shape (P,).
     covariance
         (2P, 2P); None where errors are unknown.
+    parts
+        What of it comes from own errors, from those common at a speed and to a run, three times (2P, 2P).
     gap
         Certified relative distance from the optimum; None for a closed form.
     chi_square, dof
         Of the weighted fit: how well weights in these planes explain the readings.
+    explained
+        Whether errors alone may leave so much.
     active_weights, active_residuals
         Limits that bind, (P,) and (N,).
     warnings
@@ -81,9 +93,11 @@ class Fitted:
 
     weights: ComplexArray
     covariance: FloatArray | None
+    parts: tuple[FloatArray, ...] = ()
     gap: float | None = None
     chi_square: float | None = None
     dof: int | None = None
+    explained: bool = True
     active_weights: BoolArray | None = None
     active_residuals: BoolArray | None = None
     warnings: tuple[str, ...] = ()
@@ -128,16 +142,19 @@ def _plain(stack: Stack, method: Method) -> Fitted:
     found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
     bound = found.gap is not None  # limits that do not bind leave the closed form
     covariance: FloatArray | None = None
+    parts: tuple[FloatArray, ...] = ()
     words: tuple[str, ...] = ()
-    if stack.channels is not None and method == "least-squares" and not bound:
-        covariance = _propagated(stack, found.weights, stack.row_weights)
-    elif stack.channels is not None:
-        covariance, words = _sampled(
-            stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
-        )
+    if stack.channels is not None:
+        parts = _propagated(stack, found.weights, stack.row_weights)
+        covariance = symmetric(sum(parts[1:], parts[0]))
+        if method != "least-squares" or bound:
+            covariance, words = _sampled(
+                stack, lambda W, Y: _solve(stack, method, W, Y, stack.row_weights).weights, stack.channels
+            )
     return Fitted(
         found.weights,
         covariance,
+        parts,
         found.gap,
         active_weights=found.active_weights,
         active_residuals=found.active_residuals,
@@ -161,12 +178,22 @@ def _solve(
     )
 
 
-def _propagated(stack: Stack, D: ComplexArray, row_weights: FloatArray | None) -> FloatArray:
-    """First-order covariance of least squares with row weights: those of the scaled rows."""
+def _propagated(stack: Stack, D: ComplexArray, row_weights: FloatArray | None) -> tuple[FloatArray, ...]:
+    """First-order covariances of least squares with row weights, those of the scaled rows: `Fitted.parts`."""
     assert stack.channels is not None
     w = np.ones(len(stack.Y)) if row_weights is None else row_weights
     W, r = w[:, None] * stack.W, w * (stack.Y + stack.W @ D)
-    return correction_covariance(W, D, r, w[:, None, None] ** 2 * stack.channels)
+    J = w[:, None, None] * correction_jacobian(W, D, r)
+    own = symmetric(np.sum(J @ stack.channels @ np.swapaxes(J, 1, 2), axis=0))
+    return (own, *_shared(J, stack))
+
+
+def _shared(J: FloatArray, stack: Stack) -> tuple[FloatArray, FloatArray]:
+    """By errors common at a speed, and to a run."""
+    if stack.common is None:
+        return np.zeros((J.shape[1],) * 2), np.zeros((J.shape[1],) * 2)
+    run, speed = common_covariance(J, stack.common)
+    return speed, run
 
 
 def _weighted(stack: Stack) -> Fitted:
@@ -179,14 +206,19 @@ def _weighted(stack: Stack) -> Fitted:
         note = "the errors of the readings are unknown: they count by the weights of sensors and speeds alone"
         plain = _plain(stack, "least-squares")
         return replace(plain, warnings=(note,))
-    free = effective_variance(stack.W, stack.Y, stack.channels, row_weights=stack.row_weights)
+    free = effective_variance(
+        stack.W, stack.Y, stack.channels, row_weights=stack.row_weights, explained=stack.explained
+    )
     if not free.converged:
         raise UndeterminedError(
             "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
             "bound; use larger trial weights, fewer planes or another method"
         )
     if stack.limits is None or _kept(stack.limits, free.weights, free.residual):
-        return Fitted(free.weights, free.covariance, chi_square=free.chi_square, dof=free.dof)
+        parts = (free.covariance, *_shared(free.derivatives, stack))
+        total = symmetric(sum(parts[1:], parts[0]))
+        told = free.model_error == 0
+        return Fitted(free.weights, total, parts, chi_square=free.chi_square, dof=free.dof, explained=told)
     limits, channels = stack.limits, _regular(stack.channels, free.model_error)
 
     def search(W: ComplexArray, Y: ComplexArray, rows: FloatArray, within: Limits) -> Solution:
@@ -213,9 +245,11 @@ def _weighted(stack: Stack) -> Fitted:
     return Fitted(
         found.weights,
         covariance,
+        (free.covariance, *_shared(free.derivatives, stack)),
         found.gap,
         free.chi_square,
         free.dof,
+        free.model_error == 0,
         active_weights=found.active_weights,
         active_residuals=found.active_residuals,
         warnings=words,
@@ -235,7 +269,7 @@ def _sampled(
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
     """Covariance of a solver's weights; None and words where most drawn readings cannot keep the limits."""
     try:
-        return sampled_covariance(solver, stack.W, stack.Y, channels), ()
+        return sampled_covariance(solver, stack.W, stack.Y, channels, common=stack.common), ()
     except ValueError as error:
         return None, (str(error),)
 

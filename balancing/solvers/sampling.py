@@ -18,7 +18,13 @@ MOST_SKIPPED = 0.2
 
 
 def sampled_covariance(
-    solver: Solver, W: ArrayLike, Y: ArrayLike, channels: ArrayLike, draws: int = 400, seed: int = 0
+    solver: Solver,
+    W: ArrayLike,
+    Y: ArrayLike,
+    channels: ArrayLike,
+    draws: int = 400,
+    seed: int = 0,
+    common: ComplexArray | None = None,
 ) -> FloatArray:
     """Covariance of the weights of any solver, from readings drawn at random from their errors.
 
@@ -33,6 +39,8 @@ def sampled_covariance(
         Covariance of (Re Y, Im Y, Re W₁, …) of each reading, shape (N, 2P + 2, 2P + 2); may be singular.
     draws
         How many; standard deviations have a relative error of 1/√(2 draws), 3.5 % for 400.
+    common
+        What else the readings have in common, as `balancing.Influence.common`.
     seed
         The same seed gives the same draws.
 
@@ -69,6 +77,8 @@ def sampled_covariance(
     for _ in range(draws):
         errors = (root @ rng.standard_normal((N, n, 1)))[..., 0]
         drawn = mean + (errors[:, ::2] + 1j * errors[:, 1::2])
+        if common is not None:
+            drawn += _shared(rng, common)
         try:
             D = np.asarray(solver(drawn[:, 1:].copy(), drawn[:, 0].copy()), dtype=complex)
         except ValueError as error:
@@ -85,6 +95,15 @@ def sampled_covariance(
             f"{skipped} of {draws} problems have no solution{words}; widen the limits, or measure better"
         )
     return symmetric(np.atleast_2d(np.cov(np.array(found).T)))
+
+
+def _shared(rng: np.random.Generator, common: ComplexArray) -> ComplexArray:
+    """Errors (N, P + 1) of columns that readings have in common."""
+    _, M, S, C, n = common.shape
+    a, b = rng.standard_normal((2, M, S + 1))
+    number = a + 1j * b
+    run = np.einsum("m,mscp->scp", number[:, 0], common[0])
+    return np.asarray(run + np.einsum("ms,mscp->scp", number[:, 1:], common[1])).reshape(S * C, n)
 
 
 def _root(C: FloatArray) -> FloatArray:

@@ -1,0 +1,509 @@
+"""Errors between runs: what the same rotor with the same weights shows another time.
+
+Mounting, thermal state, drift and what is not linear change a whole run, however often it is read. A reading
+Y of a run has, besides its own error, one of the variance p²|Y|² + f² in each direction, of three kinds: its
+own at each sensor; common to the sensors at a speed; common to the run. What is common changes all readings
+in proportion (the part p), or as a further unbalance does (the part f): along the influence vector, in which
+all planes together move the sensors most. On a real rig nearly all of it is common
+(`sample_data/rk4`): errors taken as independent then cover single planes, but not their sum.
+
+Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
+the corrected reading, Y₀ + W D, free of D. For a complex normal error of covariance Σ
+
+    log L = −log det Σ − eᴴ Σ⁻¹ e,
+
+taken on a grid of sizes (logarithmic, each as likely), mixtures of p and f, and shares of the kinds. The
+grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once. A
+covariance of n numbers, λ times one of known size, is passed on with degrees of freedom ν:
+
+    s² = exp E[log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of λ χ²(n) over s².
+
+Source: restricted maximum likelihood (Patterson and Thompson 1971).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import gain
+
+Origin = Literal["stated", "estimated", "assumed", "none"]
+
+ASSUMED = 0.02
+"""Of a reading, from run to run, where nothing says more."""
+SIZES = np.geomspace(3e-4, 1.0, 12)
+"""Whole size relative to the root mean square reading; refined where the likelihood is."""
+MIXTURES = (0.0, 0.4, 1.0)
+"""Share of f² in the variance of a root mean square reading."""
+SHARES = (0.04, 0.3, 0.6, 1.0)
+"""Of the kind own in the variance; no error between runs is common to all sensors to the last digit."""
+EXPLAINED = 0.95
+"""Level of the test by which the corrected reading takes part."""
+FINE = 20
+_LIKELY, _UNLIKELY = 1e-5, 1e-3
+_DIFFUSE = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class RunErrors:
+    """One standard deviation of what changes from run to run, in one direction of a reading.
+
+    Attributes
+    ----------
+    relative, floor
+        Of the reading, and in its unit, for the kinds own, common at a speed, common to the run; (3,) each.
+    origin
+        Where they come from.
+    interval
+        95 % interval of the whole, root mean square over the readings, in their unit; None: not estimated.
+    probability, ratios
+        Points of the grid, (G,), and the variance of each kind there, in units of that above, (G, 3).
+    merged
+        Whether the kind own stands among the errors of the readings: runs read once do not tell them apart.
+    """
+
+    relative: FloatArray = field(default_factory=lambda: np.zeros(3))
+    floor: FloatArray = field(default_factory=lambda: np.zeros(3))
+    origin: Origin = "none"
+    interval: tuple[float, float] | None = None
+    probability: FloatArray = field(default_factory=lambda: np.ones(1))
+    ratios: FloatArray = field(default_factory=lambda: np.ones((1, 3)))
+    merged: bool = False
+
+    def variance(self, readings: ComplexArray) -> FloatArray:
+        """Of each reading in a further run, in one direction, all kinds together."""
+        return np.asarray(np.sum(self.relative**2) * np.abs(readings) ** 2 + np.sum(self.floor**2))
+
+    def degrees(
+        self, shares: FloatArray, n: int, reading_dof: float | None = None
+    ) -> tuple[float, float | None]:
+        """Scale and degrees of freedom of a covariance (n, n) that holds these errors.
+
+        Parameters
+        ----------
+        shares
+            Of the readings' own errors and of the three kinds in it, (4,), sum 1.
+        n
+            Its size: the region of n numbers at 95 % is exact.
+        reading_dof
+            Degrees of freedom of the readings' own errors; None: known.
+
+        Returns
+        -------
+        s² to multiply it by, and ν of Student's t and F; None (normal) where nothing is open.
+        """
+        from scipy.special import chdtr, chdtri, fdtri
+
+        values = shares[0] * (self.ratios[:, 0] if self.merged else 1.0) + self.ratios @ shares[1:]
+        values = np.maximum(values, 1e-6 * values.max())
+        size = float(np.exp(self.probability @ np.log(values)))
+        spread = 0.0 if reading_dof is None else float(shares[0]) ** 2 / reading_dof
+        if values.max() - values.min() < 1e-3 * size:
+            return size, 1 / spread if spread else None
+        bound = _root(
+            lambda c: float(self.probability @ chdtr(n, c / values)) - 0.95, chdtri(n, 0.05) * values
+        )
+        wanted = bound / size
+        if wanted <= chdtri(n, 0.05) * 1.001:
+            return bound / float(chdtri(n, 0.05)), 1 / spread if spread else None
+        nu = _root(lambda nu: wanted - n * float(fdtri(n, nu, 0.95)), np.array([0.5, 1e5]))
+        return size, 1 / (1 / nu + spread)
+
+
+def _root(function: Callable[[float], float], within: FloatArray) -> float:
+    """Where a growing function passes zero; the end of the range where it does not."""
+    from scipy.optimize import brentq
+
+    low, high = float(within.min()), float(within.max())
+    if function(low) >= 0:
+        return low
+    return high if function(high) <= 0 else float(brentq(function, low, high, rtol=1e-4))
+
+
+class Rows(NamedTuple):
+    """Residuals e (K, S, C) and what is known of them.
+
+    `share` (K, R): of each run's variance in them; `known` (K, S, C): variance in one direction by the errors
+    of the readings; `free` (S, C, P): unknowns of the last row, absent (P = 0) or the coefficients of D.
+    """
+
+    e: ComplexArray
+    share: FloatArray
+    known: FloatArray
+    free: ComplexArray
+
+    @property
+    def dof(self) -> int:
+        """Complex numbers that the rows tell of errors."""
+        return self.e.size - self.free.shape[-1]
+
+
+def spare_rows(A: ComplexArray, Y: ComplexArray, known: FloatArray) -> Rows:
+    """Combinations of redundant runs that hold no coefficient.
+
+    Parameters
+    ----------
+    A
+        (1 T), shape (R, P + 1).
+    Y, known
+        Readings and their variances in one direction, (R, S, C).
+    """
+    R, n = A.shape
+    size = np.sqrt(np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=(1, 2)))
+    size = np.maximum(size, 0.1 * size.max())
+    basis = np.linalg.svd(A / size[:, None])[0][:, n:] if n < R else np.zeros((R, 0))
+    m = basis.conj().T / size
+    share = np.abs(m) ** 2
+    return Rows(
+        np.einsum("kr,rsc->ksc", m, Y),
+        share,
+        np.einsum("kr,rsc->ksc", share, known),
+        np.zeros((*Y.shape[1:], 0), dtype=complex),
+    )
+
+
+def corrected_row(
+    A: ComplexArray, Y: ComplexArray, known: FloatArray, theta: ComplexArray
+) -> tuple[Rows, ...]:
+    """What the weights that correct the bare rotor leave of its reading, free of the weights; none for N ≤ P.
+
+    Parameters
+    ----------
+    A, Y, known
+        As `spare_rows`.
+    theta
+        (Y₀, W₁, …), shape (S, C, P + 1).
+    """
+    S, C, n = theta.shape
+    if n > S * C or not theta[..., 0].any():
+        return ()
+    W, Y0 = theta[..., 1:].reshape(-1, n - 1), theta[..., 0].ravel()
+    size = np.sqrt(np.mean(np.abs(Y) ** 2, axis=0)).ravel()
+    size = np.maximum(size, 0.1 * size.max())
+    D = -gain(W / size[:, None]) @ (Y0 / size)
+    m = np.concatenate(([1.0], D)) @ gain(A)
+    share = np.abs(m[None]) ** 2
+    e = np.einsum("r,rsc->sc", m, Y)[None]
+    return (Rows(e, share, np.einsum("kr,rsc->ksc", share, known), theta[..., 1:]),)
+
+
+class RunColumns(NamedTuple):
+    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 2, S, C)."""
+
+    own: FloatArray
+    common: ComplexArray
+
+
+def run_columns(run: RunErrors, Y: ComplexArray, pattern: ComplexArray) -> RunColumns:
+    """Of runs with the readings Y (R, S, C) and the influence vector (S, C); common as `Influence.common`."""
+    own = run.relative[0] ** 2 * np.abs(Y) ** 2 + run.floor[0] ** 2
+    along = np.broadcast_to(pattern, Y.shape)
+    by_kind = [np.stack((run.relative[k] * Y, run.floor[k] * along), axis=1) for k in (2, 1)]
+    return RunColumns(own, np.stack(by_kind))
+
+
+def influence_vector(W: ComplexArray) -> ComplexArray:
+    """In which all planes together move the sensors most, (S, C), of root mean square 1 at each speed."""
+    norms = np.linalg.norm(W, axis=(0, 1))
+    direction = np.linalg.svd((W / np.where(norms > 0, norms, 1.0)).reshape(-1, W.shape[-1]))[2][0].conj()
+    found = W @ (direction / np.where(norms > 0, norms, 1.0))
+    size = np.sqrt(np.mean(np.abs(found) ** 2, axis=1, keepdims=True))
+    return np.asarray(np.where(size > 0, found / np.where(size > 0, size, 1.0), 1.0))
+
+
+def marginal(common: ComplexArray) -> FloatArray:
+    """Covariance of each channel by common columns (…, M, S, C, n), (S, C, 2n, 2n)."""
+    F = common.reshape(-1, *common.shape[-3:])
+    H = np.einsum("mscp,mscq->scpq", F, F.conj())
+    out = np.empty((*H.shape[:2], H.shape[2], 2, H.shape[3], 2))
+    out[..., 0, :, 0] = out[..., 1, :, 1] = H.real
+    out[..., 1, :, 0] = H.imag
+    out[..., 0, :, 1] = -H.imag
+    return out.reshape(*H.shape[:2], 2 * H.shape[2], 2 * H.shape[3])
+
+
+def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
+    """How much of a covariance (…, n, n) comes from each part, sum 1."""
+    size = np.sqrt(np.einsum("...ii->...i", total))
+    size = np.where(size > 0, size, np.inf)
+    values = np.array([np.sum(np.einsum("...ii->...i", part) / size**2) for part in parts])
+    return np.asarray(values / values.sum() if values.sum() > 0 else np.eye(len(values))[0])
+
+
+class _Grid(NamedTuple):
+    """Variances p² and f² of the three kinds at each point, (G, 3)."""
+
+    relative: FloatArray
+    floor: FloatArray
+
+
+def _grid(sizes: FloatArray, reading: float, kinds: int, *, mixtures: tuple[float, ...] = MIXTURES) -> _Grid:
+    """All sizes with all mixtures and shares; `kinds`: 1 without, 2 or 3 with common errors."""
+    shares = [(1.0, 0.0, 0.0)]
+    if kinds > 1:
+        shares += [(own, 0.0, 1 - own) for own in SHARES[:-1]]
+    if kinds > 2:
+        shares += [
+            (own, part * (1 - own), (1 - part) * (1 - own)) for own in SHARES[:-1] for part in (0.5, 1.0)
+        ]
+    variance, mixture, which = (
+        each.ravel() for each in np.meshgrid(sizes**2, mixtures, np.arange(len(shares)), indexing="ij")
+    )
+    share = np.array(shares)[which]
+    return _Grid(
+        (variance * (1 - mixture))[:, None] * share, (variance * mixture)[:, None] * share * reading**2
+    )
+
+
+def likelihood(
+    rows: Rows, Y: ComplexArray, pattern: ComplexArray, at: _Grid
+) -> tuple[FloatArray, FloatArray]:
+    """Log det Σ and eᴴ Σ⁻¹ e at every point of a grid, (G,) each.
+
+    Parameters
+    ----------
+    rows
+        Residuals.
+    Y
+        Readings, (R, S, C), that the part p is common along.
+    pattern
+        Influence vector, (S, C), of root mean square 1 at each speed, that the part f is common along.
+    """
+    own = np.einsum("kr,rsc->ksc", rows.share, np.abs(Y) ** 2)
+    total = rows.share.sum(axis=1)
+    variance = rows.known + at.relative[:, 0, None, None, None] * own
+    variance = variance + (at.floor[:, [0]] * total)[..., None, None]
+    along_run = np.sqrt(rows.share)[..., None, None] * Y
+    along_vector = np.sqrt(total)[:, None, None, None] * pattern
+    columns = np.concatenate((along_run, along_vector), axis=1)  # (K, M, S, C)
+
+    def scale(kind: int) -> FloatArray:
+        both = np.repeat(at.relative[:, [kind]], len(Y), axis=1), at.floor[:, [kind]]
+        return np.sqrt(np.concatenate(both, axis=1))
+
+    return _gaussian(rows, variance, columns, scale(1), scale(2))
+
+
+def _gaussian(
+    rows: Rows, variance: FloatArray, columns: ComplexArray, by_speed: FloatArray, by_run: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Log det Σ and eᴴ Σ⁻¹ e, (G,) each.
+
+    Own variances (G, K, S, C) in one direction; columns (K, M, S, C) in common, times the scales (G, M).
+    """
+    K, S, C = rows.e.shape
+    P = rows.free.shape[-1]
+    d = 2 * np.maximum(variance, 1e-12 * np.mean(np.abs(rows.e) ** 2) + 1e-300)  # of both directions
+    last = np.zeros((K, P, S, C), dtype=complex)
+    last[-1:] = np.moveaxis(rows.free, -1, 0)
+    U = np.concatenate((columns, last), axis=1)
+    weighted = U / d[:, :, None]  # (G, K, M, S, C)
+    gram = np.einsum("gkmsc,knsc->gksmn", weighted.conj(), U)
+    h = np.einsum("gkmsc,ksc->gksm", weighted.conj(), rows.e)
+    q = np.einsum("gksc,ksc->gk", 1 / d, np.abs(rows.e) ** 2)
+    log = np.log(d).sum(axis=(2, 3))
+    free = 0.0 if not P else np.mean(np.abs(rows.e[-1]) ** 2) / np.mean(np.abs(rows.free) ** 2)
+
+    def scales(common: FloatArray, unknown: float) -> FloatArray:
+        return np.sqrt(2 * np.concatenate((common**2, np.full((len(common), P), unknown)), axis=1))
+
+    if S > 1:
+        gram, h, less, more = _reduced(gram, h, scales(by_speed, 0.0)[:, None, None])
+        q, log = q - less.sum(axis=-1), log + more.sum(axis=-1)
+    else:
+        by_run = np.hypot(by_run, by_speed)
+    wide = scales(by_run, _DIFFUSE * free)[:, None]
+    _, _, less, more = _reduced(gram.sum(axis=2), h.sum(axis=2), wide)
+    return (log + more).sum(axis=1), np.maximum((q - less).sum(axis=1), 0.0)
+
+
+def _reduced(
+    gram: ComplexArray, h: ComplexArray, scale: FloatArray
+) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
+    """Uᴴ Σ⁻¹ U, Uᴴ Σ⁻¹ e, what eᴴ Σ⁻¹ e loses and log det Σ gains, when Σ gets U scale² Uᴴ (Woodbury)."""
+    n = gram.shape[-1]
+    sides = scale[..., None] * np.concatenate((gram, h[..., None]), axis=-1)
+    inner = np.eye(n) + sides[..., :n] * scale[..., None, :]
+    log = np.linalg.slogdet(inner)[1]
+    solved = np.linalg.solve(inner, sides)
+    found = np.swapaxes(sides[..., :n].conj(), -1, -2) @ solved
+    less = np.sum(scale * h.conj() * solved[..., n], axis=-1).real
+    return gram - found[..., :n], h - found[..., n], less, log
+
+
+def estimated(rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray) -> RunErrors:
+    """Size, mixture and kinds of the errors between runs.
+
+    Parameters
+    ----------
+    rows
+        Of redundant runs, and of the corrected reading; the latter counts where the former do not contradict.
+    Y
+        Readings, (R, S, C).
+    pattern
+        `influence_vector`.
+    """
+    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
+    coarse = _grid(SIZES, reading, _kinds(Y))
+    rows = _agreeing(rows, Y, pattern, coarse, _posterior(rows[:1], Y, pattern, coarse))
+    table = _posterior(rows, Y, pattern, coarse).reshape(len(SIZES), -1)
+    seen = np.flatnonzero(table.sum(axis=1) > _LIKELY * table.sum(axis=1).max())
+    low, high = SIZES[max(seen[0] - 1, 0)], SIZES[min(seen[-1] + 1, len(SIZES) - 1)]
+    sizes = np.geomspace(low, high, FINE)
+    kept = np.flatnonzero(table.sum(axis=0) > _UNLIKELY * table.sum(axis=0).max())
+    every = _grid(sizes, reading, _kinds(Y))
+    fine = _Grid(*(each.reshape(FINE, -1, 3)[:, kept].reshape(-1, 3) for each in every))
+    probability = _posterior(rows, Y, pattern, fine)
+    cumulated = np.cumsum(probability.reshape(FINE, -1).sum(axis=1))
+    limits = np.interp((0.025, 0.975), cumulated, sizes) * reading
+    return _of_grid(fine, probability, reading, "estimated", (float(limits[0]), float(limits[1])))
+
+
+def given(
+    rows: Sequence[Rows],
+    Y: ComplexArray,
+    pattern: ComplexArray,
+    relative: float,
+    floor: float,
+    origin: Origin,
+) -> RunErrors:
+    """Errors of known size; the data (as `estimated`) say only how much of them is common."""
+    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
+    at = _known(Y, relative, floor)
+    if at is None:
+        return RunErrors(origin=origin)
+    own = _Grid(*(each[:1] for each in at))
+    rows = _agreeing(rows, Y, pattern, own, np.ones(1))
+    return _of_grid(at, _posterior(rows, Y, pattern, at), reading, origin, None)
+
+
+def scatter(
+    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, relative: float = 0.0, floor: float = 0.0
+) -> tuple[float, float]:
+    """How many times errors of known size the residuals are, and the probability of more, whatever is common."""
+    from scipy.special import chdtrc
+
+    n = sum(each.dof for each in rows)
+    at = _known(Y, relative, floor) or _Grid(np.zeros((1, 3)), np.zeros((1, 3)))
+    log, q = _likelihood(rows, Y, pattern, at)
+    weight = _normal(-log - n * np.log(np.maximum(q, 1e-300)))
+    return float(np.sqrt(weight @ q / n)), float(weight @ chdtrc(2 * n, 2 * q))
+
+
+def chance_of_more(
+    run: RunErrors,
+    residual: ComplexArray,
+    own: FloatArray,
+    between: float,
+    common: ComplexArray | None,
+    W: ComplexArray,
+) -> float:
+    """Probability that errors alone leave more of the corrected reading than was found.
+
+    Parameters
+    ----------
+    run
+        Errors between runs: how sure their size is.
+    residual, W
+        Y₀ + W D, (S, C), and coefficients, (S, C, P).
+    own, between
+        Its variance in one direction without common errors, (S, C), and the share of errors between runs in it.
+    common
+        Columns of the residual in common, as `Influence.common`: (2, M, S, C).
+    """
+    from scipy.special import chdtrc
+
+    rows = Rows(residual[None], np.ones((1, 1)), own[None], W)
+    if rows.dof <= 0:
+        return 1.0
+    share = np.array([1 - between, between])
+    first = run.ratios[:, 0]
+    factor = share[0] * (first if run.merged else 1.0) + share[1] * first
+    columns = np.zeros((2, 0, *own.shape)) if common is None else common
+    M = columns.shape[1]
+    scale = np.sqrt(run.ratios[:, 1:].T)
+    nothing = np.zeros((len(first), M))
+    by_run = np.concatenate((np.repeat(scale[1][:, None], M, axis=1), nothing), axis=1)
+    by_speed = np.concatenate((nothing, np.repeat(scale[0][:, None], M, axis=1)), axis=1)
+    both = np.concatenate((columns[0], columns[1]))[None]
+    q = _gaussian(rows, factor[:, None, None, None] * own[None, None], both, by_speed, by_run)[1]
+    return float(run.probability @ chdtrc(2 * rows.dof, 2 * q))
+
+
+def _agreeing(
+    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid, probability: FloatArray
+) -> Sequence[Rows]:
+    """The rows without the corrected reading where it is beyond what the grid explains (95 %).
+
+    Unbalance outside the planes leaves such a rest; it says nothing of the errors.
+    """
+    from scipy.special import chdtrc
+
+    kept = [each for each in rows if not each.free.shape[-1]]
+    for each in (each for each in rows if each.free.shape[-1]):
+        q = _likelihood([each], Y, pattern, at)[1]
+        if probability @ chdtrc(2 * each.dof, 2 * q) > 1 - EXPLAINED:
+            kept.append(each)
+    return kept
+
+
+def _known(Y: ComplexArray, relative: float, floor: float) -> _Grid | None:
+    """Every share of errors of one size; None where there are none."""
+    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
+    size = np.hypot(relative * reading, floor)
+    if size == 0:
+        return None
+    return _grid(np.array([size / reading]), reading, _kinds(Y), mixtures=((floor / size) ** 2,))
+
+
+def _likelihood(
+    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid
+) -> tuple[FloatArray, FloatArray]:
+    """Sum of `likelihood` over all rows."""
+    log, q = np.zeros((2, len(at.floor)))
+    for each in rows:
+        if each.dof > 0:
+            more = likelihood(each, Y, pattern, at)
+            log, q = log + more[0], q + more[1]
+    return log, q
+
+
+def _kinds(Y: ComplexArray) -> int:
+    R, S, C = Y.shape
+    return 1 if S * C == 1 else 2 if S == 1 or C == 1 else 3
+
+
+def _posterior(rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid) -> FloatArray:
+    log, q = _likelihood(rows, Y, pattern, at)
+    return _normal(-log - q)
+
+
+def _normal(log: FloatArray) -> FloatArray:
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum())
+
+
+def _of_grid(
+    at: _Grid, probability: FloatArray, reading: float, origin: Origin, interval: tuple[float, float] | None
+) -> RunErrors:
+    """The grid in one: variances averaged by their precision, so that large ones do not decide."""
+    total = at.relative * reading**2 + at.floor
+    precision = probability / total.sum(axis=1)
+    precision = precision / precision.sum()
+    relative, floor = precision @ at.relative, precision @ at.floor
+    base = relative * reading**2 + floor
+    ratios = total / np.where(base > 0, base, 1.0)
+    kept = probability > 1e-6 * probability.max()
+    return RunErrors(
+        np.sqrt(relative),
+        np.sqrt(floor),
+        origin,
+        interval,
+        probability[kept] / probability[kept].sum(),
+        ratios[kept],
+    )
