@@ -124,10 +124,8 @@ class Trials:
         if steps.ndim == 4:
             steps = steps[:, None]
         if steps.shape != (2, *self.readings.shape):
-            raise ValueError(
-                f"steps must have shape {(2, *self.readings.shape)}, those of amplitudes and of phases, or be "
-                f"None; got {steps.shape}"
-            )
+            wanted = (2, *self.readings.shape)
+            raise ValueError(f"steps must have shape {wanted} or be None; got {steps.shape}")
         missing = np.isnan(self.readings)
         if not (missing | (np.isfinite(steps) & (steps >= 0))).all():
             raise ValueError("the step in which a reading is written must be a finite number ≥ 0")
