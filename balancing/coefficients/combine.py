@@ -207,7 +207,7 @@ def _contradictions(
     planes: tuple[str, ...],
     sensors: tuple[str, ...],
     speeds: FloatArray,
-    dof: int | None,
+    dof: float | None,
 ) -> tuple[str, ...]:
     found = [d for d in differences if len(differences) * tail(d[0], 2, dof) < 1 - LEVEL]
     found.sort(key=lambda d: -d[0])

@@ -130,7 +130,7 @@ def both_directions(errors: ReadingErrors) -> ReadingErrors:
     return replace(errors, amplitude=errors.amplitude or errors.phase, phase=errors.phase or errors.amplitude)
 
 
-def tail(chi_square: float, n: int, dof: int | None) -> float:
+def tail(chi_square: float, n: int, dof: float | None) -> float:
     """Probability of a larger χ² with n degrees of freedom; of F where the errors have `dof` themselves."""
     from scipy.special import chdtrc, fdtrc
 

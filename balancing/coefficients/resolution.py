@@ -28,7 +28,7 @@ class Resolution(NamedTuple):
     largest: float
     direction: ComplexArray
 
-    def significant(self, readings: int, dof: int | None) -> bool:
+    def significant(self, readings: int, dof: float | None) -> bool:
         """Whether some reading tells the planes apart: all together at 95 %, or one of them at 99 %."""
         if self.n <= 0:
             return False

@@ -95,7 +95,7 @@ class CheckComparison:
     distance: FloatArray | None
     chi_square: float | None
     n: int
-    dof: int | None
+    dof: float | None
     probability: float | None
     explained: bool | None
     change: ComplexArray | None
@@ -286,7 +286,7 @@ def _joint_covariance(
     return symmetric(V)
 
 
-def _change(W: ComplexArray, d: FloatArray, V: FloatArray, dof: int | None) -> ComplexArray | None:
+def _change(W: ComplexArray, d: FloatArray, V: FloatArray, dof: float | None) -> ComplexArray | None:
     """Weights δ (P,), the same in all runs, for which W δ explains the differences; None if none do.
 
     Generalised least squares over the stretched channels: minimises Σ (d − A δ)ᵀ V⁻¹ (d − A δ) with A the

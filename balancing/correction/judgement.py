@@ -78,7 +78,7 @@ def judge(
     value: complex,
     limit: float,
     covariance: FloatArray | None,
-    dof: int | None = None,
+    dof: float | None = None,
     speed: float | None = None,
 ) -> Judgement:
     """Judge one complex value.
@@ -123,7 +123,7 @@ def judge_unbalance(
     planes: Sequence[str],
     *,
     radii: Mapping[str, float] | None = None,
-    dof: int | None = None,
+    dof: float | None = None,
 ) -> tuple[Judgement, ...]:
     """Residual unbalance of each plane, and what they are together at the tolerance planes.
 

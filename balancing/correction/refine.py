@@ -24,7 +24,7 @@ from balancing.coefficients.baseline import match_speeds
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
 from balancing.data.trials import Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
@@ -188,6 +188,7 @@ def _joined(
     names, weights = list(trials.runs), [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
     weights[0][:, : len(trials.planes)] = trials.weights
     blocks = [trials.readings[:, :, rows][..., columns]]
+    steps = [_steps(trials)[:, :, :, rows][..., columns]]
     for check, own in zip(checks, mounted, strict=True):
         for name in check.runs:
             names.append(different(name, names))
@@ -195,24 +196,37 @@ def _joined(
         weights.append(np.column_stack([own.get(plane, empty) for plane in planes]))
         speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
         sensors = _sensors(check, trials)
-        block = check.readings[:, :, [speeds.index(s) for s in rows]]
-        blocks.append(block[..., [sensors.index(c) for c in columns]])
-    most = max(len(block) for block in blocks)
-    gap = complex(np.nan, np.nan)
-    padded = [
-        np.concatenate((block, np.full((most - len(block), *block.shape[1:]), gap))) for block in blocks
-    ]
+        at, of = [speeds.index(s) for s in rows], [sensors.index(c) for c in columns]
+        blocks.append(check.readings[:, :, at][..., of])
+        steps.append(_steps(check)[:, :, :, at][..., of])
+    rounded = any(each.steps is not None for each in (trials, *checks))
     return Trials(
         runs=tuple(names),
         speeds=trials.speeds[rows],
         sensors=tuple(trials.sensors[c] for c in columns),
         planes=planes,
-        readings=np.concatenate(padded, axis=1),
+        readings=_side_by_side(blocks),
         weights=np.concatenate(weights),
         errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
         labels=trials.labels,
         warnings=tuple(dict.fromkeys(word for each in (trials, *checks) for word in each.warnings)),
+        steps=_side_by_side(steps) if rounded else None,
     )
+
+
+def _steps(trials: Trials) -> FloatArray:
+    """Of readings that are not rounded: zero."""
+    return np.zeros((2, *trials.readings.shape)) if trials.steps is None else trials.steps
+
+
+def _side_by_side(blocks: Sequence[AnyArray]) -> AnyArray:
+    """Runs of several tables, arrays (…, K, R, S, C), as those of one: NaN where one has fewer repeats."""
+    most = max(block.shape[-4] for block in blocks)
+    padded = []
+    for block in blocks:
+        gap = np.full((*block.shape[:-4], most - block.shape[-4], *block.shape[-3:]), np.nan, block.dtype)
+        padded.append(np.concatenate((block, gap), axis=-4))
+    return np.concatenate(padded, axis=-3)
 
 
 def _alone(trials: Trials) -> tuple[Influence | None, tuple[str, ...]]:

@@ -253,7 +253,7 @@ def verdict_of_check(
     return _verdict(rows, f"check run {name}", start.labels, warnings)
 
 
-def _unexplained(r: ComplexArray, covariance: FloatArray, fitted: int, dof: int | None) -> tuple[str, ...]:
+def _unexplained(r: ComplexArray, covariance: FloatArray, fitted: int, dof: float | None) -> tuple[str, ...]:
     """Warn where weights in the planes do not explain the readings: χ² of what is left, r (N,)."""
     vector = np.stack((r.real, r.imag), axis=-1)
     trace = np.trace(covariance, axis1=1, axis2=2)
@@ -278,7 +278,7 @@ def _readings(
     readings: ComplexArray,
     covariance: FloatArray | None,
     limit: FloatArray | None,
-    dof: int | None,
+    dof: float | None,
 ) -> list[Judgement]:
     if limit is None:
         return []

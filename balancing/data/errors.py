@@ -114,7 +114,7 @@ def mean_covariance(trials: Trials, errors: ReadingErrors | None) -> FloatArray:
 def _rounding(trials: Trials) -> FloatArray:
     """Variance of uniform errors of half the last digit of amplitude and phase."""
     mean = trials.mean
-    if getattr(trials, "steps", None) is None:
+    if trials.steps is None:
         return np.zeros((*mean.shape, 2, 2))
     amplitude, phase = np.nanmean(trials.steps, axis=1) / np.sqrt(12.0)
     return _turned(mean, amplitude**2, (phase * np.abs(mean)) ** 2)

@@ -79,6 +79,10 @@ class Trials:
         Units and conventions to print results in.
     warnings
         What the user should know about how the readings were understood.
+    steps
+        Steps in which the readings are written, of the amplitude (SI) and of the phase (rad): an instrument
+        that shows whole degrees rounds by up to half of one. Shape (2, K, R, S, C), or (2, R, S, C) for
+        K = 1, NaN where there is no reading; None where they are not rounded.
 
     Raises
     ------
@@ -96,6 +100,7 @@ class Trials:
     labels: Labels = field(default_factory=Labels)
     warnings: tuple[str, ...] = ()
     run_errors: RunScatter | None = None
+    steps: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for name in ("runs", "sensors", "planes"):
@@ -122,6 +127,22 @@ class Trials:
         for name, array in (("readings", readings), ("weights", weights)):
             array.flags.writeable = False
             object.__setattr__(self, name, array)
+        if self.steps is not None:
+            object.__setattr__(self, "steps", self._checked_steps(self.steps))
+
+    def _checked_steps(self, given: FloatArray) -> FloatArray:
+        steps = np.array(given, dtype=np.float64)
+        if steps.ndim == 4:
+            steps = steps[:, None]
+        if steps.shape != (2, *self.readings.shape):
+            wanted = (2, *self.readings.shape)
+            raise ValueError(f"steps must have shape {wanted} or be None; got {steps.shape}")
+        missing = np.isnan(self.readings)
+        if not (missing | (np.isfinite(steps) & (steps >= 0))).all():
+            raise ValueError("the step in which a reading is written must be a finite number ≥ 0")
+        steps[:, missing] = np.nan
+        steps.flags.writeable = False
+        return steps
 
     def _check_readings(self, readings: ComplexArray) -> None:
         missing = np.isnan(readings)

@@ -33,7 +33,8 @@ class Sample:
     about
         One line for the list.
     sources
-        Files and folders of the sample data; of folders all tables, model, job and explaining files.
+        Files and folders of the sample data; of folders all tables, model, job and
+        explaining files, and licenses.
     steps
         What is run, in order.
     pictures
@@ -101,6 +102,12 @@ SAMPLES = {
             ),
         ),
         ("discs.png",),
+    ),
+    "rig": Sample(
+        "a real rig: eleven runs with known weights, each read three times",
+        ("rk4",),
+        (Step("balance", "Weights", ("balance", "{}/rk4/job.toml", "--plot", "{}/balance.png")),),
+        ("balance.png",),
     ),
     "rotor": Sample(
         "a compressor: critical speeds, Campbell diagram, response with margins",

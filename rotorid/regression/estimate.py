@@ -241,7 +241,7 @@ class Estimate:
         return text
 
 
-def coverage_factor(dof: int | None) -> float | None:
+def coverage_factor(dof: float | None) -> float | None:
     """Half width of a 95 % interval in standard deviations.
 
     Parameters

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from docs_blocks import blocks, first_difference
 
 from rotorid import read_ode_model
 
@@ -30,6 +31,14 @@ PINNED = {
         "modelled_g_mm": 340.033712,
         "modelled_deg": 188.354075,
         "rms_ratio": 0.648286754,
+    },
+    "rk4": {
+        "reading_um": 0.0414698597,
+        "run_um": 0.362017947,
+        "correlation": 3.02952677,
+        "cosine": 0.939968935,
+        "sum_um_per_g_mm": 0.882868546,
+        "couple_um_per_g_mm": 0.036482639,
     },
     "rotor_critical_speeds": {
         "first_critical_rpm": 4066.83591,
@@ -179,6 +188,23 @@ def test_the_model_file_of_a_reduction_is_read_by_fit(tmp_path):
     load("reduce_for_control").main(str(tmp_path / "small.toml"))
     model = read_ode_model(tmp_path / "small.toml")
     assert list(model.parameters) == ["d_x7", "d_x12", "d_x18"]
+
+
+def test_the_page_of_the_rig_shows_what_the_example_prints(ran):
+    """And the tables have a line for each run that is estimated."""
+    _, text, _ = ran("rk4")
+    (shown,) = [block for block in blocks(FOLDER.parent / "docs" / "rk4.md") if block.kind == "text"]
+    assert len(shown.text.splitlines()) == 6
+    assert first_difference(shown.text.splitlines(), text) is None
+    runs = [line.split()[0] for line in text.splitlines() if line.endswith(("silent", "warned"))]
+    all_others = ["A001", "A002", "A007", "A008", "A009", "A015", "A017", "A018", "A019", "A020"]
+    assert runs == [*all_others, *(run for run in all_others if run not in ("A007", "A015"))]
+    assert len([line for line in text.splitlines() if "regions that hold the truth" in line]) == 2
+
+
+def test_the_methods_of_the_rig(capsys):
+    load("rk4").main("weighted")
+    assert "regions that hold the truth, of 8" in capsys.readouterr().out
 
 
 def test_an_example_runs_as_a_script(tmp_path):

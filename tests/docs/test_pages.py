@@ -11,7 +11,7 @@ from rotorid.samples import sample_data
 
 DOCS = sample_data().parent / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
-PAGES = [*STARTS, DOCS / "validation.md", *sorted((DOCS / "api").glob("*.md"))]
+PAGES = [*STARTS, DOCS / "rk4.md", DOCS / "validation.md", *sorted((DOCS / "api").glob("*.md"))]
 
 
 @pytest.fixture

@@ -153,6 +153,7 @@ bk-weighted-no-errors       balance sample_data/bk_two_plane/job.toml --method w
 bk-weighted                 balance sample_data/bk_two_plane/job.toml --method weighted --amplitude-error 2 --phase-error 1 --verbose
 left-in                     balance sample_data/left_in/job.toml --history
 left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
+rk4                         balance sample_data/rk4/job.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 template                    balance --template job.xlsx
 balance-misspelt-column     balance misspelt.csv {TURBO}/weights.csv
@@ -266,7 +267,7 @@ PRINTED_ONLY = (
     "task_8_2",
 )
 RECORDS = ("limit_cycle", "quasilinearization", "run_down", "three_masses")
-DEMOS = ("main", "balancing", "holes", "rotor", "reduction", "identification", "record")
+DEMOS = ("main", "balancing", "holes", "rig", "rotor", "reduction", "identification", "record")
 COMMANDS = (
     *(
         "demo",

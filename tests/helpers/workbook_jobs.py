@@ -10,6 +10,7 @@ SAMPLES = (
     "turbo_job/holes",
     "bk_two_plane/job",
     "left_in/job",
+    "rk4/job",
     "model_job/job",
 )
 CHECK = [RUNS[0], *[["check", 1000, s, a, p] for s, a, p in (("A", 0.3, 17), ("B", 0.7, 301.5))]]

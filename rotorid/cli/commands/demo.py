@@ -15,7 +15,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.cli.common import JsonOption, json_text, provenance
 from rotorid.cli.demo_samples import SAMPLES, Sample
 
-COPIED = (".csv", ".toml", ".md")
+COPIED = (".csv", ".toml", ".md", ".txt")
 
 
 def demo(

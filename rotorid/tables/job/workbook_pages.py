@@ -7,10 +7,11 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any
 
 from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS, Line
-from rotorid.tables.reader.grid import BadCell, Cell, show
+from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576
@@ -129,6 +130,8 @@ def _put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
     if isinstance(value, float):
         # Given a float, openpyxl would keep 16 digits; 17 are needed.
         cell.value, cell.data_type = repr(value), "n"
+        if isinstance(value, Shown):
+            cell.number_format = _number_format(value.text)
     elif isinstance(value, str):
         if len(value) > LONGEST_TEXT:
             raise ValueError(
@@ -140,6 +143,14 @@ def _put(cell: Any, value: Cell, title: str) -> None:  # noqa: ANN401
         cell.value, cell.data_type = value, "s"  # never a formula
     else:
         cell.value = value
+
+
+def _number_format(text: str) -> str:
+    """The number format that shows a number with the digits of this text."""
+    _, digits, exponent = Decimal(text).as_tuple()
+    power = "e" in text.lower()
+    decimals = len(digits) - 1 if power else -int(exponent)
+    return f"0{'.' if decimals else ''}{'0' * decimals}{'E+00' if power else ''}"
 
 
 def _comment(text: str) -> Any:  # noqa: ANN401

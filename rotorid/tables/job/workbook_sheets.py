@@ -18,7 +18,7 @@ from typing import Any
 from rotorid.tables.job.source import JobTables
 from rotorid.tables.job.workbook_reading import TABLES
 from rotorid.tables.reader.columns import REMARKS
-from rotorid.tables.reader.grid import Cell, Grid, Row, show
+from rotorid.tables.reader.grid import Cell, Grid, Row, Shown, show
 from rotorid.tables.reader.number import decimal_comma, parse_number
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key", "hole_names", "station")
@@ -103,6 +103,9 @@ def _number(cell: Cell, separator: str, *, comma: bool) -> Cell:
     if not isinstance(cell, str) or not cell:
         return cell
     value = parse_number(cell, comma=comma, separator=separator)
+    text = cell.replace(",", ".").rstrip(".")
+    if text != show(value) and (value or "e" not in text.lower()):
+        return Shown(value, text)  # 12.50 keeps its digits
     whole = value.is_integer() and abs(value) < 1e15 and (value != 0 or math.copysign(1.0, value) > 0)
     return int(value) if whole else value
 

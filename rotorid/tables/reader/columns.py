@@ -13,6 +13,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
+from rotorid.tables.reader.digits import written_steps
 from rotorid.tables.reader.grid import BadCell, Cell, Grid, make_grid, show
 from rotorid.tables.reader.number import (
     NotANumber,
@@ -110,6 +111,10 @@ class Table:
         if stem not in self.fields:
             return np.full(len(self.rows), missing)
         return self.fields[stem].numbers
+
+    def steps(self, stem: str) -> FloatArray:
+        """Steps in SI in which the numbers of a column without problems are written, shape (rows,)."""
+        return np.asarray(written_steps(self.fields[stem].cells) * self.unit(stem).to_si(1.0))
 
     def texts(self, stem: str) -> tuple[str, ...]:
         """Values of a text column."""

@@ -22,6 +22,18 @@ class BadCell:
     expected: str
 
 
+class Shown(float):
+    """A number of a workbook with the digits that its format shows, such as 12.50."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> Shown:
+        """The number of this text."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+
 Cell = str | int | float | BadCell
 Row = tuple[int, tuple[Cell, ...]]
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import datetime
 import io
+import re
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from rotorid.tables.reader.grid import BadCell, Cell, Row, clean
+from rotorid.tables.reader.grid import BadCell, Cell, Row, Shown, clean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 
 SUFFIXES = (".xlsx", ".xlsm")
+_DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
+"""A number format with decimals or a power of ten."""
 
 
 def is_workbook(path: Path) -> bool:
@@ -75,8 +78,17 @@ def _cell(cell: Any, written: Any) -> Cell:  # noqa: ANN401
     if isinstance(value, (int, float)):
         if "%" in str(cell.number_format):
             return BadCell(f"{100 * value:g}%", "a plain number; the cell is formatted as a percentage")
-        return value
+        return _with_digits(value, str(cell.number_format))
     return clean(str(value))
+
+
+def _with_digits(value: float, number_format: str) -> float:
+    """The number with the digits that its format shows, if the format shows all of it."""
+    found = _DIGITS.fullmatch(number_format)
+    if found is None:
+        return value
+    text = f"{value:.{len(found[1] or '')}{'e' if found[2] else 'f'}}"
+    return Shown(value, text) if float(text) == value else value
 
 
 def pick_sheet(

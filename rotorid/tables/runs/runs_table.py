@@ -42,6 +42,7 @@ class Runs:
     speeds: FloatArray
     sensors: tuple[str, ...]
     readings: ComplexArray
+    steps: FloatArray
     unit: Unit
     speed_unit: Unit
     warnings: tuple[str, ...] = ()
@@ -87,15 +88,18 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
     unit, speed_unit = table.unit("amplitude"), table.unit("speed")
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         nothing = np.empty((0, len(runs), len(speeds), len(sensors)), dtype=complex)
-        return Runs(table.source, runs, speeds, sensors, nothing, unit, speed_unit)
+        return Runs(table.source, runs, speeds, sensors, nothing, nothing.real, unit, speed_unit)
     values = polar(amplitude, phase, conventions.phase_sign)
     order = _repeat_order(table)
     most = max((len(rows) for rows in cells.values()), default=1)
+    written = np.array([table.steps("amplitude"), table.steps("phase")])
     readings = np.full((most, len(runs), len(speeds), len(sensors)), complex(np.nan, np.nan))
+    steps = np.full((2, *readings.shape), np.nan)
     for place, rows in cells.items():
         for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
             readings[(k, *place)] = values[row]
-    return Runs(table.source, runs, speeds, sensors, readings, unit, speed_unit, merged)
+            steps[(slice(None), k, *place)] = written[:, row]
+    return Runs(table.source, runs, speeds, sensors, readings, steps, unit, speed_unit, merged)
 
 
 def _repeat_order(table: Table) -> list[int]:

@@ -294,7 +294,20 @@ def subtract_slow_roll(trials: Trials, roll: SlowRoll) -> Trials:
     S = roll.at(trials.speeds, trials.sensors)
     errors, words = _widened(trials.errors, float(np.abs(S).max(initial=0.0)), trials.labels)
     warnings = (*trials.warnings, *roll.warnings, *_larger(trials, S), *words)
-    return replace(trials, readings=trials.readings - S, errors=errors, warnings=warnings)
+    steps = None if trials.steps is None else _turned(trials.steps, trials.readings, trials.readings - S)
+    return replace(trials, readings=trials.readings - S, errors=errors, warnings=warnings, steps=steps)
+
+
+def _turned(steps: FloatArray, measured: ComplexArray, left: ComplexArray) -> FloatArray:
+    """Steps of the difference that give the same variances along and across it as those of the measured one.
+
+    The measured amplitude was rounded in its own direction, the phase across; what is left points elsewhere.
+    """
+    amplitude, phase = steps[0] ** 2, (steps[1] * np.abs(measured)) ** 2
+    cos = np.cos(np.angle(left) - np.angle(measured)) ** 2
+    along, across = cos * amplitude + (1 - cos) * phase, (1 - cos) * amplitude + cos * phase
+    size = np.maximum(np.abs(left), 1e-12 * np.abs(measured)) + np.finfo(float).tiny
+    return np.array([np.sqrt(along), np.sqrt(across) / size])
 
 
 def _widened(

@@ -97,4 +97,5 @@ def make_trials(
         errors=errors.in_si(labels) if isinstance(errors, StatedErrors) else errors,
         labels=labels,
         warnings=read.warnings,
+        steps=read.steps,
     )

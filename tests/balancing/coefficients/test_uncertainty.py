@@ -243,7 +243,7 @@ def test_repeats_with_equal_phases_do_not_make_the_phase_exact():
     job = read_job(sample_data() / "bk_two_plane" / "job.toml")
     once = job.trials.readings[:1]
     twice = np.concatenate((once * 0.99, once * 1.01))
-    model = error_model(replace(job.trials, readings=twice, errors=None))
+    model = error_model(replace(job.trials, readings=twice, errors=None, steps=None))
     assert model.errors.phase == pytest.approx(model.errors.amplitude)
     assert model.errors.amplitude == pytest.approx(0.01 * np.sqrt(2), rel=1e-9)
     assert "all repeated phases are equal" in model.warnings[0]

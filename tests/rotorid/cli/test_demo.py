@@ -13,6 +13,7 @@ NUMBERS = {
     "main": ["135.240", "134.203 kg", "416.9  171.6°"],
     "balancing": ["416.9  171.6°", "explained by the stated errors", "13.20  155.9°"],
     "holes": ["No other choice of pieces is better (proven).", "1 × 20 g in hole 4 (at 45°)"],
+    "rig": ["Both planes are determined", "disk 2"],
     "rotor": ["4176.22", "10932.4 rpm", "4391.84"],
     "reduction": ["134.203 kg", "SEREP", "three_masses.toml"],
     "identification": ["c     = 999.935", "only c and b*(1 - delta) are determined"],
@@ -54,6 +55,11 @@ def test_the_commands_are_those_a_user_would_type(cli, tmp_path):
         again = cli(*command[1:])
         assert again.code == 0
         assert again.out in outcome.out
+
+
+def test_the_license_of_a_sample_goes_with_it(cli, tmp_path):
+    assert cli("demo", tmp_path, "--sample", "rig").code == 0
+    assert "MIT License" in (tmp_path / "rk4" / "LICENSE.txt").read_text(encoding="utf-8")
 
 
 def test_json_is_one_document_with_all_results(cli, tmp_path):

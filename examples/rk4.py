@@ -1,0 +1,104 @@
+"""A real rig with known weights: how large the errors are, and whether the regions of the weights hold them.
+
+Run `python examples/rk4.py [METHOD]`. `BASE` is the bare rotor. The weights of a run are estimated from other
+runs: what would have to be added for the bare rotor's vibration is minus what was mounted. The error of the
+bare rotor's vector, which those runs tell too, is left out of the regions.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri, fdtri
+
+import balancing
+from rotorid import read_job
+
+FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"
+UM, G_MM, BARE, FEW = 1e6, 1e6, "BASE", ("BASE", "A007", "A015")
+DISC_1_2_AND_SUM = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+
+
+def main(method: str = "least-squares") -> dict[str, float]:
+    """Print how the runs scatter, then the weights of each run from others; return its key numbers."""
+    trials = read_job(FOLDER / "job.toml").trials
+    found = scatter(trials)
+    others = [run for run in trials.runs if run != BARE]
+    print("\nWeights of each run from all other runs (error and half the longest axis of the 95 % region):")
+    table(trials, {run: [name for name in trials.runs if name != run] for run in others}, method)
+    print(f"\nThe same from {', '.join(FEW)} only:")
+    table(trials, {run: FEW for run in others if run not in FEW}, method)
+    return found
+
+
+def scatter(trials: balancing.Trials) -> dict[str, float]:
+    """Of the readings of one run, and of the runs about Y = Y0 + W T, fitted with equal weights; um."""
+    Y, mean = UM * trials.readings[:, :, 0], UM * trials.mean[:, 0]  # (K, R, C), (R, C)
+    K, R, C = Y.shape
+    reading = np.sqrt(np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (2 * R * (K - 1)))
+    A = np.column_stack([np.ones(R), trials.weights * G_MM])
+    theta, _, rank, _ = np.linalg.lstsq(A, mean, rcond=None)
+    left, W, dof = mean - A @ theta, theta[1:].T, R - rank
+    run = np.sqrt(np.sum(np.abs(left) ** 2) / (2 * dof * C))
+    S = left.T @ left.conj() / dof
+    own = np.sqrt(np.diag(S).real)
+    correlations = np.linalg.eigvalsh(S / np.outer(own, own))[::-1]
+    U, sizes, _ = np.linalg.svd(W)
+    shares, directions = np.linalg.eigh(S)
+    both = abs(np.vdot(U[:, 0], directions[:, -1]))
+    print("Readings of one run scatter by", ", ".join(f"{s:.3f}" for s in reading), "um a component.")
+    print(f"Runs scatter by {run:.2f} um a component about the same linear machine,")
+    print("  eigenvalues of their correlation:", ", ".join(f"{v:.2f}" for v in correlations))
+    print(f"  {shares[-1] / shares.sum():.0%} of their variance stands in one direction of the sensors,")
+    print(f"  at a cosine of {both:.2f} with the one in which both discs move them.")
+    print("Singular values of W:", ", ".join(f"{s:.3f}" for s in sizes), "um per g·mm.")
+    numbers = (np.sqrt(np.mean(reading**2)), run, correlations[0], both, *sizes)
+    names = ("reading_um", "run_um", "correlation", "cosine", "sum_um_per_g_mm", "couple_um_per_g_mm")
+    return {name: float(value) for name, value in zip(names, numbers, strict=True)}
+
+
+def table(trials: balancing.Trials, known: dict[str, Sequence[str]], method: str) -> None:
+    """One line a run: error of disc 1, disc 2 and their sum, and whether the regions hold the truth."""
+    print("  run        disk 1         disk 2         sum of both    (g·mm)")
+    held, warned = np.zeros(3, dtype=int), 0
+    for run, others in known.items():
+        influence = balancing.estimate_influence(of(trials, others))
+        assert influence.baseline is not None
+        one = of(trials, [run])
+        moved = replace(one, readings=one.readings - influence.baseline, weights=0 * one.weights, steps=None)
+        correction = balancing.correct(influence, moved, refuse=False, method=method)
+        error = DISC_1_2_AND_SUM @ (-correction.weights - one.weights[0])
+        covariance, radius2 = regions(correction)
+        z = np.column_stack([error.real, error.imag])
+        inside = np.einsum("ki,kij,kj->k", z, np.linalg.inv(covariance), z) <= radius2
+        sizes = np.sqrt(radius2 * np.linalg.eigvalsh(covariance)[:, -1])
+        rows = zip(G_MM * np.abs(error), G_MM * sizes, inside, strict=True)
+        cells = [f"{e:5.2f} ± {size:5.2f} {'in' if i else '--'}" for e, size, i in rows]
+        print(f"  {run}  {'  '.join(cells)}  {'warned' if correction.warnings else 'silent'}")
+        held, warned = held + inside, warned + bool(correction.warnings)
+    counts = f"disk 1 {held[0]}, disk 2 {held[1]}, sum {held[2]}"
+    print(f"  regions that hold the truth, of {len(known)}: {counts}; warned: {warned}")
+
+
+def regions(correction: balancing.Correction) -> tuple[NDArray[np.float64], float]:
+    """Covariances (3, 2, 2) of both discs and of their sum, and the square of the 95 % radius."""
+    L = np.kron(DISC_1_2_AND_SUM, np.eye(2))
+    joint = (L @ np.asarray(correction.covariance) @ L.T).reshape(3, 2, 3, 2)
+    dof = correction.dof
+    return np.einsum("kakb->kab", joint), chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)
+
+
+def of(trials: balancing.Trials, runs: Sequence[str]) -> balancing.Trials:
+    """Some of the runs."""
+    rows = [trials.runs.index(run) for run in runs]
+    parts = {"readings": trials.readings[:, rows], "weights": trials.weights[rows]}
+    return replace(trials, runs=tuple(runs), **parts, steps=np.asarray(trials.steps)[:, :, rows])
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:2])

@@ -1,0 +1,52 @@
+"""The sample of a real rig: its tables, and the digits in which they are written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotorid.samples import sample_data
+from rotorid.tables import read_job
+
+FOLDER = sample_data() / "rk4"
+
+
+def test_what_the_tables_hold():
+    trials = read_job(FOLDER / "job.toml").trials
+    assert trials.readings.shape == (3, 11, 1, 4)
+    assert not np.isnan(trials.readings).any()
+    assert (trials.sensors, trials.planes) == (("p1x", "p1y", "p2x", "p2y"), ("disk 1", "disk 2"))
+    assert trials.runs[0] == "BASE"
+    assert trials.labels.vibration_unit == "mil"
+    np.testing.assert_allclose(trials.speeds, [1206 * np.pi / 30], rtol=1e-12)
+    grams = 1e6 * trials.weights.real
+    assert dict(zip(trials.runs, map(tuple, grams.round(9)), strict=True)) == {
+        "BASE": (0, 0),
+        "A001": (3, 0),
+        "A002": (6, 0),
+        "A007": (48, 0),
+        "A008": (60, 0),
+        "A009": (0, 3),
+        "A015": (0, 48),
+        "A017": (3, 3),
+        "A018": (6, 6),
+        "A019": (12, 12),
+        "A020": (24, 24),
+    }
+    assert trials.readings[0, 0, 0, 0] == pytest.approx(
+        0.24863 * 25.4e-6 * np.exp(1j * np.deg2rad(70.722)), rel=1e-12
+    )
+
+
+def test_digits_are_those_of_the_table():
+    """Five decimals of a mil and three of a degree, zeros at the end or not."""
+    steps = read_job(FOLDER / "job.toml").trials.steps
+    np.testing.assert_allclose(steps[0], 1e-5 * 25.4e-6, rtol=1e-12)
+    np.testing.assert_allclose(steps[1], np.deg2rad(1e-3), rtol=1e-12)
+
+
+def test_its_license_goes_with_it():
+    text = (FOLDER / "README.md").read_text(encoding="utf-8")
+    assert "Keep these lines and `LICENSE.txt` with every copy." in text
+    assert "MIT License" in text
+    assert "Copyright (c) 2026" in (FOLDER / "LICENSE.txt").read_text(encoding="utf-8")
