@@ -1,8 +1,8 @@
 """A real rig with known weights: how large the errors are, and whether the regions of the weights hold them.
 
 Run `python examples/rk4.py [METHOD]`. `BASE` is the bare rotor. The weights of a run are estimated from other
-runs: what would have to be added for the bare rotor's vibration is minus what was mounted. The error of the
-bare rotor's vector, which those runs tell too, is left out of the regions.
+runs: what would have to be added for the bare rotor's vibration is minus what was mounted, and what corrects
+the difference of both vibrations is minus the weights. Its regions hold the errors of both.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, fdtri
 
 import balancing
+from balancing.coefficients.run_errors import influence_vector, marginal, run_columns
+from balancing.data.errors import mean_covariance
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"
@@ -24,7 +26,7 @@ UM, G_MM, BARE, FEW = 1e6, 1e6, "BASE", ("BASE", "A007", "A015")
 DISC_1_2_AND_SUM = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
 
 
-def main(method: str = "least-squares") -> dict[str, float]:
+def main(method: str = "weighted") -> dict[str, float]:
     """Print how the runs scatter, then the weights of each run from others; return its key numbers."""
     trials = read_job(FOLDER / "job.toml").trials
     found = scatter(trials)
@@ -67,11 +69,10 @@ def table(trials: balancing.Trials, known: dict[str, Sequence[str]], method: str
     print("  run        disk 1         disk 2         sum of both    (g·mm)")
     held, warned = np.zeros(3, dtype=int), 0
     for run, others in known.items():
-        influence = balancing.estimate_influence(of(trials, others))
-        assert influence.baseline is not None
         one = of(trials, [run])
-        moved = replace(one, readings=one.readings - influence.baseline, weights=0 * one.weights, steps=None)
-        correction = balancing.correct(influence, moved, refuse=False, method=method)
+        correction = balancing.correct(
+            difference(balancing.estimate_influence(of(trials, others)), one), refuse=False, method=method
+        )
         error = DISC_1_2_AND_SUM @ (-correction.weights - one.weights[0])
         covariance, radius2 = regions(correction)
         z = np.column_stack([error.real, error.imag])
@@ -83,6 +84,22 @@ def table(trials: balancing.Trials, known: dict[str, Sequence[str]], method: str
         held, warned = held + inside, warned + bool(correction.warnings)
     counts = f"disk 1 {held[0]}, disk 2 {held[1]}, sum {held[2]}"
     print(f"  regions that hold the truth, of {len(known)}: {counts}; warned: {warned}")
+
+
+def difference(influence: balancing.Influence, one: balancing.Trials) -> balancing.Influence:
+    """The coefficients with what a run differs from the bare rotor by as the vibration to correct."""
+    known = (influence.baseline, influence.covariance, influence.common, influence.errors)
+    bare, covariance, common, errors = known
+    assert bare is not None and covariance is not None and common is not None and errors is not None
+    columns = run_columns(influence.run_errors, one.mean, influence_vector(influence.W))
+    flip = np.array([-1.0, -1.0, *np.ones(covariance.shape[-1] - 2)])  # −Y₀, and the new run's own
+    more = np.zeros((2, 2, *common.shape[2:]), dtype=complex)
+    more[..., 0] = columns.common[:, 0]
+    joint = covariance * np.outer(flip, flip) + marginal(more)
+    own = mean_covariance(one, errors)[0] + columns.own[0, ..., None, None] * np.eye(2)
+    joint[..., :2, :2] += own
+    both = np.concatenate((common * flip[::2], more), axis=1)
+    return replace(influence, baseline=one.mean[0] - bare, covariance=joint, common=both)
 
 
 def regions(correction: balancing.Correction) -> tuple[NDArray[np.float64], float]:

@@ -24,7 +24,7 @@ Source: restricted maximum likelihood (Patterson and Thompson 1971).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -395,15 +395,15 @@ def scatter(
     return float(np.sqrt(weight @ q / n)), float(weight @ chdtrc(2 * n, 2 * q))
 
 
-def chance_of_more(
+def seen_in(
     run: RunErrors,
     residual: ComplexArray,
     own: FloatArray,
     between: float,
     common: ComplexArray | None,
     W: ComplexArray,
-) -> float:
-    """Probability that errors alone leave more of the corrected reading than was found.
+) -> tuple[float, RunErrors]:
+    """Probability that errors alone leave more of a corrected reading than was found; what it says of them.
 
     Parameters
     ----------
@@ -420,7 +420,7 @@ def chance_of_more(
 
     rows = Rows(residual[None], np.ones((1, 1)), own[None], W)
     if rows.dof <= 0:
-        return 1.0
+        return 1.0, run
     share = np.array([1 - between, between])
     first = run.ratios[:, 0]
     factor = share[0] * (first if run.merged else 1.0) + share[1] * first
@@ -431,8 +431,11 @@ def chance_of_more(
     by_run = np.concatenate((np.repeat(scale[1][:, None], M, axis=1), nothing), axis=1)
     by_speed = np.concatenate((nothing, np.repeat(scale[0][:, None], M, axis=1)), axis=1)
     both = np.concatenate((columns[0], columns[1]))[None]
-    q = _gaussian(rows, factor[:, None, None, None] * own[None, None], both, by_speed, by_run)[1]
-    return float(run.probability @ chdtrc(2 * rows.dof, 2 * q))
+    log, q = _gaussian(rows, factor[:, None, None, None] * own[None, None], both, by_speed, by_run)
+    known = np.log(np.maximum(run.probability, 1e-300))
+    return float(run.probability @ chdtrc(2 * rows.dof, 2 * q)), replace(
+        run, probability=_normal(known - log - q)
+    )
 
 
 def _agreeing(

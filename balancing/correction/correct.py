@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import check_planes, check_resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import RunErrors, chance_of_more, shares_of
+from balancing.coefficients.run_errors import RunErrors, seen_in, shares_of
 from balancing.correction.choice import coefficients_of, plane_indices, rows_of
 from balancing.correction.correction_warnings import (
     EMPTY,
@@ -328,6 +328,7 @@ def correct(  # noqa: PLR0913
         channels = own[used][..., index[:, None], index].reshape(-1, n, n)
         total = start.covariance[used][..., index[:, None], index].reshape(-1, n, n)
     common = None if start.common is None else start.common[:, :, used][..., [0, *(1 + p for p in chosen)]]
+    seen = None if channels is None else partial(_seen, influence, W, Y, channels, common)
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
@@ -340,7 +341,7 @@ def correct(  # noqa: PLR0913
         partial(amplitude_words, start.labels),
         partial(weight_words, start.labels),
         common,
-        None if channels is None else partial(_explained, influence, W, Y, channels, common),
+        None if seen is None else lambda D: seen(D)[0] > 1 - UNEXPLAINED,
     )
     fitted = fit_weights(stack, method, strength=strength, keep=keep)
     D = fitted.weights
@@ -349,6 +350,8 @@ def correct(  # noqa: PLR0913
     after = Y + influence.W[used][..., chosen] @ D
     after_covariance, covariance, dof, run = None, fitted.covariance, start.model.dof, influence.run_errors
     if covariance is not None and fitted.parts:
+        if baseline is not None and seen is not None and fitted.explained:
+            run = seen(D)[1]
         scale, dof = run.degrees(_shares(influence, fitted), len(covariance), start.model.dof)
         covariance = covariance * scale
     if channels is not None and errors is not None:
@@ -389,20 +392,19 @@ def correct(  # noqa: PLR0913
     return _with_words(result, warnings, influence.notes + notes(result))
 
 
-def _explained(
+def _seen(
     influence: Influence,
     W: ComplexArray,
     Y: ComplexArray,
     channels: FloatArray,
     common: ComplexArray | None,
     D: ComplexArray,
-) -> bool:
-    """Whether errors explain what weights leave (95 %)."""
+) -> tuple[float, RunErrors]:
+    """What weights leave: the probability that errors leave more, and the errors between runs after it."""
     own = np.trace(prediction_covariance(D, channels), axis1=1, axis2=2).reshape(Y.shape) / 2
     shared = None if common is None else common @ np.concatenate(([1.0], D))
     residual, free = Y + (W @ D).reshape(Y.shape), W.reshape(*Y.shape, -1)
-    chance = chance_of_more(influence.run_errors, residual, own, influence.own_between, shared, free)
-    return chance > 1 - UNEXPLAINED
+    return seen_in(influence.run_errors, residual, own, influence.own_between, shared, free)
 
 
 def _shares(influence: Influence, fitted: Fitted) -> FloatArray:
