@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
-from balancing.coefficients.run_errors import influence_vector, marginal, run_columns
+from balancing.coefficients.run_errors import marginal, run_columns, runs_of
 from balancing.data.conventions import Labels
 from balancing.data.errors import ErrorModel, error_model, mean_covariance, reading_covariance, symmetric
 from balancing.data.trials import ReadingErrors, Trials
@@ -101,7 +101,7 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
         return Start(readings, None, known, (), influence.labels, None)
     variance = reading_covariance(readings, known.errors)
     nothing = np.zeros(len(influence.planes), dtype=complex)
-    return _with_coefficients(influence, readings, readings[None], variance, nothing, known)
+    return _with_coefficients(influence, readings, readings[None], variance, nothing[None], known)
 
 
 def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start:
@@ -124,7 +124,9 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
             _mounted_last(influence, trials, mounted),
         )
     variance = mean_covariance(trials, model.errors)[pick].mean(axis=0) / len(trials.runs)
-    start = _with_coefficients(influence, readings, trials.mean[pick], variance, mean, _joined(model, known))
+    start = _with_coefficients(
+        influence, readings, trials.mean[pick], variance, mounted, _joined(model, known)
+    )
     return start._replace(
         labels=trials.labels,
         mounted=_mounted_last(influence, trials, mounted),
@@ -219,12 +221,12 @@ def _with_coefficients(
             "baseline run alone, the real ones are larger",
         )
     else:
-        effect = stretch(mounted[None])  # W T as a row
+        effect = stretch(mounted.mean(axis=0)[None])  # W T as a row
         change = np.eye(2 * P + 2)
         change[:2, :2] = 0.0
         change[:2, 2:] = -effect
         covariance = change @ influence.covariance @ change.T
-    columns = run_columns(influence.run_errors, runs, influence_vector(influence.W))
+    columns = run_columns(influence.run_errors, runs_of(runs, mounted, influence.W))
     R = len(runs)
     further = columns.common.reshape(2, -1, S, C) / R
     covariance[..., :2, :2] += variance + (columns.own.sum(axis=0) / R**2)[..., None, None] * np.eye(2)
@@ -233,7 +235,7 @@ def _with_coefficients(
     covariance += marginal(common)
     if influence.common is not None:
         before = influence.common.copy()
-        before[..., 0] = -before[..., 1:] @ mounted
+        before[..., 0] = -before[..., 1:] @ mounted.mean(axis=0)
         common = np.concatenate((before, common), axis=1)
     return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common)
 

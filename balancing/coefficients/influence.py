@@ -22,9 +22,9 @@ from balancing.coefficients.run_errors import (
     corrected_row,
     estimated,
     given,
-    influence_vector,
     marginal,
     run_columns,
+    runs_of,
     scatter,
     shares_of,
     spare_rows,
@@ -195,25 +195,26 @@ def estimate_influence(trials: Trials) -> Influence:
     Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
     merged = model.source == "assumed" and R > P + 1  # the runs themselves tell all errors in one
     reading = mean_covariance(trials, None if merged else model.errors)
-    theta = np.einsum("scpr,scr->scp", _gain(A, reading, trials.mean, RunErrors()), Y)
+    theta = np.einsum("scpr,scr->scp", _gain(A, reading, np.zeros(reading.shape[:3])), Y)
     run = _between_runs(trials, A, theta, reading, model)
     if merged:
         model, run = _as_readings(run, trials, model)
         reading = mean_covariance(trials, model.errors)
-    G = _gain(A, reading, trials.mean, run)
+    W = theta[..., 1:]
+    between = run.variance(trials.mean, np.einsum("scp,rp->rsc", W, trials.weights))
+    G = _gain(A, reading, between)
     theta = np.einsum("scpr,scr->scp", G, Y)
     # a rotor at rest is at rest: what is left of its readings is rounding
     theta[..., 0][np.abs(theta[..., 0]) < EQUAL * np.abs(Y).max(axis=-1)] = 0.0
-    covariance, common, dof, own_between = joint_covariance(
-        G, reading, run_columns(run, trials.mean, influence_vector(theta[..., 1:])), run, model
-    )
+    runs = runs_of(trials.mean, trials.weights, theta[..., 1:])
+    covariance, common, dof, own_between = joint_covariance(G, reading, run_columns(run, runs), run, model)
     try:
         check_effects(trials, theta[..., 1:], covariance if known(model) else _digits(trials, G))
     except UndeterminedError as error:
         raise refusal(str(error), trials.warnings + repeated) from error
     warnings = trials.warnings + repeated + model.warnings
     if model.source == "stated" and R > P + 1:
-        warnings += check_consistency(trials, A, reading, run, influence_vector(theta[..., 1:]))
+        warnings += check_consistency(trials, A, reading, runs)
     return Influence(
         speeds=trials.speeds,
         sensors=trials.sensors,
@@ -263,29 +264,30 @@ def _between_runs(
 ) -> RunErrors:
     """Errors between runs: stated, estimated from redundant runs, assumed, or none beside stated errors."""
     one_direction = np.trace(reading, axis1=-2, axis2=-1) / 2
-    Y, pattern = trials.mean, influence_vector(theta[..., 1:])
-    spare = spare_rows(A, Y, one_direction)
-    rows = (spare, *corrected_row(A, Y, one_direction, theta))
+    runs = runs_of(trials.mean, trials.weights, theta[..., 1:])
+    spare = spare_rows(A, runs.Y, one_direction)
+    rows = (spare, *corrected_row(A, runs.Y, one_direction, theta))
     stated = trials.run_errors
-    if stated is not None and (spare.dof == 0 or scatter([spare], Y, pattern, *stated)[1] > 1 - EXPLAINED):
-        return given(rows, Y, pattern, *stated, "stated")
+    if stated is not None and (spare.dof == 0 or scatter([spare], runs, *stated)[1] > 1 - EXPLAINED):
+        return given(rows, runs, *stated, "stated")
     if spare.dof:
-        return estimated(rows, Y, pattern)
+        return estimated(rows, runs)
     if model.source == "stated":
         return RunErrors()
-    return given(rows, Y, pattern, ASSUMED_RUN, 0.0, "assumed")
+    return given(rows, runs, ASSUMED_RUN, 0.0, "assumed")
 
 
 def _as_readings(run: RunErrors, trials: Trials, model: ErrorModel) -> tuple[ErrorModel, RunErrors]:
     """What each reading has of its own between runs read once cannot be told from its own error."""
-    p, f = float(run.relative[0]), float(run.floor[0])
-    if max(p * np.abs(trials.mean).max(), f) < EQUAL * np.abs(trials.mean).max():
+    p, w, f = map(float, run.sizes[:, 0])
+    if max((p + w) * np.abs(trials.mean).max(), f) < EQUAL * np.abs(trials.mean).max():
         words = "the runs agree to the last digit: they say nothing about the errors of the readings"
         return replace(model, warnings=(*model.warnings, words)), RunErrors()
-    rest = np.array([0.0, 1.0, 1.0])
+    rest = run.sizes.copy()
+    rest[[0, 2], 0] = 0.0
     return (
-        ErrorModel(ReadingErrors(p, p, f), None, "residuals", model.warnings),
-        replace(run, relative=run.relative * rest, floor=run.floor * rest, merged=True),
+        ErrorModel(ReadingErrors(p or 1e-12, p, f), None, "residuals", model.warnings),
+        replace(run, sizes=rest, merged=True),
     )
 
 
@@ -315,23 +317,21 @@ def joint_covariance(
     return symmetric(total), common, run.degrees(shares, 2, model.dof)[1], own_between
 
 
-def _gain(A: ComplexArray, reading: FloatArray, Y: ComplexArray, run: RunErrors) -> ComplexArray:
+def _gain(A: ComplexArray, reading: FloatArray, between: FloatArray) -> ComplexArray:
     """(Y₀, W₁, …) = G Y, (S, C, P + 1, R), with rows weighted by the mean variance of both directions.
 
     Parameters
     ----------
     reading
         Covariances by the errors of the readings, (R, S, C, 2, 2).
-    Y
-        Readings, (R, S, C).
+    between
+        Variances by the errors between runs, (R, S, C).
     """
     R, n = A.shape
-    variance = np.trace(reading, axis1=-2, axis2=-1) / 2
-    variance += np.sum(run.relative**2) * np.abs(Y) ** 2 + np.sum(run.floor**2)
-    variance = np.moveaxis(variance, 0, -1)
+    variance = np.moveaxis(np.trace(reading, axis1=-2, axis2=-1) / 2 + between, 0, -1)
     largest = variance.max(axis=-1, keepdims=True)
     if n == R or not largest.any():
-        return np.broadcast_to(gain(A), (*Y.shape[1:], n, R))
+        return np.broadcast_to(gain(A), (*between.shape[1:], n, R))
     # a reading near zero would otherwise count infinitely much
     variance = np.where(largest > 0, np.maximum(variance, 1e-4 * largest), 1.0)
     root = 1 / np.sqrt(variance)

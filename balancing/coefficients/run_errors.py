@@ -1,18 +1,19 @@
 """Errors between runs: what the same rotor with the same weights shows another time.
 
 Mounting, thermal state, drift and what is not linear change a whole run, however often it is read. A reading
-Y of a run has, besides its own error, one of the variance p²|Y|² + f² in each direction, of three kinds: its
-own at each sensor; common to the sensors at a speed; common to the run. What is common changes all readings
-in proportion (the part p), or as a further unbalance does (the part f): along the influence vector, in which
-all planes together move the sensors most. On a real rig nearly all of it is common
-(`sample_data/rk4`): errors taken as independent then cover single planes, but not their sum.
+Y of a run has, besides its own error, one of the variance p²|Y|² + w²|W T|² + f² in each direction, in
+proportion to the reading, to what the mounted weights do, and to neither; of three kinds: its own at each
+sensor; common to the sensors at a speed; common to the run. What is common changes all readings in proportion
+(p), as other weights do (w), or as a further unbalance does (f): along the influence vector, in which all
+planes together move the sensors most. On a real rig nearly all of it is common (`sample_data/rk4`): errors
+taken as independent then cover single planes, but not their sum.
 
 Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
 the corrected reading, Y₀ + W D, free of D. For a complex normal error of covariance Σ
 
     log L = −log det Σ − eᴴ Σ⁻¹ e,
 
-taken on a grid of sizes (logarithmic, each as likely), mixtures of p and f, and shares of the kinds. The
+taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of the kinds. The
 grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once. A
 covariance of n numbers, λ times one of known size, is passed on with degrees of freedom ν:
 
@@ -38,8 +39,8 @@ ASSUMED = 0.02
 """Of a reading, from run to run, where nothing says more."""
 SIZES = np.geomspace(3e-4, 1.0, 12)
 """Whole size relative to the root mean square reading; refined where the likelihood is."""
-MIXTURES = (0.0, 0.4, 1.0)
-"""Share of f² in the variance of a root mean square reading."""
+MIXTURES = np.array([(1.0, 0, 0), (0.6, 0, 0.4), (0, 0, 1.0), (0, 0.5, 0.5), (0.5, 0.5, 0)])
+"""Shares of p, w and f in the mean variance of the readings."""
 SHARES = (0.04, 0.3, 0.6, 1.0)
 """Of the kind own in the variance; no error between runs is common to all sensors to the last digit."""
 EXPLAINED = 0.95
@@ -55,8 +56,9 @@ class RunErrors:
 
     Attributes
     ----------
-    relative, floor
-        Of the reading, and in its unit, for the kinds own, common at a speed, common to the run; (3,) each.
+    sizes
+        Of the reading, of the weights' effect, and in the unit of a reading, for the kinds own, common at a
+        speed, common to the run, (3, 3).
     origin
         Where they come from.
     interval
@@ -67,17 +69,17 @@ class RunErrors:
         Whether the kind own stands among the errors of the readings: runs read once do not tell them apart.
     """
 
-    relative: FloatArray = field(default_factory=lambda: np.zeros(3))
-    floor: FloatArray = field(default_factory=lambda: np.zeros(3))
+    sizes: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
     origin: Origin = "none"
     interval: tuple[float, float] | None = None
     probability: FloatArray = field(default_factory=lambda: np.ones(1))
     ratios: FloatArray = field(default_factory=lambda: np.ones((1, 3)))
     merged: bool = False
 
-    def variance(self, readings: ComplexArray) -> FloatArray:
-        """Of each reading in a further run, in one direction, all kinds together."""
-        return np.asarray(np.sum(self.relative**2) * np.abs(readings) ** 2 + np.sum(self.floor**2))
+    def variance(self, readings: ComplexArray, effect: ComplexArray) -> FloatArray:
+        """Of each reading in a run whose weights do `effect`, in one direction, all kinds together."""
+        p, w, f = np.sum(self.sizes**2, axis=1)
+        return np.asarray(p * np.abs(readings) ** 2 + w * np.abs(effect) ** 2 + f)
 
     def degrees(
         self, shares: FloatArray, n: int, reading_dof: float | None = None
@@ -123,6 +125,37 @@ def _root(function: Callable[[float], float], within: FloatArray) -> float:
     if function(low) >= 0:
         return low
     return high if function(high) <= 0 else float(brentq(function, low, high, rtol=1e-4))
+
+
+class Runs(NamedTuple):
+    """Readings and what the mounted weights do of them, (R, S, C), and the influence vector, (S, C).
+
+    The latter of root mean square 1 at each speed.
+    """
+
+    Y: ComplexArray
+    effect: ComplexArray
+    vector: ComplexArray
+
+    @property
+    def along(self) -> ComplexArray:
+        """What errors in common go along, (3, R, S, C)."""
+        return np.stack((self.Y, self.effect, np.broadcast_to(self.vector, self.Y.shape)))
+
+    @property
+    def size(self) -> FloatArray:
+        """Variance of each reading by errors of size 1, (3, R, S, C)."""
+        return np.stack((np.abs(self.Y) ** 2, np.abs(self.effect) ** 2, np.ones(self.Y.shape)))
+
+    @property
+    def mean(self) -> FloatArray:
+        """Mean variance of all readings by errors of size 1, (3,)."""
+        return np.asarray(self.size.mean(axis=(1, 2, 3)))
+
+
+def runs_of(Y: ComplexArray, weights: ComplexArray, W: ComplexArray) -> Runs:
+    """Runs with the readings (R, S, C) and weights (R, P) at the coefficients (S, C, P)."""
+    return Runs(Y, np.einsum("scp,rp->rsc", W, weights), influence_vector(W))
 
 
 class Rows(NamedTuple):
@@ -193,18 +226,17 @@ def corrected_row(
 
 
 class RunColumns(NamedTuple):
-    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 2, S, C)."""
+    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 3, S, C)."""
 
     own: FloatArray
     common: ComplexArray
 
 
-def run_columns(run: RunErrors, Y: ComplexArray, pattern: ComplexArray) -> RunColumns:
-    """Of runs with the readings Y (R, S, C) and the influence vector (S, C); common as `Influence.common`."""
-    own = run.relative[0] ** 2 * np.abs(Y) ** 2 + run.floor[0] ** 2
-    along = np.broadcast_to(pattern, Y.shape)
-    by_kind = [np.stack((run.relative[k] * Y, run.floor[k] * along), axis=1) for k in (2, 1)]
-    return RunColumns(own, np.stack(by_kind))
+def run_columns(run: RunErrors, runs: Runs) -> RunColumns:
+    """Of such runs; the common ones as `Influence.common`."""
+    own = np.einsum("b,brsc->rsc", run.sizes[:, 0] ** 2, runs.size)
+    common = [np.moveaxis(run.sizes[:, k, None, None, None] * runs.along, 0, 1) for k in (2, 1)]
+    return RunColumns(own, np.stack(common))
 
 
 def influence_vector(W: ComplexArray) -> ComplexArray:
@@ -235,58 +267,34 @@ def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
     return np.asarray(values / values.sum() if values.sum() > 0 else np.eye(len(values))[0])
 
 
-class _Grid(NamedTuple):
-    """Variances p² and f² of the three kinds at each point, (G, 3)."""
-
-    relative: FloatArray
-    floor: FloatArray
-
-
-def _grid(sizes: FloatArray, reading: float, kinds: int, *, mixtures: tuple[float, ...] = MIXTURES) -> _Grid:
-    """All sizes with all mixtures and shares; `kinds`: 1 without, 2 or 3 with common errors."""
+def _grid(whole: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> FloatArray:
+    """Variances of errors of size 1 at all sizes with all mixtures and shares, (G, 3, 3) as `RunErrors.sizes`."""
+    _, S, C = runs.Y.shape
     shares = [(1.0, 0.0, 0.0)]
-    if kinds > 1:
+    if S * C > 1:
         shares += [(own, 0.0, 1 - own) for own in SHARES[:-1]]
-    if kinds > 2:
+    if S > 1 and C > 1:
         shares += [
-            (own, part * (1 - own), (1 - part) * (1 - own)) for own in SHARES[:-1] for part in (0.5, 1.0)
+            (own, (1 - own) * part, (1 - own) * (1 - part)) for own in SHARES[:-1] for part in (0.5, 1.0)
         ]
-    variance, mixture, which = (
-        each.ravel() for each in np.meshgrid(sizes**2, mixtures, np.arange(len(shares)), indexing="ij")
-    )
-    share = np.array(shares)[which]
-    return _Grid(
-        (variance * (1 - mixture))[:, None] * share, (variance * mixture)[:, None] * share * reading**2
-    )
+    used = mixtures[(mixtures[:, 1] == 0) | bool(runs.mean[1] > 0)]
+    each = used / np.where(runs.mean > 0, runs.mean, 1.0) * runs.mean[0]
+    return np.einsum("g,mb,hk->gmhbk", whole**2, each, np.array(shares)).reshape(-1, 3, 3)
 
 
-def likelihood(
-    rows: Rows, Y: ComplexArray, pattern: ComplexArray, at: _Grid
-) -> tuple[FloatArray, FloatArray]:
-    """Log det Σ and eᴴ Σ⁻¹ e at every point of a grid, (G,) each.
-
-    Parameters
-    ----------
-    rows
-        Residuals.
-    Y
-        Readings, (R, S, C), that the part p is common along.
-    pattern
-        Influence vector, (S, C), of root mean square 1 at each speed, that the part f is common along.
-    """
-    own = np.einsum("kr,rsc->ksc", rows.share, np.abs(Y) ** 2)
-    total = rows.share.sum(axis=1)
-    variance = rows.known + at.relative[:, 0, None, None, None] * own
-    variance = variance + (at.floor[:, [0]] * total)[..., None, None]
-    along_run = np.sqrt(rows.share)[..., None, None] * Y
-    along_vector = np.sqrt(total)[:, None, None, None] * pattern
-    columns = np.concatenate((along_run, along_vector), axis=1)  # (K, M, S, C)
+def likelihood(rows: Rows, runs: Runs, at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Log det Σ and eᴴ Σ⁻¹ e of residuals at every point of a grid (G, 3, 3), (G,) each."""
+    own = np.einsum("gb,kr,brsc->gksc", at[..., 0], rows.share, runs.size)
+    p, w, f = np.sqrt(rows.share)[..., None, None] * runs.along[:, None]  # (K, R, S, C)
+    # the influence vector is the same in every run: one column
+    f = np.sqrt(rows.share.sum(axis=1))[:, None, None, None] * runs.vector
+    columns = np.concatenate((p, w, f), axis=1)  # (K, M, S, C)
 
     def scale(kind: int) -> FloatArray:
-        both = np.repeat(at.relative[:, [kind]], len(Y), axis=1), at.floor[:, [kind]]
-        return np.sqrt(np.concatenate(both, axis=1))
+        each = np.sqrt(at[..., kind])
+        return np.repeat(each, (len(runs.Y), len(runs.Y), 1), axis=1)
 
-    return _gaussian(rows, variance, columns, scale(1), scale(2))
+    return _gaussian(rows, rows.known + own, columns, scale(1), scale(2))
 
 
 def _gaussian(
@@ -336,61 +344,50 @@ def _reduced(
     return gram - found[..., :n], h - found[..., n], less, log
 
 
-def estimated(rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray) -> RunErrors:
+def estimated(rows: Sequence[Rows], runs: Runs) -> RunErrors:
     """Size, mixture and kinds of the errors between runs.
 
     Parameters
     ----------
     rows
         Of redundant runs, and of the corrected reading; the latter counts where the former do not contradict.
-    Y
-        Readings, (R, S, C).
-    pattern
-        `influence_vector`.
+    runs
+        All of them.
     """
-    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
-    coarse = _grid(SIZES, reading, _kinds(Y))
-    rows = _agreeing(rows, Y, pattern, coarse, _posterior(rows[:1], Y, pattern, coarse))
-    table = _posterior(rows, Y, pattern, coarse).reshape(len(SIZES), -1)
+    coarse = _grid(SIZES, runs)
+    rows = _agreeing(rows, runs, coarse, _posterior(rows[:1], runs, coarse))
+    table = _posterior(rows, runs, coarse).reshape(len(SIZES), -1)
     seen = np.flatnonzero(table.sum(axis=1) > _LIKELY * table.sum(axis=1).max())
     low, high = SIZES[max(seen[0] - 1, 0)], SIZES[min(seen[-1] + 1, len(SIZES) - 1)]
     sizes = np.geomspace(low, high, FINE)
     kept = np.flatnonzero(table.sum(axis=0) > _UNLIKELY * table.sum(axis=0).max())
-    every = _grid(sizes, reading, _kinds(Y))
-    fine = _Grid(*(each.reshape(FINE, -1, 3)[:, kept].reshape(-1, 3) for each in every))
-    probability = _posterior(rows, Y, pattern, fine)
+    fine = _grid(sizes, runs).reshape(FINE, -1, 3, 3)[:, kept].reshape(-1, 3, 3)
+    probability = _posterior(rows, runs, fine)
     cumulated = np.cumsum(probability.reshape(FINE, -1).sum(axis=1))
-    limits = np.interp((0.025, 0.975), cumulated, sizes) * reading
-    return _of_grid(fine, probability, reading, "estimated", (float(limits[0]), float(limits[1])))
+    limits = np.interp((0.025, 0.975), cumulated, sizes) * np.sqrt(runs.mean[0])
+    return _of_grid(fine, probability, runs, "estimated", (float(limits[0]), float(limits[1])))
 
 
-def given(
-    rows: Sequence[Rows],
-    Y: ComplexArray,
-    pattern: ComplexArray,
-    relative: float,
-    floor: float,
-    origin: Origin,
-) -> RunErrors:
+def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origin: Origin) -> RunErrors:
     """Errors of known size; the data (as `estimated`) say only how much of them is common."""
-    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
-    at = _known(Y, relative, floor)
-    if at is None:
+    at = _known(runs, relative, floor)
+    if not at.any():
         return RunErrors(origin=origin)
-    own = _Grid(*(each[:1] for each in at))
-    rows = _agreeing(rows, Y, pattern, own, np.ones(1))
-    return _of_grid(at, _posterior(rows, Y, pattern, at), reading, origin, None)
+    rows = _agreeing(rows, runs, at[:1], np.ones(1))
+    return _of_grid(at, _posterior(rows, runs, at), runs, origin, None)
 
 
 def scatter(
-    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, relative: float = 0.0, floor: float = 0.0
+    rows: Sequence[Rows], runs: Runs, relative: float = 0.0, floor: float = 0.0
 ) -> tuple[float, float]:
-    """How many times errors of known size the residuals are, and the probability of more, whatever is common."""
+    """How many times errors of known size the residuals are, and the probability of more.
+
+    Whatever is common: shares count by how well they fit at the best size.
+    """
     from scipy.special import chdtrc
 
     n = sum(each.dof for each in rows)
-    at = _known(Y, relative, floor) or _Grid(np.zeros((1, 3)), np.zeros((1, 3)))
-    log, q = _likelihood(rows, Y, pattern, at)
+    log, q = _likelihood(rows, runs, _known(runs, relative, floor))
     weight = _normal(-log - n * np.log(np.maximum(q, 1e-300)))
     return float(np.sqrt(weight @ q / n)), float(weight @ chdtrc(2 * n, 2 * q))
 
@@ -438,9 +435,7 @@ def seen_in(
     )
 
 
-def _agreeing(
-    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid, probability: FloatArray
-) -> Sequence[Rows]:
+def _agreeing(rows: Sequence[Rows], runs: Runs, at: FloatArray, probability: FloatArray) -> Sequence[Rows]:
     """The rows without the corrected reading where it is beyond what the grid explains (95 %).
 
     Unbalance outside the planes leaves such a rest; it says nothing of the errors.
@@ -449,40 +444,31 @@ def _agreeing(
 
     kept = [each for each in rows if not each.free.shape[-1]]
     for each in (each for each in rows if each.free.shape[-1]):
-        q = _likelihood([each], Y, pattern, at)[1]
+        q = likelihood(each, runs, at)[1]
         if probability @ chdtrc(2 * each.dof, 2 * q) > 1 - EXPLAINED:
             kept.append(each)
     return kept
 
 
-def _known(Y: ComplexArray, relative: float, floor: float) -> _Grid | None:
-    """Every share of errors of one size; None where there are none."""
-    reading = float(np.sqrt(np.mean(np.abs(Y) ** 2)))
-    size = np.hypot(relative * reading, floor)
-    if size == 0:
-        return None
-    return _grid(np.array([size / reading]), reading, _kinds(Y), mixtures=((floor / size) ** 2,))
+def _known(runs: Runs, relative: float, floor: float) -> FloatArray:
+    """Every share of errors of one size, p and f."""
+    parts = np.array([relative**2, 0.0, floor**2]) * runs.mean
+    mixture = parts / (parts.sum() or 1.0)
+    return _grid(np.sqrt([parts.sum() / runs.mean[0]]), runs, mixture[None])
 
 
-def _likelihood(
-    rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid
-) -> tuple[FloatArray, FloatArray]:
+def _likelihood(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sum of `likelihood` over all rows."""
-    log, q = np.zeros((2, len(at.floor)))
+    log, q = np.zeros((2, len(at)))
     for each in rows:
         if each.dof > 0:
-            more = likelihood(each, Y, pattern, at)
+            more = likelihood(each, runs, at)
             log, q = log + more[0], q + more[1]
     return log, q
 
 
-def _kinds(Y: ComplexArray) -> int:
-    R, S, C = Y.shape
-    return 1 if S * C == 1 else 2 if S == 1 or C == 1 else 3
-
-
-def _posterior(rows: Sequence[Rows], Y: ComplexArray, pattern: ComplexArray, at: _Grid) -> FloatArray:
-    log, q = _likelihood(rows, Y, pattern, at)
+def _posterior(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> FloatArray:
+    log, q = _likelihood(rows, runs, at)
     return _normal(-log - q)
 
 
@@ -492,21 +478,22 @@ def _normal(log: FloatArray) -> FloatArray:
 
 
 def _of_grid(
-    at: _Grid, probability: FloatArray, reading: float, origin: Origin, interval: tuple[float, float] | None
+    at: FloatArray,
+    probability: FloatArray,
+    runs: Runs,
+    origin: Origin,
+    interval: tuple[float, float] | None,
 ) -> RunErrors:
     """The grid in one: variances averaged by their precision, so that large ones do not decide."""
-    total = at.relative * reading**2 + at.floor
+    total = np.einsum("gbk,b->gk", at, runs.mean)
     precision = probability / total.sum(axis=1)
-    precision = precision / precision.sum()
-    relative, floor = precision @ at.relative, precision @ at.floor
-    base = relative * reading**2 + floor
-    ratios = total / np.where(base > 0, base, 1.0)
+    variance = np.einsum("g,gbk->bk", precision / precision.sum(), at)
+    base = runs.mean @ variance
     kept = probability > 1e-6 * probability.max()
     return RunErrors(
-        np.sqrt(relative),
-        np.sqrt(floor),
+        np.sqrt(variance),
         origin,
         interval,
         probability[kept] / probability[kept].sum(),
-        ratios[kept],
+        (total / np.where(base > 0, base, 1.0))[kept],
     )

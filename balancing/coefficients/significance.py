@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from balancing.coefficients.identifiability import UndeterminedError
-from balancing.coefficients.run_errors import RunErrors, scatter, spare_rows
+from balancing.coefficients.run_errors import Runs, scatter, spare_rows
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
@@ -103,9 +103,7 @@ def weak_trials(trials: Trials, W: ComplexArray) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def check_consistency(
-    trials: Trials, A: ComplexArray, reading: FloatArray, run: RunErrors, pattern: ComplexArray
-) -> tuple[str, ...]:
+def check_consistency(trials: Trials, A: ComplexArray, reading: FloatArray, runs: Runs) -> tuple[str, ...]:
     """Warn where runs disagree with each other by more than the stated errors explain (95 %).
 
     Parameters
@@ -116,14 +114,12 @@ def check_consistency(
         (1 T), shape (R, P + 1).
     reading
         Covariance of the mean readings by their errors, shape (R, S, C, 2, 2).
-    run
-        Errors between runs: those that are stated explain, those that were estimated only widen.
-    pattern
-        `influence_vector`.
+    runs
+        The same with what their weights do.
     """
     spare = spare_rows(A, trials.mean, np.trace(reading, axis1=-2, axis2=-1) / 2)
     stated = trials.run_errors or (0.0, 0.0)
-    ratio, chance = scatter([spare], trials.mean, pattern, *stated)
+    ratio, chance = scatter([spare], runs, *stated)
     if chance > 1 - LEVEL:
         return ()
     fit = np.linalg.lstsq(A, trials.mean.reshape(len(A), -1), rcond=None)[0]

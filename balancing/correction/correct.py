@@ -355,7 +355,9 @@ def correct(  # noqa: PLR0913
         scale, dof = run.degrees(_shares(influence, fitted), len(covariance), start.model.dof)
         covariance = covariance * scale
     if channels is not None and errors is not None:
-        single = reading_covariance(after, errors) + run.variance(after)[..., None, None] * np.eye(2)
+        single = reading_covariance(after, errors) + run.variance(after, after - Y)[..., None, None] * np.eye(
+            2
+        )
         after_covariance = single + prediction_covariance(D, total).reshape(single.shape)
     result = Correction(
         speeds=influence.speeds[used],

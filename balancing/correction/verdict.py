@@ -23,6 +23,7 @@ from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
 from balancing.correction.choice import plane_indices
 from balancing.correction.correct import Correction
+
 POOR = 1e-3  # TODO
 from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
 from balancing.data.conventions import Labels
