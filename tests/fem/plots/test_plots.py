@@ -167,6 +167,26 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     figure.canvas.draw()
 
 
+def test_a_campbell_diagram_holds_all_frequencies_speeds_and_decrements():
+    above, below = campbell_figure(whirl()).axes[:2]
+    assert above.get_ylim()[0] == 0
+    assert 900 < above.get_ylim()[1] < 1.5 * 900
+    for axes in (above, below):
+        assert axes.get_xlim()[0] == 0
+        assert 1000 < axes.get_xlim()[1] < 1.2 * 1000
+    # decrements from 2 down to −0.1, those above 3 cut off
+    assert -0.5 < below.get_ylim()[0] < -0.1
+    assert 2 < below.get_ylim()[1] < 2.5
+    heavy = whirl()
+    heavy.log_decrements[:, 2] = 20.0
+    assert campbell_figure(heavy).axes[1].get_ylim()[1] == pytest.approx(3.0)
+    # the 1× line ends where the speeds or the frequencies end, whichever is first
+    assert above.get_lines()[4].get_xdata()[-1] == pytest.approx(1.06 * 900)
+    slow = whirl()
+    slow.speeds = slow.speeds / 2
+    assert campbell_figure(slow).axes[0].get_lines()[4].get_xdata()[-1] == pytest.approx(500.0)
+
+
 def test_a_campbell_diagram_of_a_rotor(tmp_path):
     rotor = fem.Rotor([0.25] * 4, 0.05, supports=[fem.Support(1, 1e6, 50.0), fem.Support(5, 1e6, 50.0)])
     result = fem.campbell(rotor, np.linspace(0, 400, 9), 2)

@@ -84,10 +84,19 @@ def test_free_amounts_with_a_step_between_listed_holes(run):
 
 def test_two_weights_at_free_angles(run, tmp_path):
     document = run("35g@120", "--two", "20g,30g", "--json").json
+    assert document["masses"] == pytest.approx([20, 30], rel=1e-12)
+    assert (document["unit"], len(document["solutions"])) == ("g", 2)
     for solution in document["solutions"]:
         a, b = np.exp(1j * np.radians(solution["angles_deg"]))
         assert 20 * a + 30 * b == pytest.approx(35 * np.exp(2j * np.pi / 3), rel=1e-9)
-    outcome = run("35g@120", "--two", "20g,30g", "--plot", tmp_path / "two.svg")
+    files = ("--plot", tmp_path / "two.svg", "--output", tmp_path / "two.csv")
+    outcome = run("35g@120", "--two", "20g,30g", *files)
+    table = pd.read_csv(tmp_path / "two.csv", encoding="utf-8-sig")
+    assert table["solution"].tolist() == [1, 1, 2, 2]
+    assert table["mass_g"].to_numpy() == pytest.approx([20, 30, 20, 30], rel=1e-12)
+    assert table["angle_deg"].to_numpy() == pytest.approx(
+        [angle for solution in document["solutions"] for angle in solution["angles_deg"]]
+    )
     assert "20 g at 178.8° and 30 g at 85.2°" in outcome.out
 
 
@@ -102,6 +111,21 @@ def test_drilling_takes_away_opposite(run, way, tmp_path):
     outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.xlsx")
     assert outcome.code == 0, outcome.err
     assert "take away opposite" in outcome.out
+    # what the drill takes, a cylinder and the cone of its tip, 118° wide
+    assert (document["diameter_m"], document["radius_m"]) == pytest.approx((0.008, 0.1))
+    cone = 0.004 / np.tan(np.radians(59))
+    assert document["tip_depth_m"] - document["depth_m"] == pytest.approx(cone, rel=1e-9)
+    mass = 7800 * np.pi * 0.004**2 * (document["depth_m"] + cone / 3)
+    assert document["mass_of_one_kg"] == pytest.approx(mass, rel=1e-9)
+    table = pd.read_excel(tmp_path / "t.xlsx")
+    assert table["hole"].tolist() == [k + 1 for k in range(len(document["holes"]))]
+    assert table["angle_deg"].tolist() == pytest.approx([hole["angle_deg"] for hole in document["holes"]])
+    assert table["mass_g"].to_numpy() == pytest.approx(1e3 * mass, rel=1e-9)
+    assert table["diameter_mm"].to_numpy() == pytest.approx(8)
+    assert table["depth_mm"].to_numpy() == pytest.approx(1e3 * document["depth_m"])
+    assert table["tip_depth_mm"].to_numpy() == pytest.approx(1e3 * document["tip_depth_m"])
+    assert f"{1e3 * mass:.4g} g" in outcome.out
+    assert f"tip at {1e3 * document['tip_depth_m']:.2f} mm" in outcome.out
 
 
 def test_a_single_shallow_hole_and_grinding(run):

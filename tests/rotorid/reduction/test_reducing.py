@@ -12,7 +12,14 @@ from book_task_9 import (
 )
 
 import fem
-from rotorid.reduction import equivalent_masses, mac, mass_sensitivity, natural_frequencies, reduce
+from rotorid.reduction import (
+    equivalent_masses,
+    mac,
+    mass_sensitivity,
+    natural_frequencies,
+    reduce,
+    reduce_measured,
+)
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
@@ -144,6 +151,27 @@ def test_document_frame_and_text(rotor):
     text = reduction.summary()
     assert "134.203 kg" in text
     assert max(map(len, text.splitlines())) <= 110
+
+
+def test_rows_of_the_frame_are_numbered_through(rotor):
+    frame = reduce(rotor, (7, 12, 18), 2).to_frame()
+    assert frame.index.tolist() == list(range(6))
+    assert frame["table"].tolist() == ["masses"] * 3 + ["modes"] * 3
+    assert frame["node"].tolist()[:3] == [7, 12, 18]
+
+
+def test_places_of_measured_modes_are_numbered_or_named():
+    given = COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2]
+    numbered = reduce_measured(*given)
+    named = reduce_measured(*given, nodes=("fan", "wheel", 18))
+    assert numbered.nodes == (1, 2, 3)
+    assert numbered.to_frame()["node"].tolist()[:3] == [1, 2, 3]
+    assert named.nodes == ("fan", "wheel", 18)
+    assert named.to_dict()["nodes"] == ["fan", "wheel", 18]
+    np.testing.assert_array_equal(named.masses.solution, numbered.masses.solution)
+    for wrong in (("fan", "wheel"), ("fan", "fan", 18)):
+        with pytest.raises(ValueError, match="3 different names of places"):
+            reduce_measured(*given, nodes=wrong)
 
 
 @pytest.mark.parametrize(
