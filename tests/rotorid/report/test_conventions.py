@@ -66,3 +66,45 @@ def test_words_of_the_conventions():
     turned = dict(conventions.words(Labels(angles="against rotation"), {"A": 30.0}, 90.0))
     assert turned["Sensors"].startswith("A at 330°")
     assert turned["Key phasor"].startswith("at 270° from x")
+
+
+def test_a_figure_of_readings_holds_before_after_their_reach_and_limits():
+    rows = [
+        {"speed_rpm": speed, "sensor": sensor, "before": before, "after": after, "within_95": reach,
+         "limit": limit}
+        for speed, sensor, before, after, reach, limit in (
+            (1000.0, "A", 10.0, 4.0, 1.0, None),
+            (1000.0, "B", 12.0, 2.0, 3.0, 6.0),
+            (3000.0, "A", 20.0, 5.0, 2.0, 7.0),
+        )
+    ]  # fmt: skip
+    figure = residual_figure(rows, "µm pp")
+    ax = figure.axes[0]
+    assert [bar.get_width() for bar in ax.patches] == [10.0, 12.0, 20.0]
+    # readings of one speed stand together, those of the next further below
+    y = [bar.get_y() + bar.get_height() / 2 for bar in ax.patches]
+    assert y == pytest.approx([0.0, 1.0, 2.5])
+    assert ax.get_yticks().tolist() == pytest.approx(y)
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["A", "B", "A"]
+    low, high = ax.get_ylim()
+    assert high < 0 < 2.5 < low
+    assert {t.get_text(): t.get_position()[1] for t in ax.texts} == pytest.approx(
+        {"1000 rpm": 0.0, "3000 rpm": 2.5}
+    )
+    dots, bars = ax.containers[1].lines[0], ax.containers[1].lines[2][0]
+    assert dots.get_xdata().tolist() == [4.0, 2.0, 5.0]
+    # an amplitude reaches to 0 at least
+    ends = [(segment[0][0], segment[1][0]) for segment in bars.get_segments()]
+    assert ends == [(3.0, 5.0), (0.0, 5.0), (3.0, 7.0)]
+    limits = next(c for c in ax.collections if c.get_label() == "limit")
+    assert [segment[0][0] for segment in limits.get_segments()] == [6.0, 7.0]
+    assert [segment[:, 1].mean() for segment in limits.get_segments()] == pytest.approx([1.0, 2.5])
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == ["before", "predicted with 95 % of a check run", "limit"]
+    assert (ax.get_xlabel(), ax.get_xscale()) == ("amplitude, µm pp", "linear")
+    for row in rows:
+        row["within_95"] = row["limit"] = None
+    rows[1]["after"] = 0.9  # less than a twentieth of the largest
+    plain = residual_figure(rows, "")
+    assert [text.get_text() for text in plain.legends[0].get_texts()] == ["before", "predicted"]
+    assert (plain.axes[0].get_xlabel(), plain.axes[0].get_xscale()) == ("amplitude", "symlog")
