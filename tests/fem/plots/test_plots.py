@@ -405,13 +405,14 @@ def test_the_arrow_of_an_orbit_follows_the_motion():
 
 def test_a_speed_map_is_in_rpm_with_its_band_and_its_supports():
     k = np.geomspace(1e5, 1e9, 9)
-    speeds = np.stack([100 * np.sqrt(k / (k + 1e7)), np.linspace(-1.0, 150.0, 9)], axis=1)
+    known = np.array([-1.0, 0.0, 0.5, 30.0, 60.0, 90.0, 120.0, 140.0, np.nan])
+    speeds = np.stack([100 * np.sqrt(k / (k + 1e7)), known], axis=1)
     ax = draw_speed_map(
         k, speeds, supports=[("DE", [1e7, 2e7], [50, 150]), ("fixed", [1e8, 1e8], [])], operating=(70, 80)
     )
     low, high = ax.get_ylim()
     first, second, machine, fixed = ax.get_lines()[:4]
-    assert len(second.get_xdata()) == 8  # what is not positive is left out
+    np.testing.assert_allclose(second.get_data(), (k[2:8], known[2:8] * 30 / np.pi))
     np.testing.assert_allclose(machine.get_data(), ([1e7, 2e7], np.array([50, 150]) * 30 / np.pi))
     assert (machine.get_marker() != "", fixed.get_marker()) == (True, "")
     np.testing.assert_allclose(fixed.get_data(), ([1e8, 1e8], (low, high)))
