@@ -298,6 +298,10 @@ def test_names_of_close_planes_stand_in_two_lines():
     heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
     assert heights["11"] == heights["20"] > 0
     assert heights["12"] > heights["11"] + 8
+    below = fem.draw_rotor(rotor23(), planes=[5], sensors=[11, 12])
+    places = {text.get_text(): (text.get_position()[1], text.get_va()) for text in below.texts}
+    assert places["12"][0] < places["11"][0] < 0 < places["5"][0]
+    assert [places[name][1] for name in ("5", "11", "12")] == ["bottom", "top", "top"]
 
 
 def test_mode_shapes_between_nodes_are_those_of_a_beam():
@@ -453,3 +457,15 @@ def test_critical_speeds_beyond_the_diagram_are_left_out_and_close_ones_stand_on
     taken = np.array([400.0, 420.0, 700.0])
     assert np.abs(once.xy[0] - taken).min() > 60
     assert once.xy[0] > 800
+
+
+@pytest.mark.parametrize(("span", "step"), [(60, 15), (125, 30), (200, 30), (300, 45), (500, 90), (900, 180)])
+def test_ticks_of_the_phase_are_few_and_at_parts_of_a_right_angle(span, step):
+    speeds = np.linspace(10.0, 300.0, 100)
+    reading = np.exp(-1j * np.radians(np.linspace(0.0, span, 100)))[:, None]
+    below = draw_bode(speeds, reading, ["A"])[1]
+    low, high = below.get_ylim()
+    ticks = [tick for tick in below.get_yticks() if low <= tick <= high]
+    assert len(ticks) <= 9
+    assert set(np.diff(ticks)) == {float(step)}
+    assert all(tick % step == 0 for tick in ticks)
