@@ -49,6 +49,17 @@ def test_one_plane_has_all_and_two_planes_of_a_symmetric_rotor_half_each():
     assert shares(rotor(planes={"left": None, "right": None})) == pytest.approx([0.5, 0.5])
 
 
+def test_the_rule_of_the_shares_is_said():
+    assert rotor().rule == "Nothing is allocated to planes."
+    assert rotor(planes={"disc": None}).rule == "One plane (a disc) has the whole of it."
+    assert rotor(planes={"left": None, "right": None}).rule == "Half in each plane, as for a symmetric rotor."
+    placed = rotor(planes={"A": 0.0, "B": 1.0}, centre=0.4).rule
+    assert placed.endswith("The correction planes are the tolerance planes.")
+    between = rotor(planes={"A": 0.25, "B": 0.75}, bearings=(0.0, 1.0), centre=0.4).rule
+    assert between.endswith("safe at the bearings whatever the angles of the residuals are.")
+    assert "Nothing" not in placed + between
+
+
 @each_of(
     ("centre", "expected"),
     [

@@ -10,6 +10,7 @@ from fem_rotors import rotor23, uniform
 
 import fem
 from fem.plots import campbell_figure, draw_bode, draw_orbits, draw_polar, draw_speed_map, new_axes
+from fem.plots.drawing import radii, surface
 
 mpl.use("Agg")
 
@@ -167,6 +168,26 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     figure.canvas.draw()
 
 
+def test_a_campbell_diagram_holds_all_frequencies_speeds_and_decrements():
+    above, below = campbell_figure(whirl()).axes[:2]
+    assert above.get_ylim()[0] == 0
+    assert 900 < above.get_ylim()[1] < 1.5 * 900
+    for axes in (above, below):
+        assert axes.get_xlim()[0] == 0
+        assert 1000 < axes.get_xlim()[1] < 1.2 * 1000
+    # decrements from 2 down to −0.1, those above 3 cut off
+    assert -0.5 < below.get_ylim()[0] < -0.1
+    assert 2 < below.get_ylim()[1] < 2.5
+    heavy = whirl()
+    heavy.log_decrements[:, 2] = 20.0
+    assert campbell_figure(heavy).axes[1].get_ylim()[1] == pytest.approx(3.0)
+    # the 1× line ends where the speeds or the frequencies end, whichever is first
+    assert above.get_lines()[4].get_xdata()[-1] == pytest.approx(1.06 * 900)
+    slow = whirl()
+    slow.speeds = slow.speeds / 2
+    assert campbell_figure(slow).axes[0].get_lines()[4].get_xdata()[-1] == pytest.approx(500.0)
+
+
 def test_a_campbell_diagram_of_a_rotor(tmp_path):
     rotor = fem.Rotor([0.25] * 4, 0.05, supports=[fem.Support(1, 1e6, 50.0), fem.Support(5, 1e6, 50.0)])
     result = fem.campbell(rotor, np.linspace(0, 400, 9), 2)
@@ -237,3 +258,214 @@ def test_import_loads_neither_matplotlib_nor_scipy():
     code = "import sys, fem; print([m for m in ('matplotlib', 'scipy', 'pandas') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_drawing_holds_everything_and_its_marks_touch_the_rotor():
+    rotor = dataclasses.replace(
+        turbine(), discs=[fem.Disc(1, 40.0, 1.25, 0.7, "wheel"), fem.Disc(4, 5.0)], stations={"wheel": 1}
+    )
+    ax = fem.draw_rotor(rotor, planes=[2], sensors=[1, 4])
+    radius, width = 250.0, np.sqrt(12 * 0.075 / 40)  # of the solid disc, mm and m
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    assert (left, right) == pytest.approx((-width / 2 - 0.02, 1.0 + 0.02))
+    assert low < -radius
+    assert high > radius
+    lines = {
+        each.get_label(): each.get_segments() for each in ax.collections if hasattr(each, "get_segments")
+    }
+    ((plane,),) = ([segment.tolist() for segment in lines[name]] for name in ("correction plane",))
+    assert [x for x, _ in plane] == pytest.approx([0.2, 0.2])
+    assert sorted(y for _, y in plane) == pytest.approx(
+        [-(high - 0.13 * (high - low)), high - 0.13 * (high - low)]
+    )
+    assert plane[1][1] > radius
+    # a sensor looks at the disc at node 1, and at the shaft at node 4, from below
+    for segment, (x, y) in zip(lines["sensors"], ((0.0, -radius), (0.8, -40.0)), strict=True):
+        assert segment[:, 0] == pytest.approx([x, x])
+        assert sorted(segment[:, 1]) == pytest.approx([low + 0.13 * (high - low), y])
+    tips = next(c for c in ax.collections if len(c.get_offsets()) == 2 and not c.get_label().startswith("d"))
+    np.testing.assert_allclose(tips.get_offsets(), [[0.0, -radius], [0.8, -40.0]])
+
+
+def test_the_shaft_at_a_step_is_as_thick_as_its_thicker_element():
+    rotor = fem.Rotor([0.1, 0.1, 0.1], [0.05, 0.12, 0.06], discs=[fem.Disc(4, 40.0, 1.25, 0.7)])
+    np.testing.assert_allclose(radii(rotor), [0.025, 0.06, 0.06, 0.03])
+    np.testing.assert_allclose(surface(rotor), [0.025, 0.06, 0.06, 0.25])
+
+
+def test_names_of_close_planes_stand_in_two_lines():
+    ax = fem.draw_rotor(rotor23(), planes=[11, 12, 20])
+    heights = {text.get_text(): text.get_position()[1] for text in ax.texts}
+    assert heights["11"] == heights["20"] > 0
+    assert heights["12"] > heights["11"] + 8
+    below = fem.draw_rotor(rotor23(), planes=[5], sensors=[11, 12])
+    places = {text.get_text(): (text.get_position()[1], text.get_va()) for text in below.texts}
+    assert places["12"][0] < places["11"][0] < 0 < places["5"][0]
+    assert [places[name][1] for name in ("5", "11", "12")] == ["bottom", "top", "top"]
+
+
+def test_mode_shapes_between_nodes_are_those_of_a_beam():
+    rotor = fem.Rotor([0.25] * 4, 0.05, supports=[fem.Support(1, 1e13), fem.Support(5, 1e13)])
+    modes = fem.critical_speeds(rotor, n=2)
+    ax = modes.plot()
+    for k, line in enumerate(ax.get_lines()[:2], start=1):
+        x, y = line.get_data()
+        assert (len(x), x[0], x[-1]) == (4 * 12 + 1, 0.0, 1.0)
+        expected = np.sin(k * np.pi * np.asarray(x))
+        assert np.abs(y * np.sign(y[6] * expected[6]) - expected).max() < 0.01 * k
+    words = [text for text in labels(ax) if "rpm" in text]
+    for k, omega in enumerate(modes.frequencies):
+        assert f"{k + 1}: {omega:.5g} rad/s = {omega * 30 / np.pi:.5g} rpm" in words[k]
+    low, high = ax.get_ylim()
+    assert low < -1
+    assert high > 1
+
+
+def test_backward_modes_are_named():
+    base = turbine()
+    modes = fem.critical_speeds(dataclasses.replace(base, model=fem.Model(True, True, True)), n=2)
+    turned = dataclasses.replace(modes, direction=("forward", "backward"))
+    words = [text for text in labels(turned.plot()) if "rpm" in text]
+    assert [text.endswith(", backward") for text in words] == [False, True]
+
+
+def test_amplitudes_that_differ_much_are_drawn_on_a_logarithmic_scale():
+    speeds = np.linspace(10.0, 100.0, 20)
+    near = np.linspace(1.0, 29.0, 20)[:, None] * 1e-6
+    assert draw_bode(speeds, near, ["A"])[0].get_yscale() == "linear"
+    above, _ = draw_bode(speeds, np.hstack((near, near * 2)), ["A", "B"])
+    assert above.get_yscale() == "log"
+    assert 0 < above.get_ylim()[0] <= 0.5 + 1e-9
+    assert above.get_ylim()[1] >= 58
+    still = near.copy()
+    still[0] = 0.0
+    still[1] = 1e-15  # six powers of ten are enough
+    assert draw_bode(speeds, still, ["A"])[0].get_ylim()[0] == pytest.approx(29e-6)
+    assert draw_bode(speeds, still, ["A"])[1].get_lines()[0].get_xdata().tolist() == speeds[1:].tolist()
+
+
+def test_few_speeds_are_marked_and_drawn_in_order():
+    speeds = np.array([30.0, 10.0, 20.0])
+    line = draw_bode(speeds, 1e-6 * speeds[:, None], ["A"])[0].get_lines()[0]
+    assert line.get_marker() == "o"
+    assert line.get_xdata().tolist() == [10.0, 20.0, 30.0]
+    np.testing.assert_allclose(line.get_ydata(), [10.0, 20.0, 30.0])
+    many = np.linspace(1.0, 12.0, 12)
+    assert draw_bode(many, 1e-6 * many[:, None], ["A"])[0].get_lines()[0].get_marker() == "None"
+
+
+@pytest.mark.parametrize("turns", [-2, 0, 1, 3])
+def test_the_phase_is_a_lag_within_a_turn(turns):
+    speeds = np.linspace(10.0, 300.0, 100)
+    lag = np.radians(np.linspace(-20.0, -170.0, 100)) + 2 * np.pi * turns
+    phase = draw_bode(speeds, np.exp(1j * lag)[:, None], ["A"])[1].get_lines()[0].get_ydata()
+    np.testing.assert_allclose(phase, np.linspace(-20.0, -170.0, 100), atol=1e-9)
+
+
+def test_peaks_and_the_operating_range_stand_in_both_axes():
+    speeds = np.linspace(10.0, 300.0, 100)
+    axes = draw_bode(speeds, speeds[:, None] * 1e-6, ["A"], peaks=[(150.0, "p")], operating=(200.0, 250.0))
+    for ax in axes:
+        assert [line.get_xdata() for line in ax.get_lines()[1:]] == [[150.0, 150.0]]
+        (band,) = ax.patches
+        assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((200.0, 250.0))
+    places = {text.get_text(): text.xy for text in axes[0].texts}
+    assert places == {"operating range": (225.0, 1.0), "p": (150.0, 0.0)}
+    # ticks of the phase at whole parts of a right angle, not too many
+    ticks = axes[1].yaxis.get_major_locator().tick_values(-180.0, 0.0)
+    assert set(np.diff(ticks)) <= {15.0, 30.0, 45.0, 90.0}
+
+
+def test_marks_of_a_polar_curve_are_evenly_spaced_along_it():
+    speeds = np.linspace(0.0, 100.0, 201)
+    Z = 1e-6 * (1 + speeds[:, None] / 10) * np.exp(0j)
+    ax = draw_polar(speeds, Z, ["A"], marks=4)
+    written = {float(text.get_text()): text.xy for text in ax.texts}
+    assert list(written) == [round(speed * 30 / np.pi) for speed in (0, 25, 50, 75, 100)]
+    assert [radius for _, radius in written.values()] == pytest.approx([1.0, 3.5, 6.0, 8.5, 11.0])
+    one = draw_polar([50.0], [[1e-6j]], ["A"])
+    assert [text.get_text() for text in one.texts] == ["477"]
+    standing = draw_polar([50.0, 60.0], [[1e-6j], [1e-6j]], ["A"])
+    assert [text.get_text() for text in standing.texts] == ["477"]
+
+
+def test_the_arrow_of_an_orbit_follows_the_motion():
+    for x, y in ((2e-6, -1e-6j), (2e-6, 1e-6j)):
+        ax = draw_orbits([x], [y], ["a"])
+        path = np.array(ax.get_lines()[0].get_data())
+        (arrow,) = ax.texts
+        begin, end = (np.array(place) for place in (arrow.get_position(), arrow.xy))
+        turn = np.linspace(0.0, 2 * np.pi, 241)
+        np.testing.assert_allclose(
+            path, 1e6 * np.real([x * np.exp(1j * turn), y * np.exp(1j * turn)]), atol=1e-9
+        )
+        at = [int(np.argmin(np.hypot(*(path - place[:, None])))) for place in (begin, end)]
+        assert 0 < at[1] - at[0] < 30
+    (line,) = [
+        each for each in draw_orbits([1e-6], [0.0], ["a"]).get_lines() if each.get_label() == "a, straight"
+    ]
+    assert line.get_linestyle() == "-"
+
+
+def test_a_speed_map_is_in_rpm_with_its_band_and_its_supports():
+    k = np.geomspace(1e5, 1e9, 9)
+    known = np.array([-1.0, 0.0, 0.5, 30.0, 60.0, 90.0, 120.0, 140.0, np.nan])
+    speeds = np.stack([100 * np.sqrt(k / (k + 1e7)), known], axis=1)
+    ax = draw_speed_map(
+        k, speeds, supports=[("DE", [1e7, 2e7], [50, 150]), ("fixed", [1e8, 1e8], [])], operating=(70, 80)
+    )
+    low, high = ax.get_ylim()
+    first, second, machine, fixed = ax.get_lines()[:4]
+    np.testing.assert_allclose(second.get_data(), (k[2:8], known[2:8] * 30 / np.pi))
+    np.testing.assert_allclose(machine.get_data(), ([1e7, 2e7], np.array([50, 150]) * 30 / np.pi))
+    assert (machine.get_marker() != "", fixed.get_marker()) == (True, "")
+    np.testing.assert_allclose(fixed.get_data(), ([1e8, 1e8], (low, high)))
+    assert low < first.get_ydata().min()
+    (band,) = ax.patches
+    assert band.get_y() == pytest.approx(70 * 30 / np.pi)
+    assert band.get_y() + band.get_height() == pytest.approx(80 * 30 / np.pi)
+    ax.figure.canvas.draw()
+    (right,) = ax.child_axes
+    assert right.get_ylim() == pytest.approx((low * np.pi / 30, high * np.pi / 30))
+
+
+def test_curves_of_a_campbell_diagram_go_on_where_the_direction_changes():
+    above = campbell_figure(whirl()).axes[0]
+    mixed, forward = above.get_lines()[2:4]
+    # neither direction up to 500 rad/s, forward from 600 on: the first stretch reaches to the second
+    assert mixed.get_xdata()[-1] == forward.get_xdata()[0] == 600.0
+    assert forward.get_xdata()[-1] == 1000.0
+    numbers = {text.get_text(): text.xy for text in above.texts if text.get_text() in ("1", "2", "3")}
+    assert numbers == {"1": (1000.0, 350.0), "2": (1000.0, 450.0), "3": (1000.0, 900.0)}
+    apart = whirl()
+    apart.frequencies[:, 1] = apart.frequencies[:, 0] + 1.0
+    texts = {text.get_text(): text.get_position() for text in campbell_figure(apart).axes[0].texts}
+    assert texts["2"][0] > texts["1"][0] == texts["3"][0]
+    lost = whirl()
+    lost.frequencies[-1, 2] = np.nan
+    assert "3" not in {text.get_text() for text in campbell_figure(lost).axes[0].texts}
+
+
+def test_critical_speeds_beyond_the_diagram_are_left_out_and_close_ones_stand_on_either_side():
+    above = campbell_figure(whirl(), [(400.0, 0.3), (420.0, 0.2), (700.0, 0.1), (990.0, 0.1)]).axes[0]
+    said = {t.get_text(): t for t in above.texts if "δ" in t.get_text()}
+    assert len(said) == 3  # the 1× line ends at 954 rad/s
+    assert [t.xy for t in said.values()] == [(400.0, 400.0), (420.0, 420.0), (700.0, 700.0)]
+    assert [t.get_ha() for t in said.values()] == ["left", "right", "left"]
+    (once,) = (t for t in above.texts if t.get_text() == "1×")
+    assert once.xy[0] == once.xy[1]
+    taken = np.array([400.0, 420.0, 700.0])
+    assert np.abs(once.xy[0] - taken).min() > 60
+    assert once.xy[0] > 800
+
+
+@pytest.mark.parametrize(("span", "step"), [(60, 15), (115, 30), (200, 30), (300, 45), (500, 90), (900, 180)])
+def test_ticks_of_the_phase_are_few_and_at_parts_of_a_right_angle(span, step):
+    speeds = np.linspace(10.0, 300.0, 100)
+    reading = np.exp(-1j * np.radians(np.linspace(0.0, span, 100)))[:, None]
+    below = draw_bode(speeds, reading, ["A"])[1]
+    low, high = below.get_ylim()
+    ticks = [tick for tick in below.get_yticks() if low <= tick <= high]
+    assert len(ticks) <= 9
+    assert set(np.diff(ticks)) == {float(step)}
+    assert all(tick % step == 0 for tick in ticks)

@@ -9,6 +9,7 @@ from cases import each_of
 
 from balancing import correct, estimate_influence
 from balancing.mounting.mounted import mount
+from rotorid.cli.commands.balance_report import Report
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 
@@ -189,3 +190,20 @@ def test_the_table_says_where_to_take_material_away(cli, tmp_path):
         turn = (line["angle_deg"] - line["equivalent_added_deg"]) % 360
         assert turn == pytest.approx(180.0 if row["action"] == "remove" else 0.0)
         assert line["equivalent_added_deg"] == pytest.approx(row["angle_deg"])
+
+
+def test_a_plane_without_holes_shows_its_weight_beside_the_pieces_of_another(tmp_path):
+    job = read_job(job_with(tmp_path, "[planes.left]\nholes = 12\navailable_g_mm = [150]\nper_hole = 2\n"))
+    influence = estimate_influence(job.trials)
+    found = correct(influence)
+    report = Report(found, influence, mounted=mount(found, influence, None, job.holes))
+    assert report.mounted.holes[1] is None
+    figure = report.figure()
+    assert [ax.get_title() for ax in figure.axes] == ["left: add", "middle: add", "right: add"]
+    left, middle, right = ({text.get_text() for text in ax.texts} for ax in figure.axes)
+    assert {"1", "12"} <= left
+    assert any(text.startswith("150") or "× 150" in text for text in left)
+    for p, own in ((1, middle), (2, right)):
+        size, angle = found.labels.weight(found.weights[p])
+        assert not {"1", "12"} <= own
+        assert any(text.endswith(f"\n{angle:.1f}°") for text in own), (size, angle, own)

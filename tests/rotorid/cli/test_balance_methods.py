@@ -339,3 +339,39 @@ def test_options_that_would_be_ignored_are_refused(cli):
     assert "names with commas" in cli("balance", JOB, "--planes", "").err
     assert "only once" in cli("unbalance", MODEL, "--stations", "6,6").err
     assert "--method ridge" in cli("unbalance", MODEL, "--stations", "6,12", "--ridge", "0.1").err
+
+
+@pytest.mark.parametrize(
+    ("method", "key", "criterion"), [("least-squares", "rms_after", "rms"), ("minmax", "max_after", "max")]
+)
+def test_a_trade_off_goes_from_no_weight_to_the_correction(answers, tmp_path, method, key, criterion):
+    found = answers(JOB, "--method", method, "--trade-off")
+    curve, points = found["trade_off"], found["trade_off"]["points"]
+    assert curve["criterion"] == criterion
+    totals = [point["total"] for point in points]
+    assert totals == sorted(totals)
+    for point in points:
+        assert point["total"] == pytest.approx(sum(row["mass"] for row in point["weights"]), abs=1e-6)
+    first, last = points[0], points[-1]
+    assert (first["total"], first["rms_after"], first["max_after"]) == pytest.approx(
+        (0.0, found["rms_before"], found["max_before"])
+    )
+    assert last[key] == pytest.approx(found[key], rel=1e-4)
+    values = [point[key] for point in points]
+    assert values == sorted(values, reverse=True)
+    # planes and speeds are those of the correction
+    part = answers(JOB, "--method", method, "--trade-off", "--planes", "right,left", "--speeds", "1220,3600")
+    assert part["trade_off"]["points"][0][key] == pytest.approx(part[key.replace("after", "before")])
+    assert part["trade_off"]["points"][-1][key] == pytest.approx(part[key], rel=1e-4)
+    for row, own in zip(part["trade_off"]["points"][-1]["weights"], part["corrections"], strict=True):
+        assert row["plane"] == own["plane"]
+        assert row["mass"] == pytest.approx(own["mass"], rel=0.01)
+
+
+def test_a_trade_off_weights_its_rows(answers, tmp_path):
+    job = job_with(tmp_path, '[sensors."probe 4"]\nweight = 0\n')
+    found = answers(job, "--trade-off")
+    last = found["trade_off"]["points"][-1]
+    for row, own in zip(last["weights"], found["corrections"], strict=True):
+        assert row["mass"] == pytest.approx(own["mass"], rel=0.01)
+        assert row["angle_deg"] == pytest.approx(own["angle_deg"], abs=0.5)

@@ -87,6 +87,21 @@ def test_history_of_a_job_in_one_table(cli):
     assert "check" in cli("balance", TURBO / "checked.toml", "--history").out
 
 
+def test_a_history_is_judged_by_the_limits_of_the_job(cli):
+    command = ("balance", TURBO / "checked.toml", "--history", "--json")
+    free = cli(*command).json["history"]
+    limited = cli(*command, "--limit", "2").json["history"]
+    within = set()
+    for one, other in zip(free["runs"], limited["runs"], strict=True):
+        for a, b in zip(one["speeds"], other["speeds"], strict=True):
+            assert (a["of_limit"], a["within_limits"]) == (None, None)
+            assert b["largest"] == a["largest"]
+            assert b["of_limit"] == pytest.approx(b["largest"] / 2, rel=1e-9)
+            assert b["within_limits"] == (b["largest"] <= 2)
+            within.add(b["within_limits"])
+    assert within == {True, False}
+
+
 def test_positions_share_the_tolerance(cli, tmp_path):
     picture = tmp_path / "residuals.png"
     places = ("--positions", "left=0.8m,right=2.5m", "--bearings", "0.318m,2.9m", "--centre", "1.6m")

@@ -125,6 +125,95 @@ def test_pictures_and_tables_of_a_response(cli, files, tmp_path):
     assert len(frame) == 2 * 91
 
 
+def test_table_text_and_orbits_of_a_response_are_those_of_the_model(cli, files, model, tmp_path):
+    command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--sensors",
+               "probe:45,wheel")  # fmt: skip
+    document = cli(*command, "--json").json
+    outcome = cli(*command, "--output", tmp_path / "t.csv")
+    speeds = np.arange(60.0, 1001.0, 10.0)
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, speeds)
+    Z = np.stack([expected.at(("probe", 45.0)), expected.at("wheel")], axis=1)
+    frame = pd.read_csv(tmp_path / "t.csv")
+    np.testing.assert_allclose(frame["speed_rad_s"].to_numpy().reshape(-1, 2), np.stack([speeds, speeds], 1))
+    assert frame["sensor"].tolist() == ["probe at 45°", "wheel"] * speeds.size
+    found = frame["amplitude_m"] * np.exp(1j * np.radians(frame["phase_deg"]))
+    np.testing.assert_allclose(found.to_numpy().reshape(-1, 2), Z, rtol=1e-6)
+    for row in document["largest"]:
+        (line,) = [
+            x for x in outcome.out.splitlines() if x.strip().startswith(row["sensor"]) and "%" not in x
+        ]
+        size, rpm = line.removeprefix(line[: line.index(row["sensor"])] + row["sensor"]).split()
+        assert float(size) == pytest.approx(1e6 * row["amplitude_m"], rel=1e-3)
+        assert float(rpm) == pytest.approx(row["speed_rad_s"] * 30 / np.pi, abs=0.051)
+        at = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [row["speed_rad_s"]])
+        where = ("probe", 45.0) if "probe" in row["sensor"] else "wheel"
+        assert row["amplitude_m"] == pytest.approx(abs(at.at(where)[0]), rel=1e-6)
+    # an orbit's farthest point lies on its major axis
+    turn = np.exp(1j * np.linspace(0.0, 2 * np.pi, 721))
+    for k, node in enumerate(document["orbits"]["nodes"]):
+        for s in (0, 20, -1):
+            x, y = (np.real(each[s, node - 1] * turn) for each in (expected.x, expected.y))
+            far = int(np.argmax(np.hypot(x, y)))
+            assert np.hypot(x, y)[far] == pytest.approx(document["orbits"]["major_axis_m"][k][s], rel=1e-4)
+            assert np.hypot(x, y).min() == pytest.approx(
+                document["orbits"]["minor_axis_m"][k][s], rel=0.02, abs=1e-3 * np.hypot(x, y)[far]
+            )
+            axis = np.radians(document["orbits"]["inclination_deg"][k][s])
+            assert abs(np.cos(axis) * y[far] - np.sin(axis) * x[far]) < 0.02 * np.hypot(x, y)[far]
+    forces = document["bearing_forces"]
+    for k, speed in enumerate(forces["largest_at_rad_s"]):
+        at = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [speed]).bearing_forces().largest
+        assert forces["largest_N"][k] == pytest.approx(at[0, k], rel=1e-6)
+
+
+def test_what_the_pictures_of_a_response_are_drawn_from(cli, files, model, tmp_path, monkeypatch):
+    import fem.plots
+
+    given = {}
+
+    def watch(name):
+        original = getattr(fem.plots, name)
+
+        def draw(*args, **options):
+            given[name] = args, options
+            return original(*args, **options)
+
+        monkeypatch.setattr(fem.plots, name, draw)
+
+    for name in ("draw_bode", "draw_polar", "draw_orbits"):
+        watch(name)
+    command = ("response", files[0], "--unbalance", files[1], "--speeds", "60:1000:10", "--plot")
+    document = cli(*command, tmp_path / "b.png", "--operating", "450:550", "--json").json
+    (speeds, Z, labels, _), options = given["draw_bode"]
+    assert labels == ["wheel", "probe"]
+    expected = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, speeds)
+    np.testing.assert_allclose(Z, np.stack([expected.at(name) for name in labels], axis=1), rtol=1e-6)
+    assert options["operating"] == (450.0, 550.0)
+    loudest = max(document["largest"], key=lambda row: row["amplitude_m"])["sensor"]
+    peaks = [peak for peak in document["peaks"] if peak["sensor"] == loudest]
+    assert [speed for speed, _ in options["peaks"]] == [peak["speed_rad_s"] for peak in peaks]
+    for (_, words), peak in zip(options["peaks"], peaks, strict=True):
+        factor = peak["amplification_factor"]
+        assert words == f"{peak['speed_rpm']:.0f} rpm" + ("" if factor is None else f", AF {factor:.1f}")
+    assert cli(*command, tmp_path / "p.png", "--view", "polar").code == 0
+    np.testing.assert_allclose(given["draw_polar"][0][1], Z, rtol=1e-9)
+    for more, rule in ((("--at", "303"), lambda s: 300.0), ((), lambda s: s[np.abs(Z).max(axis=1).argmax()])):
+        assert cli(*command, tmp_path / "o.png", "--view", "orbits", *more).code == 0
+        (x, y, names, _), options = given["draw_orbits"]
+        speed = rule(speeds)
+        one = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [speed])
+        np.testing.assert_allclose([x, y], [one.x[0, [3, 1]], one.y[0, [3, 1]]], rtol=1e-6)
+        assert names == ["wheel", "probe"]
+        assert options["title"] == f"{speed * 30 / np.pi:.0f} rpm = {speed:.5g} rad/s"
+
+
+def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
+    document = cli("critical", files[0], "-n", 1, "--map", "--json").json["map"]
+    stiffness = document["stiffness_N_per_m"]
+    assert (stiffness[0], stiffness[-1]) == pytest.approx((2e7 / 100, 5e7 * 100))
+    np.testing.assert_allclose(np.diff(np.log(stiffness)), np.log(250 * 100) / (len(stiffness) - 1))
+
+
 def test_influence_with_angles_feeds_balance(cli, files, model, tmp_path):
     table = tmp_path / "w.csv"
     document = cli(
@@ -138,6 +227,9 @@ def test_influence_with_angles_feeds_balance(cli, files, model, tmp_path):
     assert stored.sensors == ("probe at 45°", "6")
     assert stored.planes == ("wheel", "3")
     assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
+    frame = pd.read_csv(table)
+    assert len(frame) == 8
+    np.testing.assert_allclose(stored.W, W, rtol=1e-6)
 
 
 def test_critical_with_directions_mesh_check_and_map(cli, files, tmp_path):

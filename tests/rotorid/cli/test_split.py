@@ -9,6 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from rotorid.cli.amounts import vectors_of
+from rotorid.cli.commands import split_answers as answers
 from rotorid.cli.commands.split import split
 
 
@@ -84,10 +85,19 @@ def test_free_amounts_with_a_step_between_listed_holes(run):
 
 def test_two_weights_at_free_angles(run, tmp_path):
     document = run("35g@120", "--two", "20g,30g", "--json").json
+    assert document["masses"] == pytest.approx([20, 30], rel=1e-12)
+    assert (document["unit"], len(document["solutions"])) == ("g", 2)
     for solution in document["solutions"]:
         a, b = np.exp(1j * np.radians(solution["angles_deg"]))
         assert 20 * a + 30 * b == pytest.approx(35 * np.exp(2j * np.pi / 3), rel=1e-9)
-    outcome = run("35g@120", "--two", "20g,30g", "--plot", tmp_path / "two.svg")
+    files = ("--plot", tmp_path / "two.svg", "--output", tmp_path / "two.csv")
+    outcome = run("35g@120", "--two", "20g,30g", *files)
+    table = pd.read_csv(tmp_path / "two.csv", encoding="utf-8-sig")
+    assert table["solution"].tolist() == [1, 1, 2, 2]
+    assert table["mass_g"].to_numpy() == pytest.approx([20, 30, 20, 30], rel=1e-12)
+    assert table["angle_deg"].to_numpy() == pytest.approx(
+        [angle for solution in document["solutions"] for angle in solution["angles_deg"]]
+    )
     assert "20 g at 178.8° and 30 g at 85.2°" in outcome.out
 
 
@@ -102,6 +112,21 @@ def test_drilling_takes_away_opposite(run, way, tmp_path):
     outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.xlsx")
     assert outcome.code == 0, outcome.err
     assert "take away opposite" in outcome.out
+    # what the drill takes, a cylinder and the cone of its tip, 118° wide
+    assert (document["diameter_m"], document["radius_m"]) == pytest.approx((0.008, 0.1))
+    cone = 0.004 / np.tan(np.radians(59))
+    assert document["tip_depth_m"] - document["depth_m"] == pytest.approx(cone, rel=1e-9)
+    mass = 7800 * np.pi * 0.004**2 * (document["depth_m"] + cone / 3)
+    assert document["mass_of_one_kg"] == pytest.approx(mass, rel=1e-9)
+    table = pd.read_excel(tmp_path / "t.xlsx")
+    assert table["hole"].tolist() == [k + 1 for k in range(len(document["holes"]))]
+    assert table["angle_deg"].tolist() == pytest.approx([hole["angle_deg"] for hole in document["holes"]])
+    assert table["mass_g"].to_numpy() == pytest.approx(1e3 * mass, rel=1e-9)
+    assert table["diameter_mm"].to_numpy() == pytest.approx(8)
+    assert table["depth_mm"].to_numpy() == pytest.approx(1e3 * document["depth_m"])
+    assert table["tip_depth_mm"].to_numpy() == pytest.approx(1e3 * document["tip_depth_m"])
+    assert f"{1e3 * mass:.4g} g" in outcome.out
+    assert f"tip at {1e3 * document['tip_depth_m']:.2f} mm" in outcome.out
 
 
 def test_a_single_shallow_hole_and_grinding(run):
@@ -207,3 +232,79 @@ def test_help_has_an_example():
     shown = CliRunner().invoke(app, ["--help"])
     assert shown.exit_code == 0
     assert "rotorid split 35g@120 --holes 24 --pieces 10g,20g" in " ".join(shown.output.split())
+
+
+@pytest.mark.parametrize("unit", ["g", "g_mm"])
+def test_what_the_picture_shows_makes_what_is_wanted(monkeypatch, unit):
+    """Added weights, and the equivalent ones of material taken away, of every solution."""
+    from balancing.plots import discs
+
+    drawn, original = [], discs.disc
+
+    def disc(ax, plane, holes, mounting, labels, **options):
+        drawn.append((plane, options))
+        return original(ax, plane, holes, mounting, labels, **options)
+
+    monkeypatch.setattr(discs, "disc", disc)
+    size = 35 if unit == "g" else 3500
+    labels, (target,) = vectors_of(f"{size}{unit}@120", "with rotation")
+    wanted = answers.Wanted(target, labels, 0.1)
+    two = "20g,30g" if unit == "g" else "2000g_mm,3000g_mm"
+    made = {
+        "two": answers.at_two_angles(wanted, two),
+        "drilled": answers.drilled(wanted, "8mm", False, "12mm", 7800.0, 118.0, None),
+        "ground": answers.ground(wanted),
+        "one": answers.as_one(wanted, None, 0.0),
+    }
+    figures = {name: answer.figure() for name, answer in made.items()}
+    assert [plane for plane, _ in drawn] == ["solution 1", "solution 2", "weight", "weight", "weight"]
+    assert [options["remove"] for _, options in drawn] == [False, False, True, True, False]
+    for _, options in drawn:
+        assert sum(options["loose"]) == pytest.approx(target, rel=1e-9)
+        assert options["weight"] == target
+    holes = made["drilled"].document["holes"]
+    angles = np.degrees(np.angle(drawn[2][1]["loose"])) + 180
+    assert angles % 360 == pytest.approx([hole["angle_deg"] for hole in holes])
+    assert [len(figure.axes) for figure in figures.values()] == [2, 1, 1, 1]
+
+
+def test_grinding_and_rounding_in_the_table_and_in_words(run, tmp_path):
+    path = tmp_path / "t.csv"
+    said = run("3500g_mm@120", "--grind", "--radius", "100mm", "--output", path).out
+    (row,) = pd.read_csv(path, encoding="utf-8-sig").to_dict("records")
+    assert row == pytest.approx({"angle_deg": 300, "mass_g": 35, "radius_mm": 100})
+    assert "grind off 35 g at 300.0°, radius 100 mm (3500 g·mm)" in said
+    said = run("34.7g@121.3", "--step", "0.5g", "--angle-step", "5", "--output", path).out
+    (row,) = pd.read_csv(path, encoding="utf-8-sig").to_dict("records")
+    assert row == pytest.approx({"mass_g": 34.5, "angle_deg": 120})
+    error = abs(34.5 * np.exp(1j * np.radians(120)) - 34.7 * np.exp(1j * np.radians(121.3)))
+    assert f"error {error:.3g} g ({100 * error / 34.7:.2g} %)" in said
+
+
+@pytest.mark.parametrize(("step", "angle_step"), [("0.5g", 5.0), ("2g", 0.0), (None, 30.0)])
+def test_no_weight_is_rounded_by_more_than_the_largest_possible_error(step, angle_step):
+    worst = 0.0
+    for size in np.linspace(20.0, 24.0, 9):
+        for angle in np.linspace(0.0, 30.0, 13):
+            labels, (target,) = vectors_of(f"{size:.10g}g@{angle:.10g}", "with rotation")
+            document = answers.as_one(answers.Wanted(target, labels, None), step, angle_step).document
+            error = vector([document["weight"]]) - 1e3 * target
+            assert document["error"]["mass"] == pytest.approx(abs(error), abs=1e-9)
+            assert document["relative_error"] == pytest.approx(abs(error) / size, abs=1e-9)
+            assert abs(error) <= document["largest_possible_error"] * (1 + 1e-9)
+            worst = max(worst, abs(error) / document["largest_possible_error"])
+    assert worst > 0.7
+
+
+def test_limits_of_shares_and_steps_are_included(run):
+    for args in (
+        "35g@120 --holes 24 --pieces 10g,20g --good-enough 0",
+        "35g@120 --holes 24 --pieces 10g,20g --good-enough 100",
+        "35g@120 --angle-step 360",
+        "35g@120 --angle-step 0",
+        "50g@120 --two 20g,30g",
+        "10g@120 --two 20g,30g",
+    ):
+        assert run(*args.split()).code == 0
+    for args in ("35g@120 --holes 24 --pieces 10g --good-enough 100.5", "35g@120 --angle-step -1"):
+        assert run(*args.split()).code == 2

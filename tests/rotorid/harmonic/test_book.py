@@ -5,6 +5,9 @@ import tomllib
 import numpy as np
 import pytest
 
+from rotorid.harmonic import AmplitudeErrors, harmonic_model
+from rotorid.harmonic import identify as identify_model
+from rotorid.harmonic.experiments import experiments
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "identify"
@@ -179,6 +182,31 @@ def test_stated_errors_and_output_error(identify):
         assert found["provenance"]["options"]["amplitude_error"] == 2
     assert {row["experiment"] for row in found["influence"]} == {"1", "2", "3"}
     assert found["correlation"]["c"]["c"] == pytest.approx(1)
+
+
+def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_those_of_the_file(cli, tmp_path):
+    folder = FOLDER / "task_5_1"
+    text = (folder / "model.toml").read_text(encoding="utf-8")
+    model = tmp_path / "model.toml"
+    model.write_text(f"{text}\n[errors]\namplitude_percent = 5\nphase_deg = 3\n", encoding="utf-8")
+    equations = harmonic_model(["(m*p**2 + alpha*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "alpha"])
+    values = {"F": 10.0, "X": [-0.1j, -3.3e-3 - 2.2e-4j, -1.2e-3 - 4.7e-5j]}
+    for options, percent, degrees in (
+        (("--amplitude-error", 2, "--phase-error", 1), 2, 1),
+        (("--amplitude-error", 2), 2, 3),
+        (("--phase-error", 1), 5, 1),
+        ((), 5, 3),
+    ):
+        found = cli("identify", model, folder / "data.csv", *options, "--json").json["parameters"]
+        errors = AmplitudeErrors(percent / 100, np.radians(degrees))
+        expected = identify_model(equations, experiments(equations, [10, 20, 30], values, errors=errors))
+        for k, name in enumerate(("c", "alpha")):
+            assert found[name]["std"] == pytest.approx(expected.std[k], rel=1e-9)
+    bare = cli("identify", folder / "model.toml", folder / "data.csv", "--amplitude-error", 2, "--json").json
+    expected = identify_model(
+        equations, experiments(equations, [10, 20, 30], values, errors=AmplitudeErrors(0.02, 0.0))
+    )
+    assert bare["parameters"]["c"]["std"] == pytest.approx(expected.std[0], rel=1e-9)
 
 
 @pytest.mark.parametrize(

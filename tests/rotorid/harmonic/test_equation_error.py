@@ -381,6 +381,21 @@ def test_results_hold_plain_json():
         found.value("k")
 
 
+def test_noise_is_spoken_of_from_the_first_spare_equation_on():
+    """An amplitude is two equations: with c alone unknown one is spare, with c and alpha none."""
+    data = {"F": 10.0, "X": [-0.01 - 0.1j]}
+    known = {"m": 10.0, "alpha": 10.0}
+    one = identify(*two_of(harmonic_model(MASS, known=known, estimate=["c"]), data))
+    exact = identify(*two_of(harmonic_model(MASS, known={"m": 10.0}, estimate=["c", "alpha"]), data))
+    assert (one.dof, exact.dof) == (1, 0)
+    assert "prefer output error" in one.summary()
+    assert "prefer output error" not in exact.summary()
+
+
+def two_of(model, data):
+    return model, experiments(model, [10], data)
+
+
 def test_experiments_check_themselves():
     one = {"X": np.ones(1, dtype=complex)}
     marks = np.zeros(1, dtype=bool)

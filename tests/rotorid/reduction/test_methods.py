@@ -298,6 +298,15 @@ def test_document_frame_and_text(methods):
     text = methods.summary()
     for piece in ("135.2973", "545.3615", "1250.8529", "+7.480 %", "0.98795", "134.2 kg at node 7"):
         assert piece in text
+    for row in methods.rows:
+        cells = next(line for line in text.splitlines() if line.startswith(f"{row.name:<20}"))[20:]
+        numbers = [cells[29 * k : 29 * k + 29].replace("<", "").replace("%", "").split() for k in range(3)]
+        for k, (frequency, error, mac) in enumerate(numbers):
+            own = row.frequencies[k]
+            assert float(frequency) == pytest.approx(own, abs=5.1e-5)
+            percent = 100 * (own / methods.rotor_frequencies[k] - 1)
+            assert float(error) == pytest.approx(percent, abs=1.1e-4 if abs(percent) < 0.01 else 5.1e-4)
+            assert float(mac) == pytest.approx(row.mac[k], abs=5.1e-6)
     assert "Guyan, IRS and SEREP: full mass matrices" in text
     many = compare_methods(rotor23(), (2, 4, 7, 11, 14, 18, 22), modes=3).summary()
     for words in (text, many):

@@ -55,6 +55,21 @@ def test_the_best_frequencies_are_a_trap_and_the_report_says_so(triples):
     assert any("do not choose by frequency alone" in text for text in triples.warnings)
     text = triples.summary()
     assert "Frequencies alone are a trap" in text
+    lines = text.splitlines()
+    head = next(i for i, line in enumerate(lines) if line.startswith(" rank "))
+    named = {"best by MAC": triples.best_by_mac, "compromise": triples.compromise, "the book's": triples.book}
+    places = {head + 1 + i: i for i in range(10)}
+    for words, i in named.items():
+        places[1 + next(at for at, line in enumerate(lines) if line.startswith(words))] = i
+    for at, i in places.items():
+        (numbers, masses) = lines[at].split(":")
+        rank, error, _, mac, mode, condition, *nodes = numbers.replace(",", "").split()
+        assert (int(rank), mode) == (i + 1, f"({triples.worst_mode[i]})")
+        assert [int(node) for node in nodes] == triples.nodes[i].tolist()
+        assert float(error) == pytest.approx(100 * triples.error[i], abs=5.1e-5)
+        assert float(mac) == pytest.approx(triples.mac[i], abs=5.1e-5)
+        assert float(condition) == pytest.approx(triples.condition[i], rel=5.1e-3)
+        assert [float(m) for m in masses.split(",")] == pytest.approx(triples.masses[i], abs=5.1e-3)
     assert "first nodes 3, 11, 14 (rank 1, MAC 0.06 in mode 3)" in " ".join(text.split())
     assert 0 in triples.traps()
     good = triples.compromise

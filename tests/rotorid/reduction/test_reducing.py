@@ -12,7 +12,14 @@ from book_task_9 import (
 )
 
 import fem
-from rotorid.reduction import equivalent_masses, mac, mass_sensitivity, natural_frequencies, reduce
+from rotorid.reduction import (
+    equivalent_masses,
+    mac,
+    mass_sensitivity,
+    natural_frequencies,
+    reduce,
+    reduce_measured,
+)
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
@@ -144,6 +151,66 @@ def test_document_frame_and_text(rotor):
     text = reduction.summary()
     assert "134.203 kg" in text
     assert max(map(len, text.splitlines())) <= 110
+
+
+def test_the_text_has_the_numbers_of_the_result(rotor):
+    found = reduce(rotor, (7, 12, 18), 2)
+    lines = found.summary().splitlines()
+    for node, place, mass in zip((7, 12, 18), (0.973, 1.658, 2.423), found.masses.values, strict=True):
+        (line,) = [line for line in lines if line.startswith(f"  node {node:>3} ")]
+        assert f" at {place:7.3f} m {mass:12.3f} kg" in line
+    whole = sum(disc.mass for disc in rotor.discs)
+    whole += (rotor.density * np.pi / 4 * rotor.outer_diameter**2 * rotor.length).sum()
+    together = found.masses.values.sum()
+    assert f"  together {together:.1f} kg of the rotor's {whole:.1f} kg" in lines
+    head = next(i for i, line in enumerate(lines) if line.startswith("mode "))
+    assert "rotor " in lines[head]
+    for k in range(3):
+        mode, f, _, f_rpm, g, _, g_rpm, error, _, mac = lines[head + 1 + k].replace("/min", "").split()
+        model, own = found.frequencies[k], found.rotor_frequencies[k]
+        assert int(mode) == k + 1
+        assert [float(f), float(g)] == pytest.approx([model, own], abs=5.1e-5)
+        assert [float(f_rpm), float(g_rpm)] == pytest.approx(np.array([model, own]) * 30 / np.pi, abs=0.051)
+        assert float(error) == pytest.approx(100 * (model / own - 1), abs=5.1e-4)
+        assert float(mac) == pytest.approx(found.mac[k], abs=5.1e-6)
+
+
+def test_modes_that_were_not_measured_or_do_not_vibrate_are_said(rotor):
+    few = reduce_measured(COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2])
+    lines = few.summary().splitlines()
+    head = next(i for i, line in enumerate(lines) if line.startswith("mode "))
+    assert "measured" in lines[head]
+    assert "%" in lines[head + 2]
+    assert lines[head + 3].split()[:2] == ["3", f"{few.frequencies[2]:.4f}"]
+    assert "%" not in lines[head + 3]
+    last = few.to_frame().iloc[-1]
+    assert last["frequency_rad_s"] == few.frequencies[2]
+    assert last[["rotor_frequency_rad_s", "relative_error", "mac"]].isna().all()
+    odd = reduce(rotor, (2, 3, 4), 1)
+    still = [k for k in range(3) if not np.isfinite(odd.frequencies[k])]
+    assert still
+    assert odd.summary().count("does not vibrate") == len(still)
+
+
+def test_rows_of_the_frame_are_numbered_through(rotor):
+    frame = reduce(rotor, (7, 12, 18), 2).to_frame()
+    assert frame.index.tolist() == list(range(6))
+    assert frame["table"].tolist() == ["masses"] * 3 + ["modes"] * 3
+    assert frame["node"].tolist()[:3] == [7, 12, 18]
+
+
+def test_places_of_measured_modes_are_numbered_or_named():
+    given = COMPLIANCE, FREQUENCIES[:2], SHAPES[:, :2]
+    numbered = reduce_measured(*given)
+    named = reduce_measured(*given, nodes=("fan", "wheel", 18))
+    assert numbered.nodes == (1, 2, 3)
+    assert numbered.to_frame()["node"].tolist()[:3] == [1, 2, 3]
+    assert named.nodes == ("fan", "wheel", 18)
+    assert named.to_dict()["nodes"] == ["fan", "wheel", 18]
+    np.testing.assert_array_equal(named.masses.solution, numbered.masses.solution)
+    for wrong in (("fan", "wheel"), ("fan", "fan", 18)):
+        with pytest.raises(ValueError, match="3 different names of places"):
+            reduce_measured(*given, nodes=wrong)
 
 
 @pytest.mark.parametrize(

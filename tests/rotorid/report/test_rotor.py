@@ -203,6 +203,25 @@ def test_the_reduction_shows_masses_modes_and_comparisons():
     assert float(error.text.replace("−", "-")) == pytest.approx(-8.124, abs=5e-4)
 
 
+def test_the_largest_shares_of_the_variance_are_shown():
+    sheet = read_sheet(make("reduce").html)
+    found = sheet.document["uncertainty"]["contributions"]
+    rows = rows_of(sheet, "Uncertainty")
+    assert [row[0] for row in rows] == [
+        "mass at 7, kg", "mass at 12, kg", "mass at 18, kg",
+        "frequency 1, rad/s", "frequency 2, rad/s", "frequency 3, rad/s",
+    ]  # fmt: skip
+    for k, row in enumerate(rows):
+        square = "masses_kg2" if k < 3 else "natural_frequencies_rad2_s2"
+        parts = {name: part[square][k % 3] or 0.0 for name, part in found.items()}
+        largest = sorted(parts.values(), reverse=True)[:3]
+        shares = [words.rsplit(" ", 2) for words in row[-1].split(", ")]
+        assert [float(share) for _, share, _ in shares] == pytest.approx(
+            [100 * part / sum(parts.values()) for part in largest], abs=0.51
+        )
+        assert [parts[name] for name, _, _ in shares] == largest
+
+
 def test_stability_thresholds_of_both_models_are_shown():
     sheet = read_sheet(make("reduce unstable").html)
     assert {f"stability.{which}.threshold_rpm" for which in ("full", "small")} <= sheet.keys

@@ -237,6 +237,21 @@ def test_trade_off_says_the_trap_in_words(table):
     np.testing.assert_array_equal(frame[["mac_1", "mac_2", "mac_3"]], table.mac)
 
 
+def test_trade_off_prints_masses_errors_in_percent_and_mac(table):
+    lines = table.summary().splitlines()
+    for r, name in enumerate(table.names):
+        first = next(i for i, line in enumerate(lines) if line.startswith(f"{name}: "))
+        masses = lines[first].removeprefix(f"{name}: ").removesuffix(" kg").split(", ")
+        assert [float(text) for text in masses] == pytest.approx(table.masses[r], abs=5.1e-3)
+        (errors, mac) = (line.split() for line in lines[first + 1 : first + 3])
+        assert errors[:2] == ["error,", "%"]
+        assert [float(text) for text in errors[2:]] == pytest.approx(
+            100 * (table.frequencies[r] / table.rotor_frequencies - 1), abs=5.1e-5
+        )
+        assert mac[0] == "MAC"
+        assert [float(text) for text in mac[1:]] == pytest.approx(table.mac[r], abs=5.1e-5)
+
+
 def test_trade_off_where_no_model_is_good(rotor):
     text = " ".join(trade_off(rotor, (3, 11, 14)).summary().split())
     assert "None of these models moves like the rotor in all 3 modes" in text

@@ -242,6 +242,23 @@ def test_text_frame_and_document():
     text = found.summary()
     assert "m1     = 134.203 ± " in text
     assert "of the variance: U21" in text
+    values = np.concatenate((found.masses, found.frequencies))
+    std = np.concatenate((found.masses_std, found.frequencies_std))
+    for q, line in enumerate(text.splitlines()[:6]):
+        name, _, value, _, spread, unit, percent, _, *shares = line.split()
+        assert (name, unit) == (
+            ("m1", "m2", "m3", "omega1", "omega2", "omega3")[q],
+            "kg" if q < 3 else "rad/s",
+        )
+        assert float(value) == pytest.approx(values[q], rel=5.1e-6)
+        assert float(spread) == pytest.approx(std[q], rel=0.051)
+        assert float(percent.strip("(")) == pytest.approx(100 * std[q] / values[q], rel=0.051)
+        # the largest shares, largest first, of all errors together
+        said = " ".join(shares).removeprefix("of the variance: ").split(", ")
+        parts = sorted(found.contributions.items(), key=lambda item: -item[1].ravel()[q])[: len(said)]
+        for words, (key, part) in zip(said, parts, strict=True):
+            assert words.split()[0] == key
+            assert float(words.split()[1]) == pytest.approx(100 * part.ravel()[q] / std[q] ** 2, abs=0.51)
     frame = found.to_frame().set_index("quantity")
     assert frame.index.tolist() == ["m1", "m2", "m3", "omega1", "omega2", "omega3"]
     np.testing.assert_allclose(frame.drop(columns=["unit", "value", "std", "nonlinearity"]).sum(axis=1), 1.0)
