@@ -1,0 +1,80 @@
+"""What `rotorid balance` asks the runs about conventions, and what it would say under other ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.base.text import listing
+
+if TYPE_CHECKING:
+    from balancing import Correction, Trials
+    from rotorid.tables import Job
+
+
+def ask_runs(job: Job, corrections: Correction | None = None) -> Job:
+    """The job with the warning, before all others, where its runs contradict its conventions."""
+    from balancing.coefficients.convention_test import convention_test
+    from balancing.correction.other_readings import contradiction
+
+    words = contradiction(convention_test(all_runs(job, corrections)), job.trials.labels)
+    return replace(job, trials=replace(job.trials, warnings=words + job.trials.warnings))
+
+
+def all_runs(job: Job, corrections: Correction | None = None) -> Trials:
+    """Trial runs, and check runs of which is known what was mounted: that, or the corrections."""
+    from balancing.correction.refine import together
+
+    if job.check is None or (corrections is None and not job.check_mounted):
+        return job.trials
+    return together(job.trials, job.check, corrections=None if job.check_mounted else corrections)
+
+
+def with_other_readings(
+    result: Correction, job: Job, again: Callable[[str, str], Correction] | None
+) -> Correction:
+    """The correction with what the runs say about its conventions, and what other ones give.
+
+    Parameters
+    ----------
+    result, job
+        Of one another.
+    again
+        Solves the same job with this phase and these angles; None where that cannot be done.
+    """
+    from balancing.coefficients.convention_test import convention_test
+    from balancing.correction.other_readings import OtherReading, contradiction
+
+    labels = result.labels
+    test = convention_test(all_runs(job, result))
+    first = contradiction(test, labels)
+    result = replace(
+        result, convention_test=test, warnings=first + tuple(w for w in result.warnings if w not in first)
+    )
+    turned = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
+    turned += [labels.assumed] if len(labels.assumed) == 2 else []
+    found: list[tuple[list[str], Correction]] = []
+    for names in turned if again else ():
+        assert again is not None
+        other = labels.otherwise(names)
+        try:
+            solved = again(other.phase, other.angles)
+        except ValueError:  # no answer, as where limits cannot be met
+            continue
+        words = " and ".join(getattr(other, name) for name in names)
+        same = next((said for said, known in found if _alike(known, solved)), None)
+        if same is not None:
+            same.append(words)
+        elif not _alike(result, solved):
+            found.append(([words], solved))
+    others = (OtherReading(listing(said), c.labels, c.weights, c.to_add) for said, c in found)
+    return replace(result, others=tuple(others))
+
+
+def _alike(a: Correction, b: Correction) -> bool:
+    """Whether both say the same numbers, as they are printed."""
+    one, two = (m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b)))
+    return bool(np.abs(one - two).max() <= 1e-6 * np.abs(one).max())
