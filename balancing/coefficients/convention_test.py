@@ -1,10 +1,10 @@
 """Whether the runs themselves tell how phases and angles go together.
 
-Runs obey Y_run = Y₀ + W T_run. Phases that lag, taken for leading ones, are the conjugates of the readings, and
-conj(Y_run) = Ȳ₀ + W̄ T̄_run: the runs then fit the conjugate weights, and those only. So are weights whose angles
-count the other way. Runs are therefore fitted twice, with T and with T̄, and the sums of squared residuals
-compared. The fits are one and the same where the columns of (1 T) and of (1 T̄) span the same space: without a
-redundant run, and where the weights of each plane stand on one line through the shaft.
+Runs obey Y_run = Y₀ + W T_run. Phases that lag, taken for leading ones, are the conjugates of the readings,
+and conj(Y_run) = Ȳ₀ + W̄ T̄_run: such runs fit the conjugate weights, as they do where angles count the other way.
+Runs are therefore fitted twice, with T and with T̄, and the sums of squared residuals compared. Both fits are
+one where the columns of (1 T) and of (1 T̄) span the same space: without a redundant run, and where the weights
+of each plane stand on one line through the shaft.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class ConventionTest:
     verdict
         "confirmed", "contradicted" or "not told" by the data; otherwise why they cannot tell.
     chi_square, chi_square_other, dof
-        Of the runs as they were read, and with phases (or angles) taken the other way; None: they cannot tell.
+        Of the runs as they were read, and with phases (or angles) taken the other way; None: not told.
     """
 
     verdict: ConventionVerdict
@@ -62,10 +62,10 @@ class ConventionTest:
 def convention_test(trials: Trials) -> ConventionTest:
     """Ask the runs whether phases and angles go together as they were read.
 
-    A reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other one
-    fits (p > 0.01) and leaves less than half; or where the other one leaves so much less that errors of any
-    size hardly do that (F test, 0.001). Errors are those of `balancing.data.errors`; unknown ones are taken as
-    2 % and 2°.
+    One reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other
+    one fits (p > 0.01) and leaves less than half; or where the other one leaves so much less that errors of
+    any size hardly do that (F test, 0.001). Errors are those of `balancing.data.errors`; unknown ones are
+    taken as 2 % and 2°.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ def _corrections(c: Correction) -> str:
     mass, angle = c.labels.weight(c.weights)
     unit, factor = c.labels.weight_unit, c.coverage_factor
     rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
-    rows[0][3:3] = [f"if {o.words}" for o in c.others]
+    rows[0] += [f"if {o.words}" for o in c.others]
     mass_std, angle_std = c.mass_std, c.angle_std
     for p, plane in enumerate(c.planes):
         gone = plane in c.remove
@@ -136,8 +136,7 @@ def _corrections(c: Correction) -> str:
                 row.append("angle not determined")
             else:
                 row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
-        row[3:3] = [_if_other(o, o.weights[p], row[1], gone=gone) for o in c.others]
-        rows.append(row)
+        rows.append(row + [_if_other(o, o.weights[p], row[1], gone=gone) for o in c.others])
     head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
     taken = f" ({' and '.join(c.labels.assumed)} assumed)" if c.labels.assumed else ""
     foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}{taken}.", "")

@@ -25,7 +25,7 @@ class OtherReading:
     Attributes
     ----------
     words
-        What is otherwise: "lag", "lag or against rotation".
+        What is otherwise: "lag", "lag or against" (either of both alone).
     labels
         To print in: the angles are those that the job would write.
     weights, to_add
@@ -60,7 +60,10 @@ def assumptions(
     said = [labels.assumed_in_words()]
     if test is not None:
         said.append(_told(test, labels))
-    said += [f"If it is {o.words}, mount at the angles under “if {o.words}” instead." for o in others]
+    said += [f"If it is {o.words}, the weights go to the angles under “if {o.words}”." for o in others]
+    if len(labels.assumed) == 2 and len(others) == 1:
+        turned = labels.otherwise(labels.assumed)
+        said.append(f"With {turned.phase} and {turned.angles} together the angles stay as they are.")
     return tuple(said)
 
 

@@ -147,11 +147,11 @@ class Labels:
         taken = [words[name] for name in self.assumed]
         if not taken:
             return ""
-        asks = "whether phases lead or lag" if self.assumed == ("phase",) else "how angles count"
-        asks = "how phases and angles count" if len(taken) == 2 else asks
+        asked = {"phase": "whether phases lead or lag", "angles": "how angles count"}
+        said = " and ".join(asked[name] for name in self.assumed)
         return (
-            f"{' and '.join(self.assumed).capitalize()}: neither the job nor the command line says {asks}; "
-            f"{' and '.join(taken)} {'is' if len(taken) == 1 else 'are'} assumed."
+            f"Neither the job nor the command line says {said}; {' and '.join(taken)} "
+            f"{'is' if len(taken) == 1 else 'are'} assumed."
         )
 
     def turning_in_words(self) -> str:

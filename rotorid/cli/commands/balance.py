@@ -219,8 +219,8 @@ def balance(  # noqa: PLR0915
     from rotorid.cli.commands.balance_report import Report
     from rotorid.cli.commands.balance_workbook import as_workbook, workbook, write_template
     from rotorid.cli.commands.coefficients import choose, compare_planes
-    from rotorid.cli.commands.other_readings import ask_runs, with_other_readings
     from rotorid.cli.commands.verdict import Places, judge, tolerance_of
+    from rotorid.cli.other_readings import ask_runs, with_other_readings
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.job.source import JobSource

@@ -60,7 +60,7 @@ def read_trials(
     trials = make_trials(runs, weights, conventions, errors, problems)
     problems.stop()
     assert trials is not None
-    assumed = ("phase",) if phase is None else ()
+    assumed: tuple[str, ...] = ("phase",) if phase is None else ()
     if angles is None and off_axis(trials.weights):
         assumed += ("angles",)
     return replace(trials, labels=replace(trials.labels, assumed=assumed))

@@ -54,7 +54,7 @@ def with_other_readings(
     result = replace(
         result, convention_test=test, warnings=first + tuple(w for w in result.warnings if w not in first)
     )
-    turned = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
+    turned: list[tuple[str, ...]] = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
     turned += [labels.assumed] if len(labels.assumed) == 2 else []
     found: list[tuple[list[str], Correction]] = []
     for names in turned if again else ():
@@ -64,7 +64,7 @@ def with_other_readings(
             solved = again(other.phase, other.angles)
         except ValueError:  # no answer, as where limits cannot be met
             continue
-        words = " and ".join(getattr(other, name) for name in names)
+        words = " and ".join(getattr(other, name).removesuffix(" rotation") for name in names)
         same = next((said for said, known in found if _alike(known, solved)), None)
         if same is not None:
             same.append(words)
@@ -76,5 +76,7 @@ def with_other_readings(
 
 def _alike(a: Correction, b: Correction) -> bool:
     """Whether both say the same numbers, as they are printed."""
-    one, two = (m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b)))
+    one, two = (
+        m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b))
+    )
     return bool(np.abs(one - two).max() <= 1e-6 * np.abs(one).max())
