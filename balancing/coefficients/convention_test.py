@@ -1,10 +1,10 @@
 """Whether the runs themselves tell how phases and angles go together.
 
 Runs obey Y_run = Y₀ + W T_run. Phases that lag, taken for leading ones, are the conjugates of the readings,
-and conj(Y_run) = Ȳ₀ + W̄ T̄_run: such runs fit the conjugate weights, as they do where angles count the other way.
+and conj(Y_run) = Ȳ₀ + W̄ T̄_run: such runs fit the conjugate weights, as where angles count the other way.
 Runs are therefore fitted twice, with T and with T̄, and the sums of squared residuals compared. Both fits are
-one where the columns of (1 T) and of (1 T̄) span the same space: without a redundant run, and where the weights
-of each plane stand on one line through the shaft.
+one where the columns of (1 T) and of (1 T̄) span the same space: without a redundant run, and where the
+weights of each plane stand on one line through the shaft.
 """
 
 from __future__ import annotations

@@ -150,14 +150,14 @@ _SENSORS = (
 _SETTINGS = (
     _Key(
         "phase",
-        "Whether a positive phase leads or lags. Most instruments show lag: the angle that the rotor turns from "
-        "the pulse to the positive peak. To be chosen.",
+        "Whether a positive phase leads or lags, to be chosen. Most instruments show lag: the angle that the "
+        "rotor turns from the pulse to the positive peak.",
         Choice(PHASES),
         ASK_PHASE,
     ),
     _Key(
         "angles",
-        "How angles on the rotor count. To be chosen. Clockwise and counter-clockwise need rotation.",
+        "How angles on the rotor count, to be chosen. Clockwise and counter-clockwise need rotation.",
         Choice(STATED_ANGLES),
         ASK_ANGLES,
     ),
