@@ -23,6 +23,8 @@ ConventionVerdict = Literal["confirmed", "contradicted", "not told", "no redunda
 
 UNLIKELY, FITS = 1e-3, 0.01
 """Probability of χ² below which a reading of the runs is contradicted, and above which it fits."""
+FAR = 10.0
+"""Ratio of both χ² from which on the smaller one counts whatever the errors are."""
 _ASSUMED = ReadingErrors(amplitude=0.02, phase=float(np.radians(2.0)))
 _SAME = 1e-6
 
@@ -63,9 +65,9 @@ def convention_test(trials: Trials) -> ConventionTest:
     """Ask the runs whether phases and angles go together as they were read.
 
     One reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other
-    one fits (p > 0.01) and leaves less than half; or where the other one leaves so much less that errors of
-    any size hardly do that (F test, 0.001). Errors are those of `balancing.data.errors`; unknown ones are
-    taken as 2 % and 2°.
+    one fits (p > 0.01) and leaves less than half; or where the other one leaves less than a tenth, which
+    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.data.errors`; unknown ones
+    are taken as 2 % and 2°.
 
     Parameters
     ----------
@@ -106,7 +108,8 @@ def _refuted(own: float, other: float, dof: int) -> bool:
     from scipy.special import fdtrc
 
     clearly = _chance(own, dof) < UNLIKELY and _chance(other, dof) > FITS and own > 2 * other
-    return clearly or bool(fdtrc(dof, dof, own / max(other, _SAME * dof)) < UNLIKELY)
+    ratio = own / max(other, _SAME * dof)
+    return clearly or bool(ratio > FAR and fdtrc(dof, dof, ratio) < UNLIKELY)
 
 
 def _chance(chi_square: float, dof: int) -> float:

@@ -11,54 +11,56 @@ import numpy as np
 from rotorid.base.text import listing
 
 if TYPE_CHECKING:
-    from balancing import Correction, Trials
+    from balancing import Correction
+    from balancing.coefficients.convention_test import ConventionTest
     from rotorid.tables import Job
 
 
-def ask_runs(job: Job, corrections: Correction | None = None) -> Job:
-    """The job with the warning, before all others, where its runs contradict its conventions."""
+def ask_runs(job: Job, mounted: Correction | None = None) -> ConventionTest:
+    """What trial runs, and check runs of which is known what was mounted, say about conventions."""
     from balancing.coefficients.convention_test import convention_test
+    from balancing.correction.refine import together
+
+    if job.check is None or not (mounted or job.check_mounted):
+        return convention_test(job.trials)
+    return convention_test(
+        together(job.trials, job.check, corrections=None if job.check_mounted else mounted)
+    )
+
+
+def with_contradiction(job: Job) -> Job:
+    """The job with the warning, before all others, where its runs contradict its conventions."""
     from balancing.correction.other_readings import contradiction
 
-    words = contradiction(convention_test(all_runs(job, corrections)), job.trials.labels)
+    words = contradiction(ask_runs(job), job.trials.labels)
     return replace(job, trials=replace(job.trials, warnings=words + job.trials.warnings))
 
 
-def all_runs(job: Job, corrections: Correction | None = None) -> Trials:
-    """Trial runs, and check runs of which is known what was mounted: that, or the corrections."""
-    from balancing.correction.refine import together
-
-    if job.check is None or (corrections is None and not job.check_mounted):
-        return job.trials
-    return together(job.trials, job.check, corrections=None if job.check_mounted else corrections)
-
-
 def with_other_readings(
-    result: Correction, job: Job, again: Callable[[str, str], Correction] | None
+    result: Correction, test: ConventionTest, again: Callable[[str, str], Correction] | None
 ) -> Correction:
     """The correction with what the runs say about its conventions, and what other ones give.
 
     Parameters
     ----------
-    result, job
-        Of one another.
+    result
+        As the job is read.
+    test
+        What its runs say.
     again
         Solves the same job with this phase and these angles; None where that cannot be done.
     """
-    from balancing.coefficients.convention_test import convention_test
     from balancing.correction.other_readings import OtherReading, contradiction
 
     labels = result.labels
-    test = convention_test(all_runs(job, result))
     first = contradiction(test, labels)
-    result = replace(
-        result, convention_test=test, warnings=first + tuple(w for w in result.warnings if w not in first)
-    )
+    warnings = first + tuple(w for w in result.warnings if w not in first)
     turned: list[tuple[str, ...]] = [(name,) for name in labels.assumed if test.verdict != "confirmed"]
     turned += [labels.assumed] if len(labels.assumed) == 2 else []
     found: list[tuple[list[str], Correction]] = []
-    for names in turned if again else ():
-        assert again is not None
+    for names in turned:
+        if again is None:
+            break
         other = labels.otherwise(names)
         try:
             solved = again(other.phase, other.angles)
@@ -71,7 +73,7 @@ def with_other_readings(
         elif not _alike(result, solved):
             found.append(([words], solved))
     others = (OtherReading(listing(said), c.labels, c.weights, c.to_add) for said, c in found)
-    return replace(result, others=tuple(others))
+    return replace(result, warnings=warnings, convention_test=test, others=tuple(others))
 
 
 def _alike(a: Correction, b: Correction) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict
+from warnings import catch_warnings
 
 import typer
 
@@ -220,7 +221,7 @@ def balance(  # noqa: PLR0915
     from rotorid.cli.commands.balance_workbook import as_workbook, workbook, write_template
     from rotorid.cli.commands.coefficients import choose, compare_planes
     from rotorid.cli.commands.verdict import Places, judge, tolerance_of
-    from rotorid.cli.other_readings import ask_runs, with_other_readings
+    from rotorid.cli.other_readings import ask_runs, with_contradiction, with_other_readings
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.job.source import JobSource
@@ -254,7 +255,7 @@ def balance(  # noqa: PLR0915
         job = read_job(files[0], **said) if is_job else job_from_files(files, influence=influence, **said)
         return with_limits(job, max_mass, limit or []) if max_mass is not None or limit else job
 
-    job = ask_runs(read(settings))
+    job = with_contradiction(read(settings))
     found = choose(job, coefficients, model_error, refined=refine)
     used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
     candidates = names(planes) or (list(found.used) if job.left_out else list(found.influence.planes))
@@ -278,12 +279,15 @@ def balance(  # noqa: PLR0915
         )
 
     def again(phase: str, angles: str) -> Correction:
-        job = read({**settings, "phase": phase, "angles": angles})
+        with catch_warnings(action="ignore"):  # said when the job was read
+            job = read({**settings, "phase": phase, "angles": angles})
         return solved(job, choose(job, coefficients, model_error, refined=refine))
 
-    # what was mounted as proposed, was so by these conventions, and not by others
-    known = not (refine and not job.check_mounted)
-    result = with_other_readings(solved(job, found), job, again if known else None)
+    result = solved(job, found)
+    # what was mounted as proposed, before it was refined, was proposed by these conventions and by no others
+    known = not refine or job.check_mounted
+    test = ask_runs(job, result if known else None)
+    result = with_other_readings(result, test, again if known else None)
     source = JobSource(tuple(files), influence, **settings, max_mass=max_mass, limits=tuple(limit or ()))
     report = Report(result, found.influence, subsets=subsets)
     if split:
