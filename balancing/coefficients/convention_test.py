@@ -10,7 +10,7 @@ weights of each plane stand on one line through the shaft.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -37,28 +37,20 @@ class ConventionTest:
     ----------
     verdict
         "confirmed", "contradicted" or "not told" by the data; otherwise why they cannot tell.
-    chi_square, chi_square_other, dof
+    chi_square, chi_square_other, degrees_of_freedom
         Of the runs as they were read, and with phases (or angles) taken the other way; None: not told.
     """
 
     verdict: ConventionVerdict
     chi_square: float | None = None
     chi_square_other: float | None = None
-    dof: int = 0
+    degrees_of_freedom: int | None = None
 
     @property
     def other_fits(self) -> bool:
         """Whether the errors explain what the other reading leaves."""
-        return self.chi_square_other is not None and _chance(self.chi_square_other, self.dof) > FITS
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        return {
-            "verdict": self.verdict,
-            "chi_square": self.chi_square,
-            "chi_square_other": self.chi_square_other,
-            "degrees_of_freedom": self.dof,
-        }
+        found = self.chi_square_other, self.degrees_of_freedom
+        return found[0] is not None and found[1] is not None and _chance(found[0], found[1]) > FITS
 
 
 def convention_test(trials: Trials) -> ConventionTest:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.coefficients.baseline import describe_errors
 from balancing.correction.other_readings import OtherReading, assumptions, contradiction
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
 from rotorid.base.text import capital, figures, table, wrap
@@ -96,7 +98,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         "limits": _limits(c),
         "limits_that_bind": list(c.active),
         "errors": _errors(c),
-        "convention_test": None if c.convention_test is None else c.convention_test.to_dict(),
+        "convention_test": None if c.convention_test is None else asdict(c.convention_test),
         "other_readings": [row for other in c.others for row in _other_rows(c, other)],
         "assumptions": list(assumptions(c.labels, c.convention_test, c.others)),
         "warnings": list(c.warnings),
@@ -151,20 +153,10 @@ def _if_other(other: OtherReading, weight: complex, shown: str, *, gone: bool) -
 
 
 def _other_rows(c: Correction, other: OtherReading) -> list[dict[str, Any]]:
-    mass, angle = other.labels.weight(other.weights)
-    return [
-        {
-            "if": other.words,
-            "phase": other.labels.phase,
-            "angles": other.labels.angle_words,
-            "plane": plane,
-            "mass": float(mass[p]),
-            "unit": other.labels.weight_unit,
-            "angle_deg": float(angle[p]),
-            "remove_at_deg": float((angle[p] + 180) % 360) if plane in c.remove else None,
-        }
-        for p, plane in enumerate(c.planes)
-    ]
+    said = {"if": other.words, "phase": other.labels.phase, "angles": other.labels.angle_words}
+    rows = _weights(other.labels, c.planes, other.weights)
+    at = [(row["angle_deg"] + 180) % 360 if row["plane"] in c.remove else None for row in rows]
+    return [{**said, **row, "remove_at_deg": place} for row, place in zip(rows, at, strict=True)]
 
 
 def _add(c: Correction) -> str:
@@ -259,15 +251,15 @@ def _mounted(c: Correction) -> dict[str, Any]:
         return {"mounted_in_last_run": None, "add_to_mounted": None}
     run, planes, weights = c.mounted
     return {
-        "mounted_in_last_run": {"run": run, "weights": _weights(c, planes, weights)},
-        "add_to_mounted": _weights(c, planes, c.to_add),
+        "mounted_in_last_run": {"run": run, "weights": _weights(c.labels, planes, weights)},
+        "add_to_mounted": _weights(c.labels, planes, c.to_add),
     }
 
 
-def _weights(c: Correction, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
-    mass, angle = c.labels.weight(weights)
+def _weights(labels: Labels, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
+    mass, angle = labels.weight(weights)
     return [
-        {"plane": p, "mass": float(mass[i]), "unit": c.labels.weight_unit, "angle_deg": float(angle[i])}
+        {"plane": p, "mass": float(mass[i]), "unit": labels.weight_unit, "angle_deg": float(angle[i])}
         for i, p in enumerate(planes)
     ]
 

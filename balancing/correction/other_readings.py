@@ -45,8 +45,8 @@ def contradiction(test: ConventionTest, labels: Labels) -> tuple[str, ...]:
     own, other = _names(labels)
     fits = "fits" if test.other_fits else "is far nearer"
     return (
-        f"these runs contradict {own!r}: χ² {test.chi_square:.3g} of {test.dof}; {other!r} {fits}: "
-        f"{test.chi_square_other:.3g}. Phases or angles count the other way than "
+        f"these runs contradict {own!r}: χ² {test.chi_square:.3g} of {test.degrees_of_freedom}; "
+        f"{other!r} {fits}: {test.chi_square_other:.3g}. Phases or angles count the other way than "
         f"{'is assumed' if labels.assumed else 'the job says'}, and the weights would go to wrong places",
     )
 
@@ -71,7 +71,7 @@ def _told(test: ConventionTest, labels: Labels) -> str:
     if test.chi_square is None:
         return _WHY[test.verdict]
     own, other = _names(labels)
-    sums = f"χ² {test.chi_square:.3g} of {test.dof}; {other!r}: {test.chi_square_other:.3g}"
+    sums = f"χ² {test.chi_square:.3g} of {test.degrees_of_freedom}; {other!r}: {test.chi_square_other:.3g}"
     both = f" for angles {labels.angle_words}" if len(labels.assumed) == 2 else ""
     return {
         "confirmed": f"The runs themselves confirm {own!r}{both}: {sums}.",

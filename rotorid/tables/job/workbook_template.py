@@ -8,15 +8,7 @@ from dataclasses import dataclass
 from rotorid.tables.job.workbook_pages import Choice, Page, book_bytes
 from rotorid.tables.job.workbook_reading import OPTIONAL
 from rotorid.tables.job.workbook_sheets import Line
-from rotorid.tables.runs.conventions import (
-    ASK_ANGLES,
-    ASK_PHASE,
-    DEFAULT_TOLERANCE,
-    PHASES,
-    ROTATIONS,
-    STATED_ANGLES,
-    VIEWS,
-)
+from rotorid.tables.runs.conventions import DEFAULT_TOLERANCE, PHASES, ROTATIONS, STATED_ANGLES, VIEWS
 
 _POSITIVE = Choice(low=0.0, high=math.inf)
 _YES_NO = Choice(("yes", "no"))
@@ -35,7 +27,7 @@ class _Column:
 
 @dataclass(frozen=True)
 class _Key:
-    """A row of the sheet settings."""
+    """A row of the sheet settings; a value that is none of the choices is refused until somebody chooses."""
 
     name: str
     meaning: str
@@ -153,13 +145,13 @@ _SETTINGS = (
         "Whether a positive phase leads or lags, to be chosen. Most instruments show lag: the angle that the "
         "rotor turns from the pulse to the positive peak.",
         Choice(PHASES),
-        ASK_PHASE,
+        "lead or lag?",
     ),
     _Key(
         "angles",
         "How angles on the rotor count, to be chosen. Clockwise and counter-clockwise need rotation.",
         Choice(STATED_ANGLES),
-        ASK_ANGLES,
+        "which way?",
     ),
     _Key("rotation", "How the rotor turns, seen from the same end as the angles.", Choice(ROTATIONS)),
     _Key("view", "The end from which that is seen.", Choice(VIEWS)),

@@ -23,8 +23,6 @@ ROTATIONS = ("clockwise", "counter-clockwise")
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
 """What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
 VIEWS = ("drive end", "free end")
-ASK_PHASE, ASK_ANGLES = "lead or lag?", "which way?"
-"""What a form has in these places until somebody chooses; a job that still says it is refused."""
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
 FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)

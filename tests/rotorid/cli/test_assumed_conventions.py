@@ -11,6 +11,8 @@ import openpyxl
 import pytest
 from tables_data import write_csv
 
+from rotorid.samples import sample_data
+
 RNG = np.random.default_rng(15)
 SPEEDS, SENSORS, PLANES = (1200, 1800), ("A", "B"), ("left", "right")
 W = RNG.normal(size=(2, 2, 2)) + 1j * RNG.normal(size=(2, 2, 2))
@@ -291,3 +293,38 @@ def test_the_form_asks(cli, tmp_path):
     job = tmp_path / "job.toml"
     job.write_text('runs = "runs.csv"\nweights = "weights.csv"\nphase = ""\n', encoding="utf-8")
     assert "key phase: found nothing (a blank), expected 'lead' or 'lag'" in cli("balance", job).err
+
+
+def test_a_refusal_names_the_contradiction(cli, tmp_path):
+    """Four weights a quarter turn apart, read the wrong way, seem to do nothing at all."""
+    around = [{plane: (3, angle)} for plane in PLANES for angle in (0, 90, 180, 270)]
+    files = shop(tmp_path, [{}, *around], "lag", noise=0.02)
+    outcome = cli("balance", *files)
+    assert outcome.code == 2
+    assert "its effect is not determined" in outcome.err
+    assert "these runs contradict 'lead'" in outcome.err
+    assert cli("balance", *files, "--phase", "lag").code == 0
+
+
+def test_computed_coefficients(cli, tmp_path):
+    """They know where lead is: the other reading is no mirror image, and what the command says with lag."""
+    folder = sample_data() / "model_job"
+    for name in ("runs.csv", "rotor.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    text = (folder / "job.toml").read_text(encoding="utf-8")
+    words = 'phase = "lead"\nangles = "with rotation"\n'
+    assert words in text
+    (tmp_path / "job.toml").write_text(text.replace(words, ""), encoding="utf-8")
+    document = cli("balance", tmp_path / "job.toml", "--json").json
+    assert document["conventions"]["assumed"] == ["phase"]
+    expected = cli("balance", tmp_path / "job.toml", "--phase", "lag", "--json").json["corrections"]
+    for row, other in zip(expected, document["other_readings"], strict=True):
+        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
+    trial = cli("trial-weight", tmp_path / "job.toml", "--plane", "middle").out
+    assert "lead is assumed" in " ".join(trial.split())
+
+
+def test_sample_jobs_state_their_conventions(cli):
+    for job in sorted(sample_data().glob("*/*.toml")):
+        if job.stem in ("job", "holes", "checked"):
+            assert cli("balance", job, "--json").json["assumptions"] == [], job
