@@ -111,6 +111,7 @@ class TrialWeight:
         """Text of 80 columns."""
         found = self.to_dict()
         lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
+        lines += [wrap(self.labels.assumed_in_words())] if self.labels.assumed else []
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
         if found["angle_deg"] is not None:

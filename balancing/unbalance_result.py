@@ -169,6 +169,7 @@ class Unbalance:
         data = self.to_dict()
         width = max(8, *(len(name) for name in self.stations))
         lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {data['words']}"]
+        lines[:0] = [self.labels.assumed_in_words()] if self.labels.assumed else []
         lines.append(
             f"{'station':<{width}} {self.labels.weight_unit:>12} {'angle':>8} {'std':>10}  determined"
         )

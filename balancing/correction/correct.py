@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
+from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.identifiability import check_planes, check_resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors, seen_in, shares_of
@@ -25,6 +26,7 @@ from balancing.correction.correction_warnings import (
     reading_names,
     weight_words,
 )
+from balancing.correction.other_readings import OtherReading
 from balancing.correction.region_coverage import optimism
 from balancing.data.conventions import Labels
 from balancing.data.errors import Source, reading_covariance, symmetric
@@ -92,6 +94,10 @@ class Correction:
         What the correction had to keep to, and the limits that bind, in words.
     remove
         Planes where material is taken away, opposite to the weight that would be added.
+    convention_test
+        What the runs say about the relation of phases to angles; None: they were not asked.
+    others
+        What the same numbers give if a convention that is assumed is otherwise.
     """
 
     speeds: FloatArray
@@ -121,6 +127,8 @@ class Correction:
     limits: Limits | None = None
     active: tuple[str, ...] = ()
     remove: tuple[str, ...] = ()
+    convention_test: ConventionTest | None = None
+    others: tuple[OtherReading, ...] = ()
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -184,7 +192,8 @@ class Correction:
         """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown).
 
         Where material is taken away from a plane, `action` says so, `angle_deg` is the place to work at, and
-        `equivalent_added_deg` the angle of the added weight that would do the same.
+        `equivalent_added_deg` the angle of the added weight that would do the same. Where a convention is
+        assumed, `mass_if_…` and `angle_deg_if_…` say what the other reading gives.
         """
         import pandas as pd
 
@@ -198,6 +207,11 @@ class Correction:
             frame["angle_deg"] = [
                 row["angle_deg"] if row["remove_at_deg"] is None else row["remove_at_deg"] for row in known
             ]
+        for other in self.others:
+            mass, angle = other.labels.weight(other.weights)
+            word = other.words.replace(" ", "_")
+            frame[f"mass_if_{word}"] = mass
+            frame[f"angle_deg_if_{word}"] = (angle + [180.0 * (p in self.remove) for p in self.planes]) % 360
         return frame.astype({"mass_std": float, "angle_std_deg": float})
 
     def residuals_frame(self) -> pd.DataFrame:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.coefficients.baseline import describe_errors
+from balancing.correction.other_readings import OtherReading, assumptions, contradiction
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
 from rotorid.base.text import capital, figures, table, wrap
@@ -95,14 +98,20 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         "limits": _limits(c),
         "limits_that_bind": list(c.active),
         "errors": _errors(c),
+        "convention_test": None if c.convention_test is None else asdict(c.convention_test),
+        "other_readings": [row for other in c.others for row in _other_rows(c, other)],
+        "assumptions": list(assumptions(c.labels, c.convention_test, c.others)),
         "warnings": list(c.warnings),
     }
 
 
 def summary(c: Correction) -> str:
     """`Correction.summary`."""
+    contradicted = 0 if c.convention_test is None else len(contradiction(c.convention_test, c.labels))
     blocks = [
-        *(wrap(f"Warning: {w}", "  ") for w in c.warnings),
+        *(wrap(f"Warning: {w}", "  ") for w in c.warnings[:contradicted]),
+        wrap(" ".join(assumptions(c.labels, c.convention_test, c.others))),
+        *(wrap(f"Warning: {w}", "  ") for w in c.warnings[contradicted:]),
         _corrections(c),
         _add(c),
         _vibration(c),
@@ -115,6 +124,7 @@ def _corrections(c: Correction) -> str:
     mass, angle = c.labels.weight(c.weights)
     unit, factor = c.labels.weight_unit, c.coverage_factor
     rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
+    rows[0] += [f"if {o.words}" for o in c.others]
     mass_std, angle_std = c.mass_std, c.angle_std
     for p, plane in enumerate(c.planes):
         gone = plane in c.remove
@@ -128,10 +138,25 @@ def _corrections(c: Correction) -> str:
                 row.append("angle not determined")
             else:
                 row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
-        rows.append(row)
+        rows.append(row + [_if_other(o, o.weights[p], row[1], gone=gone) for o in c.others])
     head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
-    foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}.", "")
+    taken = f" ({' and '.join(c.labels.assumed)} assumed)" if c.labels.assumed else ""
+    foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}{taken}.", "")
     return f"{head}\n{table(rows)}\n{foot}"
+
+
+def _if_other(other: OtherReading, weight: complex, shown: str, *, gone: bool) -> str:
+    """The angle if a convention is otherwise, and the mass where that is another than the one shown."""
+    mass, angle = other.labels.weight(weight)
+    at = _degrees(float(angle) + 180 * gone)
+    return at if figures(float(mass)) == shown else f"{figures(float(mass))} at {at}"
+
+
+def _other_rows(c: Correction, other: OtherReading) -> list[dict[str, Any]]:
+    said = {"if": other.words, "phase": other.labels.phase, "angles": other.labels.angle_words}
+    rows = _weights(other.labels, c.planes, other.weights)
+    at = [(row["angle_deg"] + 180) % 360 if row["plane"] in c.remove else None for row in rows]
+    return [{**said, **row, "remove_at_deg": place} for row, place in zip(rows, at, strict=True)]
 
 
 def _add(c: Correction) -> str:
@@ -142,11 +167,14 @@ def _add(c: Correction) -> str:
     more, more_angle = c.labels.weight(c.to_add)
     unit = c.labels.weight_unit
     rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
+    rows[0] += [f"if {o.words}" for o in c.others if o.to_add is not None]
     for p, plane in enumerate(planes):
         gone = plane in c.remove
         name = f"{plane} (remove)" if gone else plane
         more_at = _degrees(more_angle[p] + 180 * gone)
-        rows.append([name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at])
+        row = [name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at]
+        row += [_if_other(o, o.to_add[p], row[3], gone=gone) for o in c.others if o.to_add is not None]
+        rows.append(row)
     head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
     foot = ""
     if any(plane in c.remove for plane in planes):
@@ -223,15 +251,15 @@ def _mounted(c: Correction) -> dict[str, Any]:
         return {"mounted_in_last_run": None, "add_to_mounted": None}
     run, planes, weights = c.mounted
     return {
-        "mounted_in_last_run": {"run": run, "weights": _weights(c, planes, weights)},
-        "add_to_mounted": _weights(c, planes, c.to_add),
+        "mounted_in_last_run": {"run": run, "weights": _weights(c.labels, planes, weights)},
+        "add_to_mounted": _weights(c.labels, planes, c.to_add),
     }
 
 
-def _weights(c: Correction, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
-    mass, angle = c.labels.weight(weights)
+def _weights(labels: Labels, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
+    mass, angle = labels.weight(weights)
     return [
-        {"plane": p, "mass": float(mass[i]), "unit": c.labels.weight_unit, "angle_deg": float(angle[i])}
+        {"plane": p, "mass": float(mass[i]), "unit": labels.weight_unit, "angle_deg": float(angle[i])}
         for i, p in enumerate(planes)
     ]
 

@@ -98,10 +98,7 @@ def refine(
     """
     if not checks:
         raise ValueError("there is no check run: give one or more beside the trial runs")
-    at = [match_speeds(check.speeds, trials.speeds, "trial runs") for check in checks]
-    rows = [s for s in range(len(trials.speeds)) if all(s in speeds for speeds in at)]
-    sensors = [_sensors(check, trials) for check in checks]
-    columns = [c for c in range(len(trials.sensors)) if all(c in own for own in sensors)]
+    rows, columns = _common(trials, checks)
     alone, notes = _alone(trials)
     everywhere = len(rows) == len(trials.speeds) and len(columns) == len(trials.sensors)
     if everywhere:
@@ -172,6 +169,27 @@ def _sensors(check: Trials, trials: Trials) -> list[int]:
                 f"those of {', '.join(map(repr, trials.sensors))}"
             )
     return [trials.sensors.index(name) for name in check.sensors]
+
+
+def together(
+    trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
+) -> Trials:
+    """Trial runs and check runs as one table, of the speeds and sensors that all have.
+
+    Parameters
+    ----------
+    trials, checks, corrections
+        As of `refine`.
+    """
+    return _joined(trials, checks, corrections, *_common(trials, checks))
+
+
+def _common(trials: Trials, checks: Sequence[Trials]) -> tuple[list[int], list[int]]:
+    """Speeds and sensors of the trial runs that all check runs have."""
+    at = [match_speeds(check.speeds, trials.speeds, "trial runs") for check in checks]
+    rows = [s for s in range(len(trials.speeds)) if all(s in speeds for speeds in at)]
+    sensors = [_sensors(check, trials) for check in checks]
+    return rows, [c for c in range(len(trials.sensors)) if all(c in own for own in sensors)]
 
 
 def _joined(

@@ -7,8 +7,9 @@ people of the job write them. The signs are derived in docs/conventions.md.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +45,8 @@ class Labels:
     clock
         Whether the job calls its angles clockwise or counter-clockwise instead of with or against the
         rotation.
+    assumed
+        Which of "phase" and "angles" nobody states, although they matter.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class Labels:
     rotation: Rotation | None = None
     view: View | None = None
     clock: bool = False
+    assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_turning(self.rotation, self.view, clock=self.clock)
@@ -127,6 +131,29 @@ class Labels:
             return self
         return replace(self, view=view, rotation=opposite(self.rotation))
 
+    def otherwise(self, names: Collection[str]) -> Labels:
+        """The labels with "phase", "angles" or both turned round."""
+        phase: Phase = "lag" if self.phase == "lead" else "lead"
+        angles: Angles = "against rotation" if self.angle_sign > 0 else "with rotation"
+        return replace(
+            self,
+            phase=phase if "phase" in names else self.phase,
+            angles=angles if "angles" in names else self.angles,
+        )
+
+    def assumed_in_words(self) -> str:
+        """One sentence about what is assumed; empty where nothing is."""
+        words = {"phase": self.phase, "angles": self.angle_words}
+        taken = [words[name] for name in self.assumed]
+        if not taken:
+            return ""
+        asked = {"phase": "whether phases lead or lag", "angles": "how angles count"}
+        said = " and ".join(asked[name] for name in self.assumed)
+        return (
+            f"Neither the job nor the command line says {said}; {' and '.join(taken)} "
+            f"{'is' if len(taken) == 1 else 'are'} assumed."
+        )
+
     def turning_in_words(self) -> str:
         """One clause for captions: how angles count and how the rotor turns."""
         if self.clock:
@@ -139,13 +166,14 @@ class Labels:
             words += "" if self.view is None else f" seen from the {self.view}"
         return words
 
-    def conventions(self) -> dict[str, str]:
+    def conventions(self) -> dict[str, Any]:
         """The conventions in the words of the job file; rotation and view only where they are stated."""
-        words = {
+        words: dict[str, Any] = {
             "phase": self.phase,
             "angles": self.angle_words,
             "vibration_unit": self.vibration_unit,
             "weight_unit": self.weight_unit,
+            "assumed": list(self.assumed),
         }
         if self.rotation is not None:
             words["rotation"] = self.rotation

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
@@ -169,6 +170,12 @@ class Trials:
     def mean(self) -> ComplexArray:
         """Mean of the repeated readings, shape (R, S, C)."""
         return np.asarray(np.nansum(self.readings, axis=0) / self.repeats)
+
+
+def off_axis(weights: ArrayLike) -> bool:
+    """Whether any of these complex weights stands at another angle than 0° and 180°."""
+    w = np.asarray(weights, dtype=complex)
+    return bool((np.abs(w.imag) > 1e-9 * np.abs(w)).any())
 
 
 def check_names(names: Sequence[str], what: str, *, empty: bool = False) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from balancing.correction.correction_text import small
 from rotorid.base.json import finite
-from rotorid.base.text import figures, table
+from rotorid.base.text import figures, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
@@ -70,6 +70,11 @@ def summary(m: Mounted) -> str:
     head = "What to mount, all planes together" if not c.remove else "What to mount or to remove"
     stays = "" if m.on_top_of is None else f", in addition to what is mounted in run {m.on_top_of!r}"
     lines = [*(f"Warning: {words}" for words in m.warnings), head + stays]
+    if c.labels.assumed:
+        said = " and ".join(c.labels.assumed)
+        lines.append(
+            wrap(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
+        )
     lines.append(table(rows, left=2) if len(rows) > 1 else "  nothing: every piece would make it worse")
     after = labels.vibration(m.after)[0]
     free = labels.vibration(c.after)[0]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _SAMPLE = 60.0
 """Angle, degrees, of the weight and of the phase that the figures show."""
 _SIDE, _TALL, _FLAT, _INNER, _OUTER, _KEY = 2.45, 2.1, 1.6, 1.3, 1.52, 1.13
+_ASSUMED = " Assumed: neither the job nor the command line says so."
 _BASES = {
     "um": "µm",
     "m_s": "m/s",
@@ -117,7 +118,8 @@ def words(
         )
     found.append(("Vibration", _amplitude(labels)))
     found.append(("Weights", _weight(labels)))
-    return found
+    assumed = {"Phase": "phase" in labels.assumed, "Angles of weights": "angles" in labels.assumed}
+    return [(term, said + (_ASSUMED if assumed.get(term) else "")) for term, said in found]
 
 
 def _rotation(labels: Labels) -> str:

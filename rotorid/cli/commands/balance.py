@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, TypedDict
+from typing import TYPE_CHECKING, Annotated, TypedDict
+from warnings import catch_warnings
 
 import typer
 
@@ -18,6 +19,11 @@ from rotorid.cli.common import (
     names,
     speeds,
 )
+
+if TYPE_CHECKING:
+    from balancing import Correction
+    from rotorid.cli.commands.coefficients import Chosen
+    from rotorid.tables import Job
 
 METHODS = ("least-squares", "weighted", "minmax")
 COEFFICIENTS = ("measured", "computed", "combined")
@@ -215,6 +221,7 @@ def balance(  # noqa: PLR0915
     from rotorid.cli.commands.balance_workbook import as_workbook, workbook, write_template
     from rotorid.cli.commands.coefficients import choose, compare_planes
     from rotorid.cli.commands.verdict import Places, judge, tolerance_of
+    from rotorid.cli.other_readings import ask_runs, with_contradiction, with_other_readings
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.job.source import JobSource
@@ -243,9 +250,12 @@ def balance(  # noqa: PLR0915
         "phase_error_deg": phase_error,
     }
     is_job = len(files) == 1 and influence is None and files[0].suffix.lower() in (".toml", ".xlsx")
-    job = read_job(files[0], **settings) if is_job else job_from_files(files, influence=influence, **settings)
-    if max_mass is not None or limit:
-        job = with_limits(job, max_mass, limit or [])
+
+    def read(said: Overrides) -> Job:
+        job = read_job(files[0], **said) if is_job else job_from_files(files, influence=influence, **said)
+        return with_limits(job, max_mass, limit or []) if max_mass is not None or limit else job
+
+    job = with_contradiction(read(settings))
     found = choose(job, coefficients, model_error, refined=refine)
     used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
     candidates = names(planes) or (list(found.used) if job.left_out else list(found.influence.planes))
@@ -253,18 +263,31 @@ def balance(  # noqa: PLR0915
     if best_planes is not None:
         subsets = compare_planes(found, candidates, used, best_planes, method, job.row_weights)
         candidates = list(subsets.planes[0])
-    result = correct(
-        found.influence,
-        baseline=found.baseline,
-        planes=candidates,
-        speeds=used,
-        method=method,
-        limits=job.limits_of(found.influence.planes),
-        row_weights=job.row_weights,
-        strength=_strength(ridge),
-        keep=truncate,
-        remove=sorted(job.remove),
-    )
+
+    def solved(job: Job, found: Chosen) -> Correction:
+        return correct(
+            found.influence,
+            baseline=found.baseline,
+            planes=candidates,
+            speeds=used,
+            method=method,
+            limits=job.limits_of(found.influence.planes),
+            row_weights=job.row_weights,
+            strength=_strength(ridge),
+            keep=truncate,
+            remove=sorted(job.remove),
+        )
+
+    def again(phase: str, angles: str) -> Correction:
+        with catch_warnings(action="ignore"):  # said when the job was read
+            job = read({**settings, "phase": phase, "angles": angles})
+        return solved(job, choose(job, coefficients, model_error, refined=refine))
+
+    result = solved(job, found)
+    # what was mounted as proposed, before it was refined, was proposed by these conventions and by no others
+    known = not refine or job.check_mounted
+    test = ask_runs(job, result if known else None)
+    result = with_other_readings(result, test, again if known else None)
     source = JobSource(tuple(files), influence, **settings, max_mass=max_mass, limits=tuple(limit or ()))
     report = Report(result, found.influence, subsets=subsets)
     if split:

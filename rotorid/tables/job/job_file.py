@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rotorid.tables.job.assumed import with_assumed
 from rotorid.tables.job.completion import completed
 from rotorid.tables.job.job_data import Job, Source, source_name
 from rotorid.tables.job.job_model import collect, read_model
@@ -122,7 +123,7 @@ def _read(
         job = completed(job, model, extra, settings, top, planes, sensors, problems)
     problems.stop()
     assert job is not None
-    return job
+    return with_assumed(job)
 
 
 def job_from_files(
@@ -143,7 +144,8 @@ def job_from_files(
     influence
         Influence table.
     phase, angles, amplitude_error_percent, phase_error_deg
-        Conventions and stated errors; default: lead, with rotation, none stated.
+        Conventions and stated errors; default: lead and with rotation, which the labels then call assumed;
+        none stated.
 
     Returns
     -------
@@ -170,7 +172,7 @@ def job_from_files(
     job = _assemble(None, paths[0], paths[1] if len(paths) == 2 else None, stored, settings, problems)
     problems.stop()
     assert job is not None
-    return job
+    return with_assumed(job)
 
 
 def _read_tables(

@@ -207,7 +207,9 @@ def settle_conventions(
             f"phase = {said['phase']}, as {stored} says"
         )
     t = settings.turning
+    own = {"phase": settings.phase, "angles": settings.angles}
+    unstated = tuple(name for name, word in own.items() if word is None)
     return (
-        Conventions(phase, angles, settings.speed_tolerance_percent, t.rotation, t.view, t.clock),
+        Conventions(phase, angles, settings.speed_tolerance_percent, t.rotation, t.view, t.clock, unstated),
         tuple(notes),
     )

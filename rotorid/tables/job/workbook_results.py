@@ -57,12 +57,14 @@ def result_sheets(results: Results, provenance: Mapping[str, Any] | None) -> dic
     """
     document = results.to_dict()
     warnings = [(f"# warning: {text}",) for text in document.get("warnings", ())]
+    warnings += [(f"# {text}",) for text in document.get("assumptions", ())]
     head: list[Line] = [(f"# {_NOT_READ}",)]
     sheets = {RESULTS: [*head, *warnings, *_frame(results.result.to_frame())]}
     rows = [*_summary(document, ()), *(() if provenance is None else _summary(provenance, ("provenance",)))]
     sheets[f"{RESULTS} summary"] = [*head, ("result", "value"), *rows]
     sheets[f"{RESULTS} residuals"] = [*head, *_records(document.get("residuals", ()))]
     for name, keys in {
+        "other readings": ("other_readings",),
         "add to mounted": ("add_to_mounted",),
         "mounted residuals": ("mounting", "residuals"),
         "check": ("check", "readings"),

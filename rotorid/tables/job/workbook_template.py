@@ -27,11 +27,12 @@ class _Column:
 
 @dataclass(frozen=True)
 class _Key:
-    """A row of the sheet settings."""
+    """A row of the sheet settings; a value that is none of the choices is refused until somebody chooses."""
 
     name: str
     meaning: str
     choice: Choice
+    value: str = ""
 
 
 _RUNS = (
@@ -139,11 +140,18 @@ _SENSORS = (
     _Column("note", "Remarks.", "anything"),
 )
 _SETTINGS = (
-    _Key("phase", "Whether a positive phase leads or lags. Blank: lead.", Choice(PHASES)),
+    _Key(
+        "phase",
+        "Whether a positive phase leads or lags, to be chosen. Most instruments show lag: the angle that the "
+        "rotor turns from the pulse to the positive peak.",
+        Choice(PHASES),
+        "lead or lag?",
+    ),
     _Key(
         "angles",
-        "How angles on the rotor count. Blank: with rotation. Clockwise and counter-clockwise need rotation.",
+        "How angles on the rotor count, to be chosen. Clockwise and counter-clockwise need rotation.",
         Choice(STATED_ANGLES),
+        "which way?",
     ),
     _Key("rotation", "How the rotor turns, seen from the same end as the angles.", Choice(ROTATIONS)),
     _Key("view", "The end from which that is seen.", Choice(VIEWS)),
@@ -161,7 +169,7 @@ _HOW: tuple[Line, ...] = (
     ("How to fill in this workbook",),
     ("1. Sheet runs: one row per run, speed and sensor; the first run without any trial weight.",),
     ("2. Sheet weights: what was mounted in which plane during which run.",),
-    ("3. Sheet settings: phase and angles as your instrument counts them; a blank value is not stated.",),
+    ("3. Sheet settings: choose phase and angles as your instrument and your rotor count them.",),
     ("4. Sheets planes and sensors: limits, holes and radii, where there are any; they may stay empty.",),
     ("5. rotorid balance job.xlsx   (--output sheet.xlsx: the same workbook with results)",),
     ("The units are in the names of the columns: choose another name from the list of the header's cell.",),
@@ -213,7 +221,7 @@ def _form(title: str, columns: tuple[_Column, ...]) -> Page:
 
 
 def _settings() -> Page:
-    rows: list[Line] = [(key.name, "", _explained(key)) for key in _SETTINGS]
+    rows: list[Line] = [(key.name, key.value, _explained(key)) for key in _SETTINGS]
     return Page(
         "settings",
         [("key", "value", OPTIONAL), *rows],

@@ -44,6 +44,8 @@ class Conventions:
         How the rotor turns, and the end from which that is seen; None where the job does not say.
     clock
         Whether the job calls its angles clockwise or counter-clockwise.
+    unstated
+        Which of "phase" and "angles" neither the job nor the caller states.
 
     Raises
     ------
@@ -57,6 +59,7 @@ class Conventions:
     rotation: Rotation | None = None
     view: View | None = None
     clock: bool = False
+    unstated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.phase not in PHASES:

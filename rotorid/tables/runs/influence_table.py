@@ -276,6 +276,7 @@ def influence_bytes(path: str | Path, influence: Coefficients, notes: Sequence[s
     comments = (
         f"phase = {labels.phase}",
         f"angles = {labels.angles}",
+        *((f"assumed, stated nowhere: {' and '.join(labels.assumed)}",) if labels.assumed else ()),
         PHASE_MEANING,
         *(error_comments(influence, labels) if isinstance(influence, Influence) else ()),
         *notes,

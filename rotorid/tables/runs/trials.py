@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from balancing.data.conventions import Labels
-from balancing.data.trials import ReadingErrors, Trials
+from balancing.data.trials import ReadingErrors, Trials, off_axis
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit
@@ -20,8 +21,8 @@ def read_trials(
     runs: str | Path,
     weights: str | Path | None,
     *,
-    phase: Phase = "lead",
-    angles: Angles = "with rotation",
+    phase: Phase | None = None,
+    angles: Angles | None = None,
     speed_tolerance_percent: float = DEFAULT_TOLERANCE,
     errors: StatedErrors | ReadingErrors | None = None,
 ) -> Trials:
@@ -32,9 +33,10 @@ def read_trials(
     runs, weights
         Files (`.csv`, `.xlsx`); weights may be None where influence coefficients are known.
     phase
-        Whether a positive phase in the runs table leads or lags.
+        Whether a positive phase in the runs table leads or lags; None: lead, which the labels call assumed.
     angles
-        Whether angles in the weights table count with or against the rotation.
+        Whether angles in the weights table count with or against the rotation; None: with, which the labels
+        call assumed where an angle other than 0° and 180° is mounted.
     speed_tolerance_percent
         Speeds of different runs that differ by less count as one, their mean.
     errors
@@ -53,11 +55,15 @@ def read_trials(
         If an argument is none of the allowed values.
     """
     problems = Problems()
-    conventions = Conventions(phase, angles, speed_tolerance_percent)
+    said = ("lead" if phase is None else phase, "with rotation" if angles is None else angles)
+    conventions = Conventions(*said, speed_tolerance_percent)
     trials = make_trials(runs, weights, conventions, errors, problems)
     problems.stop()
     assert trials is not None
-    return trials
+    assumed: tuple[str, ...] = ("phase",) if phase is None else ()
+    if angles is None and off_axis(trials.weights):
+        assumed += ("angles",)
+    return replace(trials, labels=replace(trials.labels, assumed=assumed))
 
 
 def make_trials(

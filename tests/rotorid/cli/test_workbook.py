@@ -160,6 +160,9 @@ def test_the_form(cli, tmp_path):
             for number, row in enumerate(body, start=2):
                 text = title in ("run", "sensor", "plane")
                 book[name].cell(number, place).value = row[place - 1] if text else float(row[place - 1])
+    keys = [cell.value for cell in book["settings"]["A"]]
+    for key, value in (("phase", "lead"), ("angles", "with rotation")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
     book.save(form)
     expected = answer(cli("balance", DATA / "bk_two_plane" / "job.toml", "--json"))
     assert answer(cli("balance", form, "--json")) == expected

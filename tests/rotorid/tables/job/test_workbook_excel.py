@@ -40,8 +40,11 @@ def european(table):
 
 
 def filled(path, **sheets):
-    """The form with rows written into its sheets, below the header; settings by key."""
+    """The form with rows written into its sheets, below the header; phase and angles are chosen."""
     book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    keys = [cell.value for cell in book["settings"]["A"]]
+    for key, value in (("phase", "lead"), ("angles", "with rotation")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
     for name, rows in sheets.items():
         sheet = book[name]
         header = [cell.value for cell in sheet[1]]

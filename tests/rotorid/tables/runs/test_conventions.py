@@ -57,6 +57,7 @@ def test_the_output_says_what_the_input_said(job):
         "angles": "clockwise",
         "vibration_unit": "um_pp",
         "weight_unit": "g",
+        "assumed": ["phase"],
         "rotation": "counter-clockwise",
         "view": "free end",
     }

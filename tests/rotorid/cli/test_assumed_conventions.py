@@ -1,0 +1,330 @@
+"""What nobody says about phases and angles: said first, with the other answer beside it; the runs are asked.
+
+One machine, Y = Y₀ + W T, is written down by a shop with its own instrument and its own degree tape, and read
+without a word about either, or with the wrong one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import openpyxl
+import pytest
+from tables_data import write_csv
+
+from rotorid.samples import sample_data
+
+RNG = np.random.default_rng(15)
+SPEEDS, SENSORS, PLANES = (1200, 1800), ("A", "B"), ("left", "right")
+W = RNG.normal(size=(2, 2, 2)) + 1j * RNG.normal(size=(2, 2, 2))
+BEST = np.array([3.1 * np.exp(0.9j), 2.2 * np.exp(-1.7j)])
+"""What balances it, with the rotation."""
+Y0 = -W @ BEST
+
+ON_AXIS = [{}, {"left": (3, 0)}, {"right": (4, 180)}]
+OFF_AXIS = [{}, {"left": (3, 40)}, {"right": (4, 250)}]
+IN_LINE = [*OFF_AXIS, {"left": (2, 220)}, {"left": (1, 40), "right": (3, 70)}]
+TELLING = [*OFF_AXIS, {"left": (3, 150)}, {"right": (4, 10)}]
+OPPOSITE = {"lead": "lag", "lag": "lead", "with": "against", "against": "with"}
+
+
+def shop(folder, runs, phase="lead", angles="with", noise=0.0, seed=0):
+    """Write runs and weights; the angles of `runs` are those on the shop's tape."""
+    turn, sign = (1 if angles == "with" else -1), (1 if phase == "lead" else -1)
+    rng = np.random.default_rng(seed)
+    readings = [["run", "speed_rpm", "sensor", "amplitude_um_pp", "phase_deg"]]
+    weights = [["run", "plane", "mass_g", "angle_deg"]]
+    for r, mounted in enumerate(runs):
+        T = [mounted.get(p, (0, 0)) for p in PLANES]
+        T = np.array([m * np.exp(1j * turn * np.radians(a)) for m, a in T])
+        weights += [[f"r{r}", p, float(m), float(a)] for p, (m, a) in mounted.items()]
+        for s, c in np.ndindex(2, 2):
+            y = Y0[s, c] + W[s, c] @ T
+            y *= 1 + noise * complex(*rng.normal(size=2))
+            place = f"r{r}", SPEEDS[s], SENSORS[c]
+            readings.append([*place, float(abs(y)), float(sign * np.degrees(np.angle(y)) % 360)])
+    write_csv(folder / "runs.csv", readings)
+    write_csv(folder / "weights.csv", weights)
+    return folder / "runs.csv", folder / "weights.csv"
+
+
+def on_the_tape(rows, angles):
+    """Printed weights as they stand on the rotor."""
+    turn = 1 if angles == "with" else -1
+    return np.array([row["mass"] * np.exp(1j * turn * np.radians(row["angle_deg"])) for row in rows])
+
+
+def said(phase=None, angles=None):
+    words = () if phase is None else ("--phase", phase)
+    return words if angles is None else (*words, "--angles", f"{angles} rotation")
+
+
+@pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS], ids=["0 and 180", "other angles"])
+@pytest.mark.parametrize("phase", ["lead", "lag"])
+@pytest.mark.parametrize("angles", ["with", "against"])
+def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
+    """Whatever the shop does: with nothing said, the right numbers stand in one of the two columns."""
+    files = shop(tmp_path, runs, phase, angles)
+    document = cli("balance", *files, "--json").json
+    assumed = ["phase"] if runs is ON_AXIS else ["phase", "angles"]
+    assert document["conventions"]["assumed"] == assumed
+    other = document["other_readings"]
+    assert {row["if"] for row in other} == {"lag" if runs is ON_AXIS else "lag or against"}
+    together = (phase == "lead") == (angles == "with")
+    right = document["corrections"] if together else other
+    np.testing.assert_allclose(on_the_tape(right, angles), BEST, rtol=1e-6)
+    wrong = other if together else document["corrections"]
+    assert np.abs(on_the_tape(wrong, angles) - BEST).max() > 0.1 * np.abs(BEST).max()
+    if runs is ON_AXIS:
+        for one, two in zip(document["corrections"], other, strict=True):
+            assert two["mass"] == pytest.approx(one["mass"], rel=1e-9)
+            assert (one["angle_deg"] + two["angle_deg"] + 180) % 360 == pytest.approx(180, abs=1e-6)
+
+
+def test_the_first_lines_say_so(cli, tmp_path):
+    files = shop(tmp_path, ON_AXIS)
+    text = cli("balance", *files, "--amplitude-error", 1, "--phase-error", 1).out
+    first = " ".join(text.split("\n\n")[0].split())
+    assert first.startswith("Neither the job nor the command line says whether phases lead or lag; lead is")
+    assert "The runs cannot tell: none is more than the planes need." in first
+    assert "If it is lag, the weights go to the angles under “if lag”." in first
+    head = next(line for line in text.splitlines() if line.strip().startswith("plane"))
+    assert head.split()[-2:] == ["if", "lag"]
+    document = cli("balance", *files, "--json").json
+    rows = [line for line in text.splitlines() if line.strip().startswith(PLANES)]
+    for row, line in zip(document["other_readings"], rows, strict=False):
+        assert f"{row['angle_deg']:.1f}°" in line
+    assert "phases as lead (phase assumed)" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert document["assumptions"][0] in first
+    added = text[text.index("The same rotor") :]
+    assert "if lag" in added[: added.index("Vibration")]
+
+
+@pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS])
+@pytest.mark.parametrize(("phase", "angles"), [("lead", "with"), ("lag", "against")])
+def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
+    files = shop(tmp_path, runs, phase, angles)
+    outcome = cli("balance", *files, *said(phase, None if runs is ON_AXIS else angles), "--json")
+    assert outcome.json["conventions"]["assumed"] == outcome.json["assumptions"] == []
+    assert outcome.json["other_readings"] == []
+    text = cli("balance", *files, *said(phase, angles)).out
+    assert text.startswith("Corrections")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (("lead", None), "says how angles count; with rotation is assumed"),
+        ((None, "against"), "says whether phases lead or lag; lead is assumed"),
+        ((None, None), "says whether phases lead or lag and how angles count; lead and with rotation are"),
+    ],
+)
+def test_each_word_that_is_missing_is_named(cli, tmp_path, given, words):
+    """The other reading is what the command prints with the other word."""
+    files = shop(tmp_path, OFF_AXIS)
+    document = cli("balance", *files, *said(*given), "--json").json
+    assert words in document["assumptions"][0]
+    phase, angles = given
+    turned = ("lag", angles) if phase is None else (phase, "against")
+    expected = cli("balance", *files, *said(*turned), "--json").json["corrections"]
+    for row, other in zip(expected, document["other_readings"], strict=True):
+        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
+    table = tmp_path / "weights_out.csv"
+    assert cli("balance", *files, *said(*given), "--output", table).code == 0
+    assert "angle_deg_if_" in table.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("errors", [(), ("--amplitude-error", 2, "--phase-error", 1.15)])
+def test_redundant_runs_contradict_a_wrong_word(cli, tmp_path, seed, errors):
+    """Stated or assumed, phase or angles: the first warning names it, with both χ²."""
+    files = shop(tmp_path, TELLING, "lag", "with", noise=0.02, seed=seed)
+    for given, own, other in (
+        ((None, "with"), "lead", "lag"),
+        (("lead", "with"), "lead", "lag"),
+        (("lag", "against"), "lag", "lead"),
+        (("lead", None), "with rotation", "against rotation"),
+    ):
+        outcome = cli("balance", *files, *said(*given), *errors, "--json")
+        if outcome.code == 2:  # the wrong word may make a trial weight seem without effect: told all the same
+            assert f"these runs contradict '{own}'" in outcome.err
+            continue
+        test = outcome.json["convention_test"]
+        assert test["verdict"] == "contradicted"
+        assert test["chi_square"] > 10 * test["chi_square_other"]
+        assert outcome.json["warnings"][0].startswith(
+            f"these runs contradict '{own}': χ² {test['chi_square']:.3g} of {test['degrees_of_freedom']}; "
+            f"'{other}' fits: {test['chi_square_other']:.3g}"
+        )
+        text = cli("balance", *files, *said(*given), *errors).out
+        assert text.startswith(f"Warning: these runs contradict '{own}'")
+        if given[0] is None:
+            assert "The runs contradict it" in " ".join(text.split())
+            right = on_the_tape(outcome.json["other_readings"], "with")
+            np.testing.assert_allclose(right, BEST, atol=0.1 * np.abs(BEST).max())
+
+
+def test_angles_that_the_runs_contradict_are_named(cli, tmp_path):
+    files = shop(tmp_path, TELLING, "lead", "against", noise=0.02)
+    outcome = cli("balance", *files, "--phase", "lead", "--json")
+    words = outcome.json["warnings"][0] if outcome.code == 0 else outcome.err
+    assert "these runs contradict 'with rotation'" in words
+    assert "'against rotation' fits" in words
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("phase", "given"), [("lead", (None, "with")), ("lag", ("lag", None))])
+def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
+    """No other angles, then; and nothing at all where everything is stated."""
+    files = shop(tmp_path, TELLING, phase, "with", noise=0.02, seed=seed)
+    document = cli("balance", *files, *said(*given), "--json").json
+    assert document["convention_test"]["verdict"] == "confirmed"
+    assert document["other_readings"] == []
+    name = "lead" if given[0] is None else "with rotation"
+    assert document["assumptions"][1].startswith(f"The runs themselves confirm '{name}': χ² ")
+    assert not any("contradict" in words for words in document["warnings"])
+    text = cli("balance", *files, *said(phase, "with")).out
+    assert text.startswith("Corrections")
+
+
+def test_both_assumed_and_confirmed_needs_no_other_angles(cli, tmp_path):
+    """Lag on a tape against the rotation: the numbers are right, and the runs say that they go together."""
+    files = shop(tmp_path, TELLING, "lag", "against", noise=0.02)
+    document = cli("balance", *files, "--json").json
+    assert document["other_readings"] == []
+    assert "confirm 'lead' for angles with rotation" in document["assumptions"][1]
+    np.testing.assert_allclose(
+        on_the_tape(document["corrections"], "against"), BEST, atol=0.1 * np.abs(BEST).max()
+    )
+
+
+def test_weights_in_line_cannot_tell(cli, tmp_path):
+    files = shop(tmp_path, [*ON_AXIS, {"left": (2, 180)}], noise=0.02)
+    document = cli("balance", *files, "--json").json
+    assert document["convention_test"]["verdict"] == "weights in line"
+    assert "stand on one line through the shaft" in document["assumptions"][1]
+    line = [*OFF_AXIS, {"left": (2, 220), "right": (3, 70)}]
+    document = cli("balance", *shop(tmp_path, line, noise=0.02), "--angles", "with rotation", "--json").json
+    assert document["convention_test"]["verdict"] == "weights in line"
+    for p, at in enumerate((40, 250)):  # mirrored about the line of the plane
+        one, two = document["corrections"][p], document["other_readings"][p]
+        turned = (one["angle_deg"] + two["angle_deg"] - 2 * at + 180) % 360
+        assert turned == pytest.approx(180, abs=1e-6)
+
+
+@pytest.mark.parametrize("assumed", [True, False])
+def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
+    """Weights mounted as proposed, in the wrong place: the check run says why."""
+    shop(tmp_path, ON_AXIS, "lag", noise=0.01)
+    text = 'runs = "runs.csv"\nweights = "weights.csv"\n' + ("" if assumed else 'phase = "lead"\n')
+    job = tmp_path / "job.toml"
+    job.write_text(text, encoding="utf-8")
+    proposed = cli("balance", job, "--json").json["corrections"]
+    mounted = {row["plane"]: (row["mass"], row["angle_deg"]) for row in proposed}
+    (tmp_path / "later").mkdir()
+    checked, _ = shop(tmp_path / "later", [mounted], "lag", noise=0.01, seed=9)
+    checked.rename(tmp_path / "check.csv")
+    job.write_text(text + 'check = "check.csv"\n', encoding="utf-8")
+    document = cli("balance", job, "--json").json
+    assert document["convention_test"]["verdict"] == "contradicted"
+    assert document["warnings"][0].startswith("these runs contradict 'lead'")
+
+
+def test_stored_coefficients(cli, tmp_path):
+    """A table that states its phase keeps it; the readings of the day are what may be otherwise."""
+    files = shop(tmp_path, OFF_AXIS, "lag")
+    stored = tmp_path / "stored.csv"
+    assert cli("balance", *files, *said("lag", "with"), "--save-influence", stored).code == 0
+    assert "assumed" not in stored.read_text(encoding="utf-8")
+    document = cli("balance", files[0], "--influence", stored, "--json")
+    assert document.code == 2  # three runs that differ, and no weights
+    day, _ = shop(tmp_path, [{}], "lag")
+    document = cli("balance", day, "--influence", stored, "--json").json
+    assert document["conventions"]["assumed"] == ["phase"]
+    assert document["conventions"]["phase"] == "lag"
+    np.testing.assert_allclose(on_the_tape(document["corrections"], "with"), BEST, rtol=1e-6)
+    expected = cli("balance", day, "--influence", stored, "--phase", "lead", "--json").json["corrections"]
+    for row, other in zip(expected, document["other_readings"], strict=True):
+        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
+    assert cli("balance", *shop(tmp_path, OFF_AXIS), "--save-influence", stored).code == 0
+    assert "# assumed, stated nowhere: phase and angles" in stored.read_text(encoding="utf-8")
+    assert cli("balance", shop(tmp_path, [{}])[0], "--influence", stored).code == 0
+
+
+def test_pieces_the_sheet_and_the_workbook_say_so(cli, tmp_path):
+    shop(tmp_path, ON_AXIS)
+    job, page, book = tmp_path / "job.toml", tmp_path / "sheet.html", tmp_path / "sheet.xlsx"
+    planes = "".join(f"[planes.{p}]\nholes = 8\navailable_g = [1, 2]\n" for p in PLANES)
+    job.write_text('runs = "runs.csv"\nweights = "weights.csv"\n' + planes, encoding="utf-8")
+    outcome = cli("balance", job, "--split", "--report", page, "--output", book)
+    assert "For phase and angles as assumed: if that is otherwise, state it" in " ".join(outcome.out.split())
+    text = page.read_text(encoding="utf-8")
+    assert text.index("Neither the job nor the command line says") < text.index("What the angles mean")
+    assert "<strong>If lag or against:</strong>" in text
+    assert text.count("Assumed: neither the job nor the command line says so.") == 2
+    sheets = openpyxl.load_workbook(book)
+    said = [str(row[0]) for row in sheets["results"].iter_rows(values_only=True)]
+    assert any(line.startswith("# Neither the job nor the command line says") for line in said)
+    assert sheets["results other readings"].max_row == 4
+    assert cli("balance", book, "--json").json["conventions"]["assumed"] == ["phase", "angles"]
+
+
+def test_the_form_asks(cli, tmp_path):
+    """A form in which nobody has chosen is refused, with the words to choose from."""
+    form = tmp_path / "job.xlsx"
+    assert cli("balance", "--template", form).code == 0
+    book = openpyxl.load_workbook(form)
+    for name in ("runs", "weights"):
+        lines = [line.split(",") for line in shop(tmp_path, OFF_AXIS)[name == "weights"].read_text().split()]
+        for number, line in enumerate(lines, start=1):
+            for place, cell in enumerate(line, start=1):
+                number_cell = number > 1 and lines[0][place - 1] not in ("run", "sensor", "plane")
+                book[name].cell(number, place).value = float(cell) if number_cell else cell
+    book.save(form)
+    outcome = cli("balance", form)
+    assert outcome.code == 2
+    assert "found 'lead or lag?', expected 'lead' or 'lag'" in outcome.err
+    assert "found 'which way?', expected 'with rotation', 'against rotation'" in outcome.err
+    keys = [cell.value for cell in book["settings"]["A"]]
+    for key, value in (("phase", "lead"), ("angles", "with rotation")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
+    book.save(form)
+    assert cli("balance", form, "--json").json["conventions"]["assumed"] == []
+    job = tmp_path / "job.toml"
+    job.write_text('runs = "runs.csv"\nweights = "weights.csv"\nphase = ""\n', encoding="utf-8")
+    assert "key phase: found nothing (a blank), expected 'lead' or 'lag'" in cli("balance", job).err
+
+
+def test_a_refusal_names_the_contradiction(cli, tmp_path):
+    """Four weights a quarter turn apart, read the wrong way, seem to do nothing at all."""
+    around = [{plane: (3, angle)} for plane in PLANES for angle in (0, 90, 180, 270)]
+    files = shop(tmp_path, [{}, *around], "lag", noise=0.02)
+    outcome = cli("balance", *files)
+    assert outcome.code == 2
+    assert "its effect is not determined" in outcome.err
+    assert "these runs contradict 'lead'" in outcome.err
+    assert cli("balance", *files, "--phase", "lag").code == 0
+
+
+def test_computed_coefficients(cli, tmp_path):
+    """They know where lead is: the other reading is no mirror image, and what the command says with lag."""
+    folder = sample_data() / "model_job"
+    for name in ("runs.csv", "rotor.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    text = (folder / "job.toml").read_text(encoding="utf-8")
+    words = 'phase = "lead"\nangles = "with rotation"\n'
+    assert words in text
+    (tmp_path / "job.toml").write_text(text.replace(words, ""), encoding="utf-8")
+    document = cli("balance", tmp_path / "job.toml", "--json").json
+    assert document["conventions"]["assumed"] == ["phase"]
+    expected = cli("balance", tmp_path / "job.toml", "--phase", "lag", "--json").json["corrections"]
+    for row, other in zip(expected, document["other_readings"], strict=True):
+        assert (other["mass"], other["angle_deg"]) == pytest.approx((row["mass"], row["angle_deg"]))
+    trial = cli("trial-weight", tmp_path / "job.toml", "--plane", "middle").out
+    assert "lead is assumed" in " ".join(trial.split())
+
+
+def test_sample_jobs_state_their_conventions(cli):
+    for job in sorted(sample_data().glob("*/*.toml")):
+        if job.stem in ("job", "holes", "checked"):
+            assert cli("balance", job, "--json").json["assumptions"] == [], job
