@@ -46,7 +46,7 @@ SHARES = (0.04, 0.3, 0.6, 1.0)
 EXPLAINED = 0.95
 """Level of the test by which the corrected reading takes part."""
 FINE = 20
-_LIKELY, _UNLIKELY = 1e-5, 1e-3
+_LIKELY, _UNLIKELY, _POSSIBLE = 1e-5, 1e-3, 0.05
 _DIFFUSE = 1e6
 
 
@@ -173,7 +173,7 @@ class Rows(NamedTuple):
     @property
     def dof(self) -> int:
         """Complex numbers that the rows tell of errors."""
-        return self.e.size - self.free.shape[-1]
+        return int(self.e.size - self.free.shape[-1])
 
 
 def spare_rows(A: ComplexArray, Y: ComplexArray, known: FloatArray) -> Rows:
@@ -268,7 +268,7 @@ def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
 
 
 def _grid(whole: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> FloatArray:
-    """Variances of errors of size 1 at all sizes with all mixtures and shares, (G, 3, 3) as `RunErrors.sizes`."""
+    """Squares of `RunErrors.sizes` with all sizes, mixtures and shares, (G, 3, 3)."""
     _, S, C = runs.Y.shape
     shares = [(1.0, 0.0, 0.0)]
     if S * C > 1:
@@ -279,7 +279,8 @@ def _grid(whole: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> Flo
         ]
     used = mixtures[(mixtures[:, 1] == 0) | bool(runs.mean[1] > 0)]
     each = used / np.where(runs.mean > 0, runs.mean, 1.0) * runs.mean[0]
-    return np.einsum("g,mb,hk->gmhbk", whole**2, each, np.array(shares)).reshape(-1, 3, 3)
+    points = np.einsum("g,mb,hk->gmhbk", whole**2, each, np.array(shares))
+    return np.asarray(points.reshape(-1, 3, 3))
 
 
 def likelihood(rows: Rows, runs: Runs, at: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -318,7 +319,9 @@ def _gaussian(
     free = 0.0 if not P else np.mean(np.abs(rows.e[-1]) ** 2) / np.mean(np.abs(rows.free) ** 2)
 
     def scales(common: FloatArray, unknown: float) -> FloatArray:
-        return np.sqrt(2 * np.concatenate((common**2, np.full((len(common), P), unknown)), axis=1))
+        return np.asarray(
+            np.sqrt(2 * np.concatenate((common**2, np.full((len(common), P), unknown)), axis=1))
+        )
 
     if S > 1:
         gram, h, less, more = _reduced(gram, h, scales(by_speed, 0.0)[:, None, None])
@@ -384,12 +387,10 @@ def scatter(
 
     Whatever is common: shares count by how well they fit at the best size.
     """
-    from scipy.special import chdtrc
-
     n = sum(each.dof for each in rows)
     log, q = _likelihood(rows, runs, _known(runs, relative, floor))
     weight = _normal(-log - n * np.log(np.maximum(q, 1e-300)))
-    return float(np.sqrt(weight @ q / n)), float(weight @ chdtrc(2 * n, 2 * q))
+    return float(np.sqrt(weight @ q / n)), _chance(q, n, weight)
 
 
 def seen_in(
@@ -409,12 +410,10 @@ def seen_in(
     residual, W
         Y₀ + W D, (S, C), and coefficients, (S, C, P).
     own, between
-        Its variance in one direction without common errors, (S, C), and the share of errors between runs in it.
+        Its variance in one direction without common errors, (S, C); share of errors between runs in it.
     common
         Columns of the residual in common, as `Influence.common`: (2, M, S, C).
     """
-    from scipy.special import chdtrc
-
     rows = Rows(residual[None], np.ones((1, 1)), own[None], W)
     if rows.dof <= 0:
         return 1.0, run
@@ -430,9 +429,7 @@ def seen_in(
     both = np.concatenate((columns[0], columns[1]))[None]
     log, q = _gaussian(rows, factor[:, None, None, None] * own[None, None], both, by_speed, by_run)
     known = np.log(np.maximum(run.probability, 1e-300))
-    return float(run.probability @ chdtrc(2 * rows.dof, 2 * q)), replace(
-        run, probability=_normal(known - log - q)
-    )
+    return _chance(q, rows.dof, run.probability), replace(run, probability=_normal(known - log - q))
 
 
 def _agreeing(rows: Sequence[Rows], runs: Runs, at: FloatArray, probability: FloatArray) -> Sequence[Rows]:
@@ -440,12 +437,10 @@ def _agreeing(rows: Sequence[Rows], runs: Runs, at: FloatArray, probability: Flo
 
     Unbalance outside the planes leaves such a rest; it says nothing of the errors.
     """
-    from scipy.special import chdtrc
-
     kept = [each for each in rows if not each.free.shape[-1]]
     for each in (each for each in rows if each.free.shape[-1]):
         q = likelihood(each, runs, at)[1]
-        if probability @ chdtrc(2 * each.dof, 2 * q) > 1 - EXPLAINED:
+        if _chance(q, each.dof, probability) > 1 - EXPLAINED:
             kept.append(each)
     return kept
 
@@ -470,6 +465,13 @@ def _likelihood(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> tuple[Float
 def _posterior(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> FloatArray:
     log, q = _likelihood(rows, runs, at)
     return _normal(-log - q)
+
+
+def _chance(q: FloatArray, n: int, probability: FloatArray) -> float:
+    """Probability that errors leave more than q, at the best of the points of a grid that are likely."""
+    from scipy.special import chdtrc
+
+    return float(chdtrc(2 * n, 2 * q[probability > _POSSIBLE * probability.max()].min()))
 
 
 def _normal(log: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.identifiability import check_planes, check_resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import RunErrors, seen_in, shares_of
+from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.choice import coefficients_of, plane_indices, rows_of
 from balancing.correction.correction_warnings import (
     EMPTY,
@@ -28,14 +28,13 @@ from balancing.correction.correction_warnings import (
 )
 from balancing.correction.other_readings import OtherReading
 from balancing.correction.region_coverage import optimism
+from balancing.correction.stack_errors import stack_errors
 from balancing.data.conventions import Labels
-from balancing.data.errors import Source, reading_covariance, symmetric
+from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.solvers.conditioning import conditioning
-from balancing.solvers.effective_variance import UNEXPLAINED
-from balancing.solvers.error_propagation import prediction_covariance
-from balancing.solvers.methods import Fitted, Stack, fit_weights
+from balancing.solvers.methods import Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
 
@@ -334,45 +333,27 @@ def correct(  # noqa: PLR0913
             small = optimism(W, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(W, names)
-    errors, channels = start.model.errors, None
-    if start.covariance is not None and errors is not None:
-        index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
-        own, n = start.own, len(index)
-        assert own is not None
-        channels = own[used][..., index[:, None], index].reshape(-1, n, n)
-        total = start.covariance[used][..., index[:, None], index].reshape(-1, n, n)
-    common = None if start.common is None else start.common[:, :, used][..., [0, *(1 + p for p in chosen)]]
-    seen = None if channels is None else partial(_seen, influence, W, Y, channels, common)
+    errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
         Y.ravel(),
-        channels,
+        None if errors is None else errors.channels,
         rows_of(row_weights, influence.W.shape[:2], used),
         kept if kept is not None and kept.any else None,
         names,
         reading_names(influence.sensors, influence.speeds[used]),
         partial(amplitude_words, start.labels),
         partial(weight_words, start.labels),
-        common,
-        None if seen is None else lambda D: seen(D)[0] > 1 - UNEXPLAINED,
+        None if errors is None else errors.common,
+        None if errors is None else errors.explain,
     )
     fitted = fit_weights(stack, method, strength=strength, keep=keep)
     D = fitted.weights
     if stack.limits is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
-    after_covariance, covariance, dof, run = None, fitted.covariance, start.model.dof, influence.run_errors
-    if covariance is not None and fitted.parts:
-        if baseline is not None and seen is not None and fitted.explained:
-            run = seen(D)[1]
-        scale, dof = run.degrees(_shares(influence, fitted), len(covariance), start.model.dof)
-        covariance = covariance * scale
-    if channels is not None and errors is not None:
-        single = reading_covariance(after, errors) + run.variance(after, after - Y)[..., None, None] * np.eye(
-            2
-        )
-        after_covariance = single + prediction_covariance(D, total).reshape(single.shape)
+    covariance, dof = (None, None) if errors is None else errors.weights(fitted)
     result = Correction(
         speeds=influence.speeds[used],
         sensors=influence.sensors,
@@ -381,11 +362,11 @@ def correct(  # noqa: PLR0913
         before=Y,
         after=after,
         covariance=covariance,
-        after_covariance=after_covariance,
+        after_covariance=None if errors is None else errors.check_run(D, after),
         dof=dof,
-        errors=errors,
+        errors=start.model.errors,
         error_source=start.model.source,
-        run_errors=run,
+        run_errors=influence.run_errors,
         condition_number=planes_told.condition_number,
         rank=planes_told.rank,
         method=method if not soft else "ridge" if strength is not None else "truncated",
@@ -406,28 +387,6 @@ def correct(  # noqa: PLR0913
     warnings += cautions(result, W, alike=not unclear)
     warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
     return _with_words(result, warnings, influence.notes + notes(result))
-
-
-def _seen(
-    influence: Influence,
-    W: ComplexArray,
-    Y: ComplexArray,
-    channels: FloatArray,
-    common: ComplexArray | None,
-    D: ComplexArray,
-) -> tuple[float, RunErrors]:
-    """What weights leave: the probability that errors leave more, and the errors between runs after it."""
-    own = np.trace(prediction_covariance(D, channels), axis1=1, axis2=2).reshape(Y.shape) / 2
-    shared = None if common is None else common @ np.concatenate(([1.0], D))
-    residual, free = Y + (W @ D).reshape(Y.shape), W.reshape(*Y.shape, -1)
-    return seen_in(influence.run_errors, residual, own, influence.own_between, shared, free)
-
-
-def _shares(influence: Influence, fitted: Fitted) -> FloatArray:
-    """Of the readings' own errors and the three kinds between runs in the covariance of the weights."""
-    own, speed, run = shares_of(fitted.parts, symmetric(sum(fitted.parts[1:], fitted.parts[0])))
-    between = influence.own_between
-    return np.array([own * (1 - between), own * between, speed, run])
 
 
 def region_radius(dof: float | None) -> float:

@@ -23,8 +23,6 @@ from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
 from balancing.correction.choice import plane_indices
 from balancing.correction.correct import Correction
-
-POOR = 1e-3  # TODO
 from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
@@ -42,6 +40,8 @@ if TYPE_CHECKING:
 
 
 _GRAM_MM = 1e6
+POOR = 1e-3
+"""Probability of χ² below which unbalance in the planes does not explain the readings."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,110 @@
+"""Errors of the readings that a correction is made of: how they go on into its weights and a check run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from balancing.coefficients.baseline import Start
+from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_errors import RunErrors, seen_in, shares_of
+from balancing.data.errors import reading_covariance, symmetric
+from balancing.solvers.effective_variance import UNEXPLAINED
+from balancing.solvers.error_propagation import prediction_covariance
+from balancing.solvers.methods import Fitted
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class StackErrors:
+    """Errors of the chosen readings and coefficients.
+
+    Attributes
+    ----------
+    W, Y
+        Coefficients (S, C, P) and vibration of the bare rotor (S, C).
+    channels, total
+        Covariance of (Re Y, Im Y, Re W₁, …) of each reading, without and with what readings have in common,
+        (N, 2P + 2, 2P + 2).
+    common
+        As `Influence.common`, (2, M, S, C, P + 1).
+    start
+        Errors of a further reading.
+    run
+        Errors between runs.
+    between
+        `Influence.own_between`.
+    fresh
+        Whether the vibration is that of new runs, which have not yet told of the errors.
+    """
+
+    W: ComplexArray
+    Y: ComplexArray
+    channels: FloatArray
+    total: FloatArray
+    common: ComplexArray | None
+    start: Start
+    run: RunErrors
+    between: float
+    fresh: bool
+
+    def explain(self, D: ComplexArray) -> bool:
+        """Whether errors alone may leave what the weights leave (95 %)."""
+        return self._after(D)[0] > 1 - UNEXPLAINED
+
+    def weights(self, fitted: Fitted) -> tuple[FloatArray | None, float | None]:
+        """Covariance of the weights, (2P, 2P), and its degrees of freedom."""
+        if fitted.covariance is None or not fitted.parts:
+            return fitted.covariance, self.start.model.dof
+        run = self._after(fitted.weights)[1] if self.fresh and fitted.explained else self.run
+        own, speed, whole = shares_of(fitted.parts, symmetric(sum(fitted.parts[1:], fitted.parts[0])))
+        shares = np.array([own * (1 - self.between), own * self.between, speed, whole])
+        scale, dof = run.degrees(shares, len(fitted.covariance), self.start.model.dof)
+        return fitted.covariance * scale, dof
+
+    def check_run(self, D: ComplexArray, after: ComplexArray) -> FloatArray:
+        """Covariance of readings with the weights mounted around their prediction, (S, C, 2, 2)."""
+        errors = self.start.model.errors
+        assert errors is not None
+        between = self.run.variance(after, after - self.Y)[..., None, None] * np.eye(2)
+        predicted = prediction_covariance(D, self.total).reshape(between.shape)
+        return np.asarray(reading_covariance(after, errors) + between + predicted)
+
+    def _after(self, D: ComplexArray) -> tuple[float, RunErrors]:
+        own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2).reshape(self.Y.shape) / 2
+        shared = None if self.common is None else self.common @ np.concatenate(([1.0], D))
+        return seen_in(self.run, self.Y + self.W @ D, own, self.between, shared, self.W)
+
+
+def stack_errors(
+    influence: Influence, start: Start, used: list[int], chosen: list[int], *, fresh: bool
+) -> StackErrors | None:
+    """Of these speeds and planes; None where the errors are unknown.
+
+    Parameters
+    ----------
+    influence, start
+        Coefficients and the vibration to correct.
+    used, chosen
+        Indices of speeds and planes.
+    fresh
+        Whether the vibration is that of new runs.
+    """
+    own = start.own
+    if start.covariance is None or own is None or start.model.errors is None:
+        return None
+    index: IntArray = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
+    n = len(index)
+    common = None if start.common is None else start.common[:, :, used][..., [0, *(1 + p for p in chosen)]]
+    return StackErrors(
+        influence.W[used][..., chosen],
+        start.readings[used],
+        own[used][..., index[:, None], index].reshape(-1, n, n),
+        start.covariance[used][..., index[:, None], index].reshape(-1, n, n),
+        common,
+        start,
+        influence.run_errors,
+        influence.own_between,
+        fresh,
+    )
