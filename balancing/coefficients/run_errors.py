@@ -65,6 +65,8 @@ class RunErrors:
         95 % interval of the whole, root mean square over the readings, in their unit; None: not estimated.
     probability, ratios
         Points of the grid, (G,), and the variance of each kind there, in units of that above, (G, 3).
+    kinds
+        Variance of each kind, mean over the readings, in their unit squared, (3,).
     merged
         Whether the kind own stands among the errors of the readings: runs read once do not tell them apart.
     """
@@ -75,6 +77,12 @@ class RunErrors:
     probability: FloatArray = field(default_factory=lambda: np.ones(1))
     ratios: FloatArray = field(default_factory=lambda: np.ones((1, 3)))
     merged: bool = False
+    kinds: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def common(self) -> float:
+        """Share of the variance that readings have in common."""
+        return float(self.kinds[1:].sum() / self.kinds.sum()) if self.kinds.any() else 0.0
 
     def variance(self, readings: ComplexArray, effect: ComplexArray) -> FloatArray:
         """Of each reading in a run whose weights do `effect`, in one direction, all kinds together."""
@@ -498,4 +506,5 @@ def _of_grid(
         interval,
         probability[kept] / probability[kept].sum(),
         (total / np.where(base > 0, base, 1.0))[kept],
+        kinds=base,
     )

@@ -36,6 +36,7 @@ _SOURCES = {
     "repeats": "from repeated readings",
     "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
     "residuals": "from the disagreement of the runs",
+    "assumed": "assumed: nothing states or measures them",
 }
 
 
@@ -102,6 +103,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         "other_readings": [row for other in c.others for row in _other_rows(c, other)],
         "assumptions": list(assumptions(c.labels, c.convention_test, c.others)),
         "warnings": list(c.warnings),
+        "notes": list(c.notes),
     }
 
 
@@ -116,6 +118,7 @@ def summary(c: Correction) -> str:
         _add(c),
         _vibration(c),
         _quality(c),
+        *(wrap(f"Note: {w}.", "  ") for w in c.notes),
     ]
     return "\n\n".join(b for b in blocks if b)
 
@@ -238,12 +241,27 @@ def _quality(c: Correction) -> str:
             else "No intervals: the errors of the readings are not known."
         )
     else:
-        dof = "" if c.dof is None else f", {c.dof} degrees of freedom"
         lines.append(
             f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
-            f"({_SOURCES[c.error_source]}{dof})."
+            f"({_SOURCES[c.error_source]}){_between_runs(c)}."
         )
+        if c.dof is not None:
+            lines[-1] += f" Degrees of freedom: {c.dof:.3g}."
     return "\n".join(wrap(line, "") for line in lines)
+
+
+def _between_runs(c: Correction) -> str:
+    """What changes from run to run, in words."""
+    run, scale = c.run_errors, c.labels.vibration_scale
+    p, w, f = np.sqrt(np.sum(run.sizes**2, axis=1))
+    if run.origin == "none" or not (p or w or f):
+        return ""
+    small = 5e-4
+    parts = [f"{100 * p:.2g} % of it"] * (p > small)
+    parts += [f"{100 * w:.2g} % of what the weights do"] * (w > small)
+    parts += [f"{figures(f * scale, 2)} {c.labels.vibration_unit}".rstrip()] * (f > 0)
+    common = f", {100 * run.common:.0f} % of the variance common to the sensors" if run.common > 0.1 else ""
+    return f"; from run to run: {', '.join(parts)} ({run.origin}{common})"
 
 
 def _mounted(c: Correction) -> dict[str, Any]:
@@ -265,13 +283,25 @@ def _weights(labels: Labels, planes: tuple[str, ...], weights: ComplexArray) -> 
 
 
 def _errors(c: Correction) -> dict[str, Any]:
-    e = c.errors
+    e, run = c.errors, c.run_errors
+    p, w, f = (float(size) for size in np.sqrt(np.sum(run.sizes**2, axis=1)))
     return {
         "source": c.error_source,
         "amplitude_percent": None if e is None else 100 * e.amplitude,
         "phase_deg": None if e is None else float(np.degrees(e.phase)),
         "floor": None if e is None else e.floor * c.labels.vibration_scale,
         "degrees_of_freedom": c.dof,
+        "between_runs": {
+            "source": run.origin,
+            "percent": 100 * p,
+            "percent_of_effect": 100 * w,
+            "floor": f * c.labels.vibration_scale,
+            "rms": float(np.sqrt(run.kinds.sum())) * c.labels.vibration_scale,
+            "common_share": run.common,
+            "interval95": None
+            if run.interval is None
+            else [each * c.labels.vibration_scale for each in run.interval],
+        },
     }
 
 

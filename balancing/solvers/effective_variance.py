@@ -144,10 +144,10 @@ def effective_variance(
 
     Unbalance outside the planes leaves residuals that no error of the readings explains. Large weights
     would excuse them by the errors of W: weights of the plain fit are up to a third too large. Where
-    chi_square is beyond what errors explain (95 %), every reading of Y therefore gets a further error, alike
-    for all, such that χ² equals its degrees of freedom. The fit is close to least squares then, and as good. If
-    the cause is errors of the trial runs that are larger than stated, the covariance is too small: times
-    `inflation`² it holds the truth for either cause.
+    chi_square is beyond what errors explain (95 %), every reading of Y therefore gets a further error,
+    alike for all, such that χ² equals its degrees of freedom. The fit is close to least squares then, and
+    as good. If the cause is errors of the trial runs that are larger than stated, the covariance is too
+    small: times `inflation`² it holds the truth for either cause.
     """
     w, y, C, weight = _checked(W, Y, channels, row_weights)
     used = weight > 0

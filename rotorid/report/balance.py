@@ -35,6 +35,7 @@ _SOURCES = {
     "repeats": "from repeated readings",
     "stated, enlarged by repeats": "as stated, enlarged because repeated readings scatter more",
     "residuals": "from the disagreement of the runs",
+    "assumed": "assumed: nobody states them, and nothing measures them",
     "unknown": "not known",
 }
 

@@ -38,6 +38,7 @@ class Overrides(TypedDict):
     angles: str | None
     amplitude_error_percent: float | None
     phase_error_deg: float | None
+    run_error_percent: float | None
 
 
 def balance(  # noqa: PLR0915
@@ -50,8 +51,14 @@ def balance(  # noqa: PLR0915
         ),
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="METHOD", help=f"{', '.join(METHODS)} (the smallest largest amplitude).")
-    ] = METHODS[0],
+        str | None,
+        typer.Option(
+            metavar="METHOD",
+            help="weighted (by the errors of the readings; the default), least-squares, or minmax (the "
+            "smallest largest amplitude).",
+            show_default=False,
+        ),
+    ] = None,
     influence: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Stored influence coefficients.", show_default=False)
     ] = None,
@@ -80,6 +87,14 @@ def balance(  # noqa: PLR0915
     phase_error: Annotated[
         float | None,
         typer.Option(metavar="DEGREES", help="Standard deviation of a reading's phase.", min=0.0),
+    ] = None,
+    run_error: Annotated[
+        float | None,
+        typer.Option(
+            metavar="PERCENT",
+            help="Standard deviation of what changes from run to run, percent of a reading.",
+            min=0.0,
+        ),
     ] = None,
     phase: Annotated[
         str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
@@ -248,6 +263,7 @@ def balance(  # noqa: PLR0915
         "angles": angles,
         "amplitude_error_percent": amplitude_error,
         "phase_error_deg": phase_error,
+        "run_error_percent": run_error,
     }
     is_job = len(files) == 1 and influence is None and files[0].suffix.lower() in (".toml", ".xlsx")
 
@@ -346,9 +362,11 @@ def balance(  # noqa: PLR0915
     )
 
 
-def _check_options(method: str, coefficients: str | None, ridge: str | None, truncate: float | None) -> None:
+def _check_options(
+    method: str | None, coefficients: str | None, ridge: str | None, truncate: float | None
+) -> None:
     for option, value, known in (
-        ("--method", method, METHODS),
+        ("--method", method, (*METHODS, None)),
         ("--coefficients", coefficients, (*COEFFICIENTS, None)),
     ):
         if value not in known:

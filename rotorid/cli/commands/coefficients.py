@@ -82,7 +82,7 @@ def compare_planes(
     planes: Sequence[str],
     speeds: Sequence[float] | None,
     k: int,
-    method: str,
+    method: str | None,
     row_weights: FloatArray | None,
 ) -> Subsets:
     """Compare all choices of k of these planes, without limits."""

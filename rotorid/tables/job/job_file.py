@@ -37,6 +37,7 @@ def read_job(
     angles: str | None = None,
     amplitude_error_percent: float | None = None,
     phase_error_deg: float | None = None,
+    run_error_percent: float | None = None,
 ) -> Job:
     """Read a job file (`.toml`) or a workbook (`.xlsx`, sheets runs, weights, planes, sensors, settings).
 
@@ -44,7 +45,7 @@ def read_job(
     ----------
     path
         The job; files that it names are found relative to it.
-    phase, angles, amplitude_error_percent, phase_error_deg
+    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         Replace what the job says.
 
     Returns
@@ -61,7 +62,7 @@ def read_job(
     """
     path = Path(path)
     problems = Problems()
-    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
+    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent)
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         problems.stop()
@@ -134,6 +135,7 @@ def job_from_files(
     angles: str | None = None,
     amplitude_error_percent: float | None = None,
     phase_error_deg: float | None = None,
+    run_error_percent: float | None = None,
 ) -> Job:
     """A job without a job file: a runs table with a weights table, or with stored coefficients.
 
@@ -143,7 +145,7 @@ def job_from_files(
         Runs and weights; with `influence` the weights (mounted during the runs) may be left out.
     influence
         Influence table.
-    phase, angles, amplitude_error_percent, phase_error_deg
+    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         Conventions and stated errors; default: lead and with rotation, which the labels then call assumed;
         none stated.
 
@@ -166,7 +168,7 @@ def job_from_files(
         )
     problems = Problems()
     paths = [Path(file) for file in files]
-    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg)
+    overrides = Overrides(phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent)
     settings = overrides.settings()
     stored = None if influence is None else Path(influence)
     job = _assemble(None, paths[0], paths[1] if len(paths) == 2 else None, stored, settings, problems)

@@ -14,6 +14,7 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.runs.conventions import (
     DEFAULT_TOLERANCE,
+    ERROR_KEYS,
     LARGEST_TOLERANCE,
     PHASES,
     Conventions,
@@ -53,6 +54,7 @@ class Overrides:
     angles: str | None
     amplitude_error_percent: float | None
     phase_error_deg: float | None
+    run_error_percent: float | None = None
 
     def __post_init__(self) -> None:
         Conventions(as_phase(self.phase or "lead"))
@@ -74,14 +76,13 @@ class Overrides:
 
     def errors(self, stated: StatedErrors | None) -> StatedErrors | None:
         """Stated errors with the replacements."""
-        if self.amplitude_error_percent is None and self.phase_error_deg is None:
-            return stated
-        result = stated or StatedErrors()
-        if self.amplitude_error_percent is not None:
-            result = replace(result, amplitude_percent=self.amplitude_error_percent)
-        if self.phase_error_deg is not None:
-            result = replace(result, phase_deg=self.phase_error_deg)
-        return result
+        said = {
+            "amplitude_percent": self.amplitude_error_percent,
+            "phase_deg": self.phase_error_deg,
+            "run_percent": self.run_error_percent,
+        }
+        given = {key: value for key, value in said.items() if value is not None}
+        return replace(stated or StatedErrors(), **given) if given else stated
 
 
 @dataclass(frozen=True)
@@ -166,12 +167,12 @@ def _errors(top: Section, problems: Problems) -> StatedErrors | None:
     if section is None:
         return None
     before = len(problems)
-    values = {key: section.number(key, low=0.0) for key in ("amplitude_percent", "phase_deg", "floor")}
+    values = {key: section.number(key, low=0.0) for key in ERROR_KEYS}
     section.finish()
     given = {key: value for key, value in values.items() if value is not None}
     if len(problems) > before:
         return None
-    if not any(given.values()):
+    if not any(value or key.startswith("run_") for key, value in given.items()):
         expected = (
             "an error above 0 (amplitude_percent, phase_deg or floor); leave [errors] out if it is unknown"
         )

@@ -34,7 +34,7 @@ class JobSource:
         A job (`.toml`, `.xlsx`), or a runs table and, perhaps, a weights table.
     influence
         Influence table, beside tables.
-    phase, angles, amplitude_error_percent, phase_error_deg
+    phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         In place of what the job says.
     max_mass, limits
         As `joblimits.with_limits` takes them.
@@ -46,13 +46,15 @@ class JobSource:
     angles: str | None = None
     amplitude_error_percent: float | None = None
     phase_error_deg: float | None = None
+    run_error_percent: float | None = None
     max_mass: str | None = None
     limits: tuple[str, ...] = ()
 
     @property
     def overrides(self) -> Overrides:
         """Conventions and errors in place of those of the job."""
-        return Overrides(self.phase, self.angles, self.amplitude_error_percent, self.phase_error_deg)
+        errors = self.amplitude_error_percent, self.phase_error_deg, self.run_error_percent
+        return Overrides(self.phase, self.angles, *errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +171,7 @@ def _override(settings: dict[str, Any], source: JobSource, job: Job) -> None:
     errors = {
         "amplitude_percent": source.amplitude_error_percent,
         "phase_deg": source.phase_error_deg,
+        "run_percent": source.run_error_percent,
     }
     given = {key: value for key, value in errors.items() if value is not None}
     if given:

@@ -163,6 +163,8 @@ _SETTINGS = (
     _Key("errors.amplitude_percent", "One standard deviation of an amplitude, percent of it.", _POSITIVE),
     _Key("errors.phase_deg", "One standard deviation of a phase, degrees.", _POSITIVE),
     _Key("errors.floor", "One standard deviation at amplitude 0, in the unit of the readings.", _POSITIVE),
+    _Key("errors.run_percent", "What changes from run to run, one standard deviation, percent.", _POSITIVE),
+    _Key("errors.run_floor", "The same at amplitude 0, in the unit of the readings.", _POSITIVE),
 )
 _TABLES = {"runs": _RUNS, "weights": _WEIGHTS, "planes": _PLANES, "sensors": _SENSORS}
 _HOW: tuple[Line, ...] = (

@@ -11,7 +11,7 @@ import numpy as np
 from balancing.data.conventions import Angles as Angles
 from balancing.data.conventions import Labels, Rotation, View, check_turning
 from balancing.data.conventions import Phase as Phase
-from balancing.data.trials import ReadingErrors
+from balancing.data.trials import ReadingErrors, RunScatter
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -25,6 +25,7 @@ STATED_ANGLES = (*ANGLES, *ROTATIONS)
 VIEWS = ("drive end", "free end")
 DEFAULT_TOLERANCE = 0.5
 LARGEST_TOLERANCE = 20.0
+ERROR_KEYS = ("amplitude_percent", "phase_deg", "floor", "run_percent", "run_floor")
 FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 
 
@@ -98,6 +99,8 @@ class StatedErrors:
         Relative to the amplitude; of the phase.
     floor
         In the amplitude's own unit, in every direction.
+    run_percent, run_floor
+        The same for what changes from run to run; None: nobody says.
 
     Raises
     ------
@@ -108,17 +111,27 @@ class StatedErrors:
     amplitude_percent: float = 0.0
     phase_deg: float = 0.0
     floor: float = 0.0
+    run_percent: float | None = None
+    run_floor: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("amplitude_percent", "phase_deg", "floor"):
-            value = getattr(self, name)
+        for name in ERROR_KEYS:
+            value = getattr(self, name) or 0.0
             if not (isfinite(value) and value >= 0):
                 raise ValueError(f"{name} of a reading must be finite and not negative, not {value!r}")
 
-    def in_si(self, labels: Labels) -> ReadingErrors:
-        """Relative, in rad, and in the unit of the readings inside."""
+    def in_si(self, labels: Labels) -> ReadingErrors | None:
+        """Of a reading: relative, in rad, and in the unit of the readings inside; None: nobody says."""
+        if not (self.amplitude_percent or self.phase_deg or self.floor):
+            return None
         floor = self.floor / labels.vibration_scale
         return ReadingErrors(self.amplitude_percent / 100.0, radians(self.phase_deg), floor)
+
+    def between_runs(self, labels: Labels) -> RunScatter | None:
+        """The same between runs."""
+        if self.run_percent is None and self.run_floor is None:
+            return None
+        return RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / labels.vibration_scale)
 
 
 @dataclass(frozen=True)

@@ -104,4 +104,5 @@ def make_trials(
         labels=labels,
         warnings=read.warnings,
         steps=read.steps,
+        run_errors=errors.between_runs(labels) if isinstance(errors, StatedErrors) else None,
     )
