@@ -67,6 +67,8 @@ class Correction:
         Of a single reading, and where they come from.
     run_errors
         What changes from run to run.
+    check_rms
+        Root mean square below which 95 of 100 check runs stay; None where errors are unknown.
     condition_number
         Of the stacked, column-scaled W.
     rank
@@ -111,6 +113,7 @@ class Correction:
     errors: ReadingErrors | None
     error_source: Source
     run_errors: RunErrors
+    check_rms: float | None
     condition_number: float
     rank: int
     method: str
@@ -367,6 +370,7 @@ def correct(  # noqa: PLR0913
         errors=start.model.errors,
         error_source=start.model.source,
         run_errors=influence.run_errors,
+        check_rms=None if errors is None or dof == 0 else errors.check_rms(D, after, dof),
         condition_number=planes_told.condition_number,
         rank=planes_told.rank,
         method=method if not soft else "ridge" if strength is not None else "truncated",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
+SMALL = 5e-4
+"""Share of a reading that is not worth a word."""
 DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 
@@ -88,6 +90,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
         ],
         "rms_before": float(np.sqrt(np.mean(old**2))),
         "rms_after": float(np.sqrt(np.mean(new**2))),
+        "rms_after_95": None if c.check_rms is None else c.check_rms * c.labels.vibration_scale,
         "max_before": float(old.max()),
         "max_after": float(new.max()),
         "condition_number": finite(c.condition_number),
@@ -205,12 +208,21 @@ def _vibration(c: Correction) -> str:
                 row.append(f"± {figures(bound[s, k], 2)}")
             rows.append(row)
     unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
-    last = [
-        f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)} → "
-        f"{small(float(np.sqrt(np.mean(new**2))), old.max())}, "
-        f"largest {figures(old.max(), 3)} → {small(new.max(), old.max())}"
-    ]
-    return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), *last])
+    last = wrap(_rms(c, old, new), "")
+    return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), last])
+
+
+def _rms(c: Correction, old: FloatArray, new: FloatArray) -> str:
+    """Before and after, and what a check run will show."""
+    before = f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)}"
+    checked = None if c.check_rms is None else figures(c.check_rms * c.labels.vibration_scale, 2)
+    if new.max() <= DUST * old.max():
+        if checked is None:
+            return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
+        return f"{before} → below {checked} in 95 of 100 check runs"
+    after = small(float(np.sqrt(np.mean(new**2))), old.max())
+    words = f"{before} → {after}, largest {figures(old.max(), 3)} → {small(new.max(), old.max())}"
+    return words if checked is None else f"{words}; rms of a check run below {checked} in 95 of 100"
 
 
 def _quality(c: Correction) -> str:
@@ -245,7 +257,7 @@ def _quality(c: Correction) -> str:
             f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
             f"({_SOURCES[c.error_source]}){_between_runs(c)}."
         )
-        if c.dof is not None:
+        if c.dof is not None and c.dof < 200:
             lines[-1] += f" Degrees of freedom: {c.dof:.3g}."
     return "\n".join(wrap(line, "") for line in lines)
 
@@ -256,10 +268,13 @@ def _between_runs(c: Correction) -> str:
     p, w, f = np.sqrt(np.sum(run.sizes**2, axis=1))
     if run.origin == "none" or not (p or w or f):
         return ""
-    small = 5e-4
-    parts = [f"{100 * p:.2g} % of it"] * (p > small)
-    parts += [f"{100 * w:.2g} % of what the weights do"] * (w > small)
-    parts += [f"{figures(f * scale, 2)} {c.labels.vibration_unit}".rstrip()] * (f > 0)
+    floor = f"{figures(f * scale, 2)} {c.labels.vibration_unit}".rstrip()
+    shown = (
+        (p > SMALL, f"{100 * p:.2g} % of it"),
+        (w > SMALL, f"{100 * w:.2g} % of what the weights do"),
+        (f > 0, floor),
+    )
+    parts = [words for large, words in shown if large]
     common = f", {100 * run.common:.0f} % of the variance common to the sensors" if run.common > 0.1 else ""
     return f"; from run to run: {', '.join(parts)} ({run.origin}{common})"
 

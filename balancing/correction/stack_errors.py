@@ -8,12 +8,20 @@ import numpy as np
 
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import RunErrors, seen_in, shares_of
+from balancing.coefficients.run_errors import (
+    RunErrors,
+    Runs,
+    influence_vector,
+    run_columns,
+    seen_in,
+    shares_of,
+)
 from balancing.data.errors import reading_covariance, symmetric
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.methods import Fitted
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.regression import stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +78,35 @@ class StackErrors:
         between = self.run.variance(after, after - self.Y)[..., None, None] * np.eye(2)
         predicted = prediction_covariance(D, self.total).reshape(between.shape)
         return np.asarray(reading_covariance(after, errors) + between + predicted)
+
+    def check_rms(self, D: ComplexArray, after: ComplexArray, dof: float | None) -> float:
+        """Root mean square below which 95 of 100 check runs stay, with the weights mounted.
+
+        Σ|a + e|² of normal errors e of covariance C (real, over all readings) has the mean |a|² + tr C and
+        the variance 2 tr C² + 4 aᵀ C a; its 95 % quantile is that of the gamma distribution of the same two.
+        """
+        from scipy.special import gammaincinv
+
+        each = self.check_run(D, after).reshape(-1, 2, 2)
+        further = run_columns(
+            self.run, Runs(after[None], (after - self.Y)[None], influence_vector(self.W))
+        ).common
+        columns = further.reshape(2, -1, *after.shape)
+        if self.common is not None:
+            columns = np.concatenate((self.common @ np.concatenate(([1.0], D)), columns), axis=1)
+        shared = columns[0].reshape(-1, after.size)
+        joint = shared.T @ shared.conj()
+        C = after.shape[1]
+        for s, part in enumerate(np.moveaxis(columns[1], 1, 0)):
+            joint[s * C : s * C + C, s * C : s * C + C] += part.T @ part.conj()
+        a = stretch(after.ravel()).reshape(-1, 2)
+        mean = float(np.sum(a**2) + np.trace(each, axis1=1, axis2=2).sum())
+        apart = joint - np.diag(np.diag(joint))
+        variance = 2 * float(np.sum(each**2)) + 4 * float(np.einsum("ni,nij,nj->", a, each, a))
+        variance += 4 * float(np.sum(np.abs(apart) ** 2))
+        variance += 4 * float((after.ravel().conj() @ apart @ after.ravel()).real)
+        shape = 1 / (variance / mean**2 + (0 if dof is None else 2 / dof))
+        return float(np.sqrt(mean * gammaincinv(shape, 0.95) / shape / after.size))
 
     def _after(self, D: ComplexArray) -> tuple[float, RunErrors]:
         own = np.trace(prediction_covariance(D, self.channels), axis1=1, axis2=2).reshape(self.Y.shape) / 2
