@@ -77,8 +77,8 @@ def test_a_trial_within_the_errors_of_the_readings():
     assert "no more than their errors explain" in words
     # without stated errors nobody knows, but the engineers' rule warns
     influence = estimate_influence(job(readings, T))
-    assert any("plane 'A' changed no reading by 30 % or 30°" in w for w in influence.warnings)
-    assert not any("plane 'B'" in w for w in influence.warnings)
+    assert any("plane 'A' changed no reading by 30 % or 30°" in w for w in influence.notes)
+    assert not any("plane 'B'" in w for w in influence.notes)
 
 
 def test_one_sensor_that_sees_the_trial_is_enough():
@@ -92,9 +92,10 @@ def test_one_sensor_that_sees_the_trial_is_enough():
 def test_a_repeated_set_of_weights_is_fine_and_averages():
     readings = [[1.0], [1.2], [3.0]]
     influence = estimate_influence(job(readings, np.array([[0], [0], [1]]) * GRAM))
-    assert influence.baseline[0, 0] == pytest.approx(1.1)
+    assert influence.baseline[0, 0] == pytest.approx(1.1, rel=0.01)
     assert influence.error_source == "residuals"
-    assert influence.dof == 2
+    # two numbers tell the size: the region is that of Student with about as many degrees of freedom
+    assert 1.5 < influence.dof < 5
 
 
 def test_runs_that_disagree_by_more_than_the_stated_errors_are_named():
@@ -154,9 +155,9 @@ def test_many_rising_readings_are_counted_not_listed():
     W = np.concatenate(([10.0], np.linspace(0.5, 1, 9)))[None, :, None]
     Y0 = np.concatenate(([-10.0], 0.1 + 0.01 * np.arange(9)))[None]
     c = correct(Influence(np.array([100.0]), tuple("abcdefghij"), ("A",), W, baseline=Y0))
-    assert len(c.warnings) == 3
-    assert "sensor 'j' at 954.93 rpm is predicted to rise from 0.18 to" in c.warnings[0]
-    assert c.warnings[-1].endswith("6 more readings rise less")
+    assert len(c.notes) == 3
+    assert "sensor 'j' at 954.93 rpm is predicted to rise from 0.18 to" in c.notes[0]
+    assert c.notes[-1].endswith("6 more readings rise less")
 
 
 def test_stored_coefficients_need_a_baseline_and_take_one():

@@ -7,8 +7,9 @@ import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, synthetic
 from repetitions import of_a_spread, repetitions
 
-from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.data.errors import error_model, reading_covariance
+from balancing import Influence, Labels, ReadingErrors, correct, estimate_influence
+from balancing.data.errors import ASSUMED, error_model, reading_covariance
+from balancing.data.trials import RunScatter
 from balancing.solvers.error_propagation import correction_jacobian, prediction_covariance
 from rotorid.regression import stretch
 from rotorid.samples import sample_data
@@ -69,7 +70,7 @@ def test_the_stated_covariance_against_simulated_jobs():
     w = np.moveaxis(draws[:, 1:] - draws[:, :1], 1, 2) / GRAM
     D = best(draws[:, 0], w)
     real = np.stack((D.real, D.imag), axis=-1).reshape(6000, 4)
-    c = correct(estimate_influence(trials))
+    c = correct(estimate_influence(trials), method="least-squares")
     np.testing.assert_allclose(real.std(axis=0), np.sqrt(np.diag(c.covariance)), rtol=0.04)
     np.testing.assert_allclose(np.cov(real.T), c.covariance, atol=0.05 * np.diag(c.covariance).max())
     np.testing.assert_allclose(np.abs(D).std(axis=0), c.mass_std, rtol=0.04)
@@ -105,7 +106,7 @@ def test_the_mean_of_repeats_has_less_variance():
     single = bruel_kjaer(errors=ERRORS)
     many = bruel_kjaer(errors=ERRORS)
     four = job(np.repeat(many.readings, 4, axis=0), many.weights, errors=ERRORS)
-    a, b = (correct(estimate_influence(t)) for t in (single, four))
+    a, b = (correct(estimate_influence(t), method="least-squares") for t in (single, four))
     np.testing.assert_allclose(b.covariance, a.covariance / 4, rtol=1e-9)
 
 
@@ -121,8 +122,10 @@ def test_repeats_give_the_errors_where_none_are_stated():
     # standard deviations of the estimates: 1/√(2·924) = 2.3 %
     assert model.errors.amplitude == pytest.approx(0.02, rel=0.08)
     assert model.errors.phase == pytest.approx(0.01, rel=0.08)
-    c = correct(estimate_influence(job(readings, exact.weights, speeds=exact.speeds)))
-    assert c.dof == model.dof
+    trials = job(readings, exact.weights, speeds=exact.speeds)
+    assert estimate_influence(trials).reading_dof == model.dof
+    c = correct(estimate_influence(replace(trials, run_errors=RunScatter(0.0))))
+    assert c.dof == pytest.approx(model.dof)
     assert c.coverage_factor == pytest.approx(1.9626, abs=1e-3)
 
 
@@ -161,15 +164,16 @@ def test_one_repeated_reading_does_not_refuse_a_job():
     readings = np.full((2, 3, 1, 2), np.nan, dtype=complex)
     readings[0] = bruel_kjaer().readings[0]
     readings[1, 0, 0, 0] = readings[0, 0, 0, 0] * 1.03 * np.exp(0.02j)
-    c = correct(estimate_influence(job(readings, bruel_kjaer().weights)))
-    assert c.dof == 1
+    trials = replace(job(readings, bruel_kjaer().weights), run_errors=RunScatter(0.0))
+    c = correct(estimate_influence(trials))
+    assert c.dof == pytest.approx(1)
     assert c.coverage_factor == pytest.approx(12.706, abs=1e-3)
 
 
 def test_equal_repeats_say_nothing_about_the_errors():
     exact = bruel_kjaer()
     model = error_model(job(np.repeat(exact.readings, 3, axis=0), exact.weights))
-    assert model.errors is None
+    assert model.source == "assumed"
     assert "equal to the last digit" in model.warnings[0]
 
 
@@ -181,19 +185,35 @@ def test_disagreeing_runs_give_the_errors_where_nothing_else_does():
     trials = job(noisy(rng, exact.readings[0], true), T, speeds=exact.speeds)
     influence = estimate_influence(trials)
     assert influence.error_source == "residuals"
-    assert influence.dof == 2 * 24 * 5
-    # 1/√(2·240) = 4.6 % for the pooled estimate
-    assert influence.errors.amplitude == pytest.approx(0.02, rel=0.099)
+    assert 100 < influence.dof < 2 * 24 * 5 * 2
     assert influence.errors.phase == influence.errors.amplitude
+    run = influence.run_errors
+    low, high = np.array(run.interval) / np.sqrt(np.mean(np.abs(trials.mean) ** 2))
+    assert 0.017 < low < 0.02 < high < 0.024
+    assert run.common < 0.3
 
 
-def test_without_any_errors_nothing_is_said_about_them():
-    c = correct(estimate_influence(bruel_kjaer()))
+def test_where_nobody_states_or_measures_errors_they_are_assumed_and_called_so():
+    influence = estimate_influence(bruel_kjaer())
+    c = correct(influence)
+    assert c.errors == ASSUMED == ReadingErrors(0.02, np.deg2rad(2.0))
+    assert c.error_source == influence.run_errors.origin == "assumed"
+    assert influence.run_errors.sizes[0] @ influence.run_errors.sizes[0] == pytest.approx(0.02**2)
+    assert "2 % of the amplitude, 2° (assumed" in c.summary().replace("\n", " ")
+    assert c.to_dict()["errors"]["between_runs"]["source"] == "assumed"
+    assert not c.warnings
+    assert "one more baseline run" in c.notes[0]
+
+
+def test_stored_coefficients_without_errors_have_none():
+    measured = estimate_influence(bruel_kjaer())
+    stored = Influence(measured.speeds, measured.sensors, measured.planes, measured.W, measured.baseline)
+    c = correct(stored)
     assert c.covariance is None
     assert c.mass_std is None
     assert c.angle_std is None
     assert c.after_covariance is None
-    assert "No intervals: no errors are stated" in c.summary()
+    assert "No intervals" in c.summary()
     d = c.to_dict()
     assert d["corrections"][0]["mass_std"] is None
     assert d["corrections"][0]["covariance"] is None
@@ -208,7 +228,7 @@ def test_the_angle_of_a_weight_within_its_own_error_is_not_determined():
     assert row["mass_std"] > row["mass"]
     assert row["angle_std_deg"] is None
     assert "angle not determined" in c.summary()
-    assert any("within its own error" in w for w in c.warnings)
+    assert any("within its own error" in w for w in c.notes)
 
 
 def test_errors_in_one_direction_only():

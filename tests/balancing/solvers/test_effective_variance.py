@@ -216,7 +216,7 @@ def test_the_covariance_against_the_scatter_of_simulated_jobs():
     for _ in range(1000):
         e = (root @ rng.standard_normal((12, 6, 1)))[..., 0]
         drawn = z + e[:, ::2] + 1j * e[:, 1::2]
-        fit = effective_variance(drawn[:, 1:], drawn[:, 0], C)
+        fit = effective_variance(drawn[:, 1:], drawn[:, 0], C, explained=lambda D: True)
         found.append(stretch(fit.weights))
         stated.append(np.diag(fit.covariance))
     np.testing.assert_allclose(np.std(found, axis=0), np.sqrt(np.mean(stated, axis=0)), rtol=0.06)
