@@ -76,9 +76,12 @@ class Correction:
     singular_values
         Of the stacked, column-scaled W, largest first.
     gap
-        Certified relative distance of the objective from its optimum; None for a closed form.
+        Certified relative distance of the objective from its optimum; None for a closed form, and for the
+        method "weighted" within limits.
     chi_square, fit_dof
-        Of the method "weighted": how well weights in these planes explain the readings.
+        Of the method "weighted": how well these weights explain the readings.
+    row_weights
+        How much each reading counts, relative to the largest, (S·C,); None: all alike.
     limits, active
         What the correction had to keep to, and the limits that bind, in words.
     remove
@@ -106,6 +109,7 @@ class Correction:
     gap: float | None = None
     chi_square: float | None = None
     fit_dof: int | None = None
+    row_weights: FloatArray | None = None
     limits: Limits | None = None
     active: tuple[str, ...] = ()
     remove: tuple[str, ...] = ()
@@ -352,6 +356,7 @@ def correct(  # noqa: PLR0913
         gap=fitted.gap,
         chi_square=fitted.chi_square,
         fit_dof=fitted.dof,
+        row_weights=stack.row_weights,
         limits=stack.limits,
         active=binding(stack, fitted),
         remove=tuple(name for name in names if name in remove),

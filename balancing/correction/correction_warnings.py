@@ -102,7 +102,7 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
             for p, s, nothing in zip(result.planes, std, empty, strict=True)
             if np.isnan(s) and not nothing
         ]
-    if result.chi_square is not None and result.fit_dof and _chance(result) < POOR:
+    if result.chi_square is not None and result.fit_dof and not result.active and _chance(result) < POOR:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
