@@ -62,7 +62,7 @@ class Correction:
     errors, error_source
         Of a single reading, and where they come from.
     condition_number
-        Of the stacked, column-scaled W.
+        Of the stacked, column-scaled W (readings of weight 0 left out).
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
@@ -264,7 +264,7 @@ def correct(  # noqa: PLR0913
         Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
         influence coefficients.
     row_weights
-        How much each reading counts, (S, C); default all alike.
+        How much each reading counts, (S, C); default all alike. One of weight 0 counts only for its limit.
     strength
         Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …), or "auto".
     keep
@@ -298,17 +298,21 @@ def correct(  # noqa: PLR0913
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
+    rows = rows_of(row_weights, influence.W.shape[:2], used)
+    felt = W if rows is None else W[rows > 0]  # what weights of 0 leave says how well planes are told apart
     soft = strength is not None or keep is not None
     unclear: tuple[str, ...] = ()
     unclear_regions: tuple[str, ...] = ()
     if not soft:
-        check_planes(W, names)
+        check_planes(felt, names)
         coefficients = coefficients_of(influence, used, chosen)
-        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
+        if coefficients is not None and rows is not None:
+            coefficients = coefficients[rows > 0]
+        unclear = check_resolution(influence, felt, coefficients, names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
-            small = optimism(W, coefficients, names, method=method)
+            small = optimism(felt, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
-    planes_told = conditioning(W, names)
+    planes_told = conditioning(felt, names)
     errors, channels = start.model.errors, None
     if start.covariance is not None and errors is not None:
         index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
@@ -318,7 +322,7 @@ def correct(  # noqa: PLR0913
         W,
         Y.ravel(),
         channels,
-        rows_of(row_weights, influence.W.shape[:2], used),
+        rows,
         kept if kept is not None and kept.any else None,
         names,
         reading_names(influence.sensors, influence.speeds[used]),
@@ -362,7 +366,7 @@ def correct(  # noqa: PLR0913
         remove=tuple(name for name in names if name in remove),
     )
     warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
-    warnings += cautions(result, W, alike=not unclear)
+    warnings += cautions(result, felt, alike=not unclear)
     warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
     return _with_warnings(result, warnings)
 

@@ -184,7 +184,7 @@ def best_subsets(
     """
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
-    _check(planes, P, N, k, criterion, show)
+    _check(planes, P, int(np.count_nonzero(w)), k, criterion, show)
     chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
     rows, right, outside = _reduced(w[:, None] * K, w * y)
     D, misfit, condition = _least_squares(rows, right, chosen)

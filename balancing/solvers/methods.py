@@ -19,7 +19,14 @@ from balancing.solvers.error_propagation import correction_covariance
 from balancing.solvers.regularised import ridge, truncated
 from balancing.solvers.sampling import sampled_covariance
 from balancing.solvers.solve import Method, Solution, solve
-from balancing.solvers.weighted_limits import RIVAL, LimitedProblem, descend, limited_fit, limited_problem
+from balancing.solvers.weighted_limits import (
+    RIVAL,
+    SETTLED_DRAWN,
+    LimitedProblem,
+    descend,
+    limited_fit,
+    limited_problem,
+)
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 
@@ -70,9 +77,9 @@ class Fitted:
     covariance
         (2P, 2P); None where errors are unknown.
     gap
-        Certified relative distance from the optimum; None for a closed form.
+        Certified relative distance from the optimum; None for a closed form or a search.
     chi_square, dof
-        Of the weighted fit: how well weights in these planes explain the readings.
+        Of the weighted fit: how well these weights explain the readings.
     active_weights, active_residuals
         Limits that bind, (P,) and (N,).
     warnings
@@ -205,10 +212,16 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
 
     def again(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
         drawn = given(W, Y, free.model_error)
-        return min((descend(drawn, D, 2) for D in rivals), key=lambda end: end.objective).weights
+        return min((descend(drawn, D, SETTLED_DRAWN) for D in rivals), key=lambda end: end.objective).weights
 
     # drawn from the errors of the readings alone: what explains the residuals is the same in every job
     covariance, words = _sampled(stack, again, _regular(channels, 0.0))
+    if free.inflation > 1:
+        words += (
+            "even without the limits, weights in these planes do not explain the vibration: what would be "
+            f"left is {free.inflation:.2g} times as large as the errors of the readings; unbalance outside "
+            "the planes (or a bow, or a rotor that is not linear) is likely, or errors larger than stated",
+        )
     if not ends[0].settled:
         words += (
             "the weighted fit within the limits did not settle: better weights may exist; use larger trial "

@@ -30,8 +30,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
 STEPS = 200
-SETTLED = 1e-12
-"""The steps end where 1 + Q is expected to fall by less than this share."""
+SETTLED, SETTLED_DRAWN = 1e-12, 1e-4
+"""Share of 1 + Q below which its expected fall ends the steps; for drawn readings."""
 SPREAD, PROJECTED, STARTS = 300, 60, 24
 """So many weights are looked at, fewer where amplitudes are limited, and so many of them are started from."""
 RIVAL = 16.0
@@ -109,18 +109,18 @@ def limited_fit(given: LimitedProblem, starts: Sequence[ComplexArray]) -> list[E
     return found if settled else found[:1]
 
 
-def descend(given: LimitedProblem, D: ComplexArray, steps: int = STEPS) -> End:
+def descend(given: LimitedProblem, D: ComplexArray, settled: float = SETTLED) -> End:
     """Steps down from some weights; the first one is taken whole where they are beyond the limits."""
     d, kept = stretch(D), _kept(given, D)
     at = likelihood.evaluate(given.fit, d)
-    for _ in range(steps):
+    for _ in range(STEPS):
         g = likelihood.gradient(given.fit, at)
         H = _convex(likelihood.hessian(given.fit, at))
         D, down = unstretch(d), -unstretch(g)
         limits = replace(given.limits, sectors=_sectors_at(given, np.where(D == 0, down, D)))
         step = stretch(quadratic_minimum(limits, D, g, H)) - d
         expected, t = float(-2 * g @ step - step @ H @ step), 1.0
-        if kept and expected <= SETTLED * (1 + at.objective):
+        if kept and expected <= settled * (1 + at.objective):
             return End(unstretch(d), at.objective, True)
         new = likelihood.evaluate(given.fit, d + step)
         if not kept:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from balancing.correction.correction_text import method_words
 from rotorid.base.text import sentence
 from rotorid.report import conventions
 from rotorid.report.balance_data import sheet_data

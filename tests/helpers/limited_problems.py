@@ -1,4 +1,4 @@
-"""Drawn problems of the weighted fit within limits, and a global search of their objective that is our own."""
+"""Drawn problems of the weighted fit within limits, and a global search of their objective by SciPy."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ def limited(W, Y, free, seed):
         at = rng.uniform(-np.pi, np.pi, P)
         arcs = [((np.angle(v) + a, w),) for v, a, w in zip(free, at, rng.uniform(0.3, 5, P), strict=True)]
     residual = np.full(N, np.inf)
-    inside = [v * 0 if arc else 0.9 * m * np.exp(1j * np.angle(v)) for v, m, arc in zip(free, most, arcs, strict=True)]
+    inside = [
+        v * 0 if arc else 0.9 * m * np.exp(1j * np.angle(v))
+        for v, m, arc in zip(free, most, arcs, strict=True)
+    ]
     if rng.random() < 0.4:
         residual = np.abs(Y + W @ np.array(inside)) * rng.uniform(1.02, 2.0, N)
         residual[rng.random(N) < 0.4] = np.inf
@@ -62,11 +65,10 @@ def limited(W, Y, free, seed):
 
 
 def problem(seed):
-    """Stack and objective of a drawn problem; None where the fit has no end without limits."""
+    """Stack and objective of a drawn problem."""
     W, Y, channels = drawn(seed)
     free = effective_variance(W, Y, channels)
-    if not free.converged:
-        return None
+    assert free.converged
     limits = limited(W, Y, free.weights, seed)
     N, P = W.shape
     stack = Stack(
@@ -85,9 +87,9 @@ def problem(seed):
     return stack, likelihood.problem_of(W, Y, wider, np.ones(N))
 
 
-def global_search(stack, fit, tries=30, seed=0):
-    """The least objective of many starts of SciPy's SLSQP in every sector."""
-    rng = np.random.default_rng(seed)
+def global_search(stack, fit, tries):
+    """The least objective of SciPy's SLSQP from many starts for each plane, in every sector."""
+    rng = np.random.default_rng(0)
     W, Y, limits = stack.W, stack.Y, stack.limits
     N, P = W.shape
     size = limits.max_weight
@@ -96,11 +98,6 @@ def global_search(stack, fit, tries=30, seed=0):
     def objective(x):
         at = likelihood.evaluate(fit, x * scale)
         return at.objective, 2 * likelihood.gradient(fit, at) * scale
-
-    def turned(c, x):
-        """Re(c̄ D) / M and its gradient."""
-        z = x[::2] + 1j * x[1::2]
-        return (c.conjugate() * z).real
 
     best = np.inf
     real = np.zeros((2, N, 2 * P))
@@ -118,7 +115,9 @@ def global_search(stack, fit, tries=30, seed=0):
 
         def kept(x, sides=sides):
             r = [Y.real[on] + real[0, on] @ x, Y.imag[on] + real[1, on] @ x]
-            return np.concatenate((1 - x[::2] ** 2 - x[1::2] ** 2, 1 - (r[0] ** 2 + r[1] ** 2) / L**2, sides @ x))
+            return np.concatenate(
+                (1 - x[::2] ** 2 - x[1::2] ** 2, 1 - (r[0] ** 2 + r[1] ** 2) / L**2, sides @ x)
+            )
 
         def slope(x, sides=sides):
             discs = np.zeros((P, 2 * P))
@@ -129,9 +128,7 @@ def global_search(stack, fit, tries=30, seed=0):
             return np.concatenate((discs, amplitudes, sides))
 
         for _ in range(tries * P):
-            angle = [
-                rng.uniform(0, 2 * np.pi) if s is None else s[0] + s[1] * rng.random() for s in sectors
-            ]
+            angle = [rng.uniform(0, 2 * np.pi) if s is None else s[0] + s[1] * rng.random() for s in sectors]
             z = np.sqrt(rng.random(P)) * np.exp(1j * np.array(angle))
             found = minimize(
                 objective,
