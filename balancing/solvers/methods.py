@@ -23,7 +23,7 @@ from balancing.solvers.weighted_limits import (
     RIVAL,
     SETTLED_DRAWN,
     LimitedProblem,
-    descend,
+    descend_all,
     limited_fit,
     limited_problem,
 )
@@ -204,15 +204,16 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
     def given(W: ComplexArray, Y: ComplexArray, model_error: float) -> LimitedProblem:
         return limited_problem(W, Y, _regular(channels, model_error), stack.row_weights, limits)
 
-    ends = limited_fit(given(stack.W, stack.Y, free.model_error), (free.weights, first.weights))
+    problem = given(stack.W, stack.Y, free.model_error)
+    ends = limited_fit(problem, (free.weights, first.weights))
     D = ends[0].weights
-    if np.allclose(D, free.weights, rtol=1e-6, atol=0.0):  # no limit binds
+    if problem.kept(free.weights) and np.allclose(D, free.weights, rtol=1e-6, atol=0.0):  # no limit binds
         return Fitted(free.weights, free.covariance, chi_square=free.chi_square, dof=free.dof)
     rivals = [end.weights for end in ends if end.objective <= ends[0].objective + RIVAL]
 
     def again(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
-        drawn = given(W, Y, free.model_error)
-        return min((descend(drawn, D, SETTLED_DRAWN) for D in rivals), key=lambda end: end.objective).weights
+        found = descend_all(given(W, Y, free.model_error), rivals, SETTLED_DRAWN)
+        return min(found, key=lambda end: end.objective).weights
 
     # drawn from the errors of the readings alone: what explains the residuals is the same in every job
     covariance, words = _sampled(stack, again, _regular(channels, 0.0))

@@ -50,6 +50,15 @@ class LimitedProblem(NamedTuple):
     limits: Problem
     sectors: tuple[tuple[Arc, ...] | None, ...]
 
+    def kept(self, D: ComplexArray) -> bool:
+        """Whether weights are within the limits."""
+        limits = self.limits
+        return bool(
+            (np.abs(D) <= limits.max_weight).all()
+            and (np.abs(limits.Y + limits.W @ D) <= limits.residual).all()
+            and all(stands_in(v, s) for v, s in zip(D, self.sectors, strict=True))
+        )
+
     def chi_square(self, D: ComplexArray) -> float:
         """Σ rᵀ Σ⁻¹ r, without row weights (readings of weight 0 left out)."""
         return float(likelihood.evaluate(self.fit, stretch(D)).each[self.fit.weight > 0].sum())
@@ -97,7 +106,7 @@ def limited_fit(given: LimitedProblem, starts: Sequence[ComplexArray]) -> list[E
     InfeasibleError
         Limits that cannot be met.
     """
-    ends = [descend(given, D) for D in (*_possible(given, starts), *_spread(given, starts))]
+    ends = descend_all(given, (*starts, *_spread(given, starts)))
     settled = [end for end in ends if end.settled]
     found: list[End] = []
     for end in sorted(settled or ends, key=lambda end: end.objective):
@@ -109,9 +118,22 @@ def limited_fit(given: LimitedProblem, starts: Sequence[ComplexArray]) -> list[E
     return found if settled else found[:1]
 
 
-def descend(given: LimitedProblem, D: ComplexArray, settled: float = SETTLED) -> End:
+def descend_all(given: LimitedProblem, starts: Iterable[ComplexArray], settled: float = SETTLED) -> list[End]:
+    """Steps down from every start whose sectors the limits allow; `InfeasibleError` where there is none."""
+    ends = []
+    for D in starts:
+        try:
+            ends.append(_descend(given, D, settled))
+        except InfeasibleError:
+            continue
+    if not ends:
+        raise InfeasibleError("no weights are within the limits")
+    return ends
+
+
+def _descend(given: LimitedProblem, D: ComplexArray, settled: float) -> End:
     """Steps down from some weights; the first one is taken whole where they are beyond the limits."""
-    d, kept = stretch(D), _kept(given, D)
+    d, kept = stretch(D), given.kept(D)
     at = likelihood.evaluate(given.fit, d)
     for _ in range(STEPS):
         g = likelihood.gradient(given.fit, at)
@@ -154,15 +176,6 @@ def _nearest(given: LimitedProblem, D: ComplexArray) -> ComplexArray:
 
 def _effect(given: LimitedProblem) -> FloatArray:
     return np.asarray(np.linalg.norm(given.limits.W, axis=0))
-
-
-def _kept(given: LimitedProblem, D: ComplexArray) -> bool:
-    limits = given.limits
-    return bool(
-        (np.abs(D) <= limits.max_weight).all()
-        and (np.abs(limits.Y + limits.W @ D) <= limits.residual).all()
-        and all(stands_in(v, s) for v, s in zip(D, given.sectors, strict=True))
-    )
 
 
 def _sectors_at(given: LimitedProblem, D: ComplexArray) -> tuple[Arc | None, ...]:
@@ -210,6 +223,6 @@ def _possible(given: LimitedProblem, points: Iterable[ComplexArray]) -> Iterator
     """Each put within the limits, where they are possible in its sectors."""
     for D in points:
         try:
-            yield D if _kept(given, D) else _nearest(given, D)
+            yield D if given.kept(D) else _nearest(given, D)
         except InfeasibleError:
             continue
