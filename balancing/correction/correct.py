@@ -70,7 +70,7 @@ class Correction:
     check_rms
         Root mean square below which 95 of 100 check runs stay; None where errors are unknown.
     condition_number
-        Of the stacked, column-scaled W.
+        Of the stacked, column-scaled W (readings of weight 0 left out).
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
@@ -88,9 +88,12 @@ class Correction:
     singular_values
         Of the stacked, column-scaled W, largest first.
     gap
-        Certified relative distance of the objective from its optimum; None for a closed form.
+        Certified relative distance of the objective from its optimum; None for a closed form, and for the
+        method "weighted" within limits.
     chi_square, fit_dof
-        Of the method "weighted": how well weights in these planes explain the readings.
+        Of the method "weighted": how well these weights explain the readings.
+    row_weights
+        How much each reading counts, relative to the largest, (S·C,); None: all alike.
     limits, active
         What the correction had to keep to, and the limits that bind, in words.
     remove
@@ -126,6 +129,7 @@ class Correction:
     gap: float | None = None
     chi_square: float | None = None
     fit_dof: int | None = None
+    row_weights: FloatArray | None = None
     limits: Limits | None = None
     active: tuple[str, ...] = ()
     remove: tuple[str, ...] = ()
@@ -289,7 +293,7 @@ def correct(  # noqa: PLR0913
         Largest weights and amplitudes and forbidden angles, for all speeds, sensors and planes of the
         influence coefficients.
     row_weights
-        How much each reading counts, (S, C); default all alike.
+        How much each reading counts, (S, C); default all alike. One of weight 0 counts only for its limit.
     strength
         Ridge: planes that act alike get small weights instead of a refusal; relative (0.01 …), or "auto".
     keep
@@ -323,26 +327,30 @@ def correct(  # noqa: PLR0913
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
+    rows = rows_of(row_weights, influence.W.shape[:2], used)
+    felt = W if rows is None else W[rows > 0]  # what weights of 0 leave says how well planes are told apart
     soft = strength is not None or keep is not None
     if method is None:
         method = "weighted" if start.covariance is not None and not soft else "least-squares"
     unclear: tuple[str, ...] = ()
     unclear_regions: tuple[str, ...] = ()
     if not soft:
-        check_planes(W, names)
+        check_planes(felt, names)
         coefficients = coefficients_of(influence, used, chosen)
-        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
+        if coefficients is not None and rows is not None:
+            coefficients = coefficients[rows > 0]
+        unclear = check_resolution(influence, felt, coefficients, names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
-            small = optimism(W, coefficients, names, method=method)
+            small = optimism(felt, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
-    planes_told = conditioning(W, names)
+    planes_told = conditioning(felt, names)
     errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
         Y.ravel(),
         None if errors is None else errors.channels,
-        rows_of(row_weights, influence.W.shape[:2], used),
+        rows,
         kept if kept is not None and kept.any else None,
         names,
         reading_names(influence.sensors, influence.speeds[used]),
@@ -383,12 +391,13 @@ def correct(  # noqa: PLR0913
         gap=fitted.gap,
         chi_square=fitted.chi_square,
         fit_dof=fitted.dof,
+        row_weights=stack.row_weights,
         limits=stack.limits,
         active=binding(stack, fitted),
         remove=tuple(name for name in names if name in remove),
     )
     warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
-    warnings += cautions(result, W, alike=not unclear)
+    warnings += cautions(result, felt, alike=not unclear)
     warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
     return _with_words(result, warnings, influence.notes + notes(result))
 

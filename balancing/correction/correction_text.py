@@ -27,9 +27,9 @@ DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 
 _METHODS = {
-    "least-squares": "Least squares: the sum of squared amplitudes is the smallest possible.",
+    "least-squares": "Least squares: the sum of squared {}amplitudes is the smallest possible.",
     "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
-    "minmax": "Min–max: the largest amplitude is the smallest possible.",
+    "minmax": "Min–max: the largest {}amplitude is the smallest possible.",
     "ridge": "Ridge: small weights where planes act alike.",
     "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
 }
@@ -230,7 +230,7 @@ def _quality(c: Correction) -> str:
     planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
     unit, scale = c.labels.vibration_unit, c.labels.vibration_scale
     numbers = f"rank {c.rank} of {n}, condition number {c.condition_number:.3g}"
-    lines = [_METHODS[c.method]]
+    lines = [method_words(c)]
     if c.gap is not None:
         lines[0] += f" The optimum is certified: at most {max(c.gap, 0.0):.1e} better is possible."
     if c.active:
@@ -277,6 +277,11 @@ def _between_runs(c: Correction) -> str:
     parts = [words for large, words in shown if large]
     common = f", {100 * run.common:.0f} % of the variance common to the sensors" if run.common > 0.1 else ""
     return f"; from run to run: {', '.join(parts)} ({run.origin}{common})"
+
+
+def method_words(c: Correction) -> str:
+    """What the method makes small."""
+    return _METHODS[c.method].format("" if c.row_weights is None else "weighted ")
 
 
 def _mounted(c: Correction) -> dict[str, Any]:

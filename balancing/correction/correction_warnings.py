@@ -93,7 +93,8 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
         for p, nothing in zip(result.planes, empty, strict=True)
         if nothing
     ]
-    if result.chi_square is not None and result.fit_dof and not result.explained:
+    unexplained = result.chi_square is not None and result.fit_dof and not result.explained
+    if unexplained and not result.active:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "

@@ -55,6 +55,8 @@ class Subsets:
         How many more were not: their planes act alike exactly, so that the weights are not determined.
     labels
         Units and conventions to print in.
+    weighted
+        Whether the readings count differently.
     """
 
     planes: tuple[tuple[str, ...], ...]
@@ -69,6 +71,7 @@ class Subsets:
     choices: int
     dependent: int
     labels: Labels
+    weighted: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
@@ -113,6 +116,8 @@ class Subsets:
         """Table of 80 columns, the best choice first."""
         found = self.to_dict()
         by = "rms" if self.criterion == "rms" else "largest amplitude"
+        if self.weighted:
+            by = "weighted rms" if self.criterion == "rms" else "largest weighted amplitude"
         units = self.labels.weight_unit, self.labels.vibration_unit
         rows = [
             ["planes", "rms", "largest", f"largest weight{f', {units[0]}' if units[0] else ''}", "condition"]
@@ -179,7 +184,7 @@ def best_subsets(
     """
     K, y, w = check_stack(W, Y, row_weights)
     N, P = K.shape
-    _check(planes, P, N, k, criterion, show)
+    _check(planes, P, int(np.count_nonzero(w)), k, criterion, show)
     chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
     rows, right, outside = _reduced(w[:, None] * K, w * y)
     D, misfit, condition = _least_squares(rows, right, chosen)
@@ -208,6 +213,7 @@ def best_subsets(
         choices=int(np.count_nonzero(solid)),
         dependent=int(np.count_nonzero(~solid)),
         labels=labels or Labels(),
+        weighted=bool(np.ptp(w) > 0),
     )
 
 

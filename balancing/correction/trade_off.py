@@ -53,6 +53,8 @@ class TradeOff:
         at least `KNEE` times as much before it as behind it. None: no such point.
     labels
         Units and conventions to print in.
+    weighted
+        Whether the readings count differently.
     """
 
     planes: tuple[str, ...]
@@ -64,6 +66,7 @@ class TradeOff:
     criterion: Criterion
     knee: int | None
     labels: Labels
+    weighted: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
@@ -123,6 +126,8 @@ class TradeOff:
             numbers = [figures(point[name], 3) for name in ("total", "rms_after", "max_after")]
             rows.append([*numbers, f"{100 * share:.0f} %", "← knee" if k == self.knee else ""])
         what = "rms" if self.criterion == "rms" else "largest amplitude"
+        if self.weighted:
+            what = "weighted rms" if self.criterion == "rms" else "largest weighted amplitude"
         head = f"The least {what} that a total weight leaves{f' ({vibration})' if vibration else ''}"
         return f"{head}\n{table(rows, left=0)}\n{self._words()}"
 
@@ -218,7 +223,7 @@ def trade_off(
         D = weight_budget_cone(K, y, budget, minmax=criterion == "max", row_weights=w).weights
         D = np.where(np.abs(D) > DUST * budget, D, 0.0)
         found.insert(place, (budget, objective(D), D))
-    return _result(planes, K, y, found, criterion, labels or Labels())
+    return _result(planes, K, y, found, criterion, labels or Labels(), weighted=bool(np.ptp(w) > 0))
 
 
 def _longest(totals: list[float], values: list[float]) -> tuple[int, float]:
@@ -236,6 +241,8 @@ def _result(
     found: list[tuple[float, float, ComplexArray]],
     criterion: Criterion,
     labels: Labels,
+    *,
+    weighted: bool,
 ) -> TradeOff:
     weights = np.array([D for _, _, D in found])
     totals = np.abs(weights).sum(axis=1)
@@ -251,6 +258,7 @@ def _result(
         criterion=criterion,
         knee=knee(totals, values),
         labels=labels,
+        weighted=weighted,
     )
 
 

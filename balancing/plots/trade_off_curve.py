@@ -34,7 +34,8 @@ def curve(t: TradeOff, ax: Axes) -> Axes:
     shown = {"max": ("largest amplitude", t.largest, COLORS[1]), "rms": ("rms", t.rms, COLORS[0])}
     for kind, (name, values, colour) in shown.items():
         main = kind == t.criterion
-        label = f"{name} (made as small as possible)" if main else f"{name} at the same weights"
+        made = "made, weighted, as small as possible" if t.weighted else "made as small as possible"
+        label = f"{name} ({made})" if main else f"{name} at the same weights"
         style = "-" if main else ":"
         ax.plot(
             x, values * scale, style, marker="o" if main else None, ms=4, lw=1.6, color=colour, label=label

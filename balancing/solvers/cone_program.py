@@ -9,11 +9,14 @@ same for micrometres and grams as for metres and kilograms.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem, project
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, stretch, unstretch
@@ -101,21 +104,10 @@ class Program:
         self, tighter: float, tolerance: float, careful: bool
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Solve with limits tighter by a share; weights (P,) and dual vectors a, u (N,)."""
-        import clarabel
-
         A, b, cones, marks = self._rows(tighter)
         q = np.zeros(A.shape[1])
         q[2 * len(self.base)] = 1.0
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
-        settings.presolve_enable = False
-        settings.equilibrate_enable = careful
-        settings.max_threads = 1
-        found = clarabel.DefaultSolver(_zero(len(q)), q, _csc(A), b, cones, settings).solve()
-        if "PrimalInfeasible" in str(found.status):
-            raise InfeasibleError("no weights are within the limits")
-        x, z = np.array(found.x), np.array(found.z)
+        x, z = _solved(_zero(len(q)), q, _csc(A), b, cones, tolerance, careful)
         weights = np.asarray(self.base + self.transform @ unstretch(x[: 2 * len(self.base)]))
         a, u = self._dual(z, marks)
         return weights, a, u
@@ -148,12 +140,8 @@ class Program:
             parts.append(_discs(self.limit_rows, known, head, n))
             cones += [clarabel.SecondOrderConeT(3)] * len(self.limited)
             marks["limited"] = slice(marks["objective"].stop, marks["objective"].stop + 3 * len(self.limited))
-        heavy = np.flatnonzero(np.isfinite(M))
-        if len(heavy):
-            size = np.maximum(M[heavy], self.sizes[heavy])
-            rows = self.transform[heavy] / size[:, None]
-            parts.append(_discs(rows, self.base[heavy] / size, M[heavy] * (1 - tighter) / size, n))
-            cones += [clarabel.SecondOrderConeT(3)] * len(heavy)
+        parts.append(_weights(M * (1 - tighter), self.base, self.transform, np.maximum(M, self.sizes), n))
+        cones += [clarabel.SecondOrderConeT(3)] * int(np.isfinite(M).sum())
         if np.isfinite(budget):
             rows = self.transform / self.sizes[:, None]
             block, b = _discs(rows, self.base / self.sizes, np.zeros(P), n)
@@ -164,26 +152,16 @@ class Program:
         return A, np.concatenate([b for _, b in parts]), cones, marks
 
     def _linear_rows(self, n: int, tighter: float) -> tuple[FloatArray, FloatArray]:
-        """Rows b − A x ≥ 0: Re(c̄ D) ≥ 0 left of a sector's start and right of its end; Σ k τ ≤ budget."""
-        P, rows, right = len(self.base), [], []
+        """Rows b − A x ≥ 0 of sectors, and Σ k τ ≤ budget."""
+        P = len(self.base)
         margin = tighter if tighter > TIGHTER[0] else 0.0  # else weights that should be zero could not be
-        for p, sector in enumerate(self.problem.sectors):
-            if sector is None:
-                continue
-            start, end = sector[0], sector[0] + sector[1]
-            sides = [1j * np.exp(1j * start), -1j * np.exp(1j * end)]
-            for inward in sides if sector[1] < np.pi - 1e-12 else sides[:1]:
-                row = np.zeros(n)
-                row[: 2 * P] = -stretch(inward.conjugate() * self.transform[p, None])[0] / self.sizes[p]
-                rows.append(row)
-                right.append(float((inward.conjugate() * self.base[p]).real) / self.sizes[p] - margin)
-        if np.isfinite(self.problem.budget):
-            size = max(float(self.sizes.max()), self.problem.budget)
-            row = np.zeros(n)
-            row[2 * P + 1 :] = self.sizes / size
-            rows.append(row)
-            right.append(self.problem.budget * (1 - tighter) / size)
-        return np.array(rows).reshape(len(rows), n), np.array(right)
+        A, b = _sides(self.problem.sectors, self.base, self.transform, self.sizes, n)
+        if not np.isfinite(self.problem.budget):
+            return A, b - margin
+        size = max(float(self.sizes.max()), self.problem.budget)
+        row = np.zeros((1, n))
+        row[0, 2 * P + 1 :] = self.sizes / size
+        return np.concatenate((A, row)), np.append(b - margin, self.problem.budget * (1 - tighter) / size)
 
     def _dual(self, z: FloatArray, marks: dict[str, slice]) -> tuple[ComplexArray, ComplexArray]:
         """Dual vectors a and u of `balancing.solvers.certificate.lower_bound` (N,) from those of the rows."""
@@ -199,6 +177,66 @@ class Program:
         if self.amplitudes_limited:
             u[self.limited] = -self.unit / self.own * _pairs(z[marks["limited"]])
         return a, u
+
+
+def quadratic_minimum(
+    problem: Problem, start: ComplexArray, gradient: FloatArray, hessian: FloatArray
+) -> ComplexArray:
+    """Weights within limits where 2 gᵀx + xᵀH x is smallest, x the stretched way to them from `start`.
+
+    Parameters
+    ----------
+    problem
+        Its limits and sectors; what it minimises does not matter.
+    start
+        Shape (P,), not necessarily within the limits.
+    gradient, hessian
+        g (2P,) and H (2P, 2P), positive definite.
+
+    Raises
+    ------
+    InfeasibleError
+        Where no weights are within the limits.
+    """
+    import clarabel
+
+    free = problem.max_weight > 0
+    if not free.all():
+        found, both = np.zeros_like(start), np.repeat(free, 2)
+        if free.any():
+            sectors = tuple(s for s, f in zip(problem.sectors, free, strict=True) if f)
+            part = replace(
+                problem, W=problem.W[:, free], max_weight=problem.max_weight[free], sectors=sectors
+            )
+            found[free] = quadratic_minimum(part, start[free], gradient[both], hessian[np.ix_(both, both)])
+        return found
+    n, M, newton = len(gradient), problem.max_weight, unstretch(np.linalg.solve(hessian, -gradient))
+    if not newton.any():
+        return start
+    sizes = np.minimum(float(np.abs(newton).max()), M + np.abs(start))
+    transform = np.diag(sizes).astype(complex)
+    x_size = np.repeat(sizes, 2)
+    H, g = hessian * np.outer(x_size, x_size), gradient * x_size
+    unit = max(float(np.abs(g).max()), float(np.abs(H).max()))
+    limited = np.isfinite(problem.residual)
+    residual, L = (problem.Y + problem.W @ start)[limited], problem.residual[limited]
+    own = np.maximum(np.maximum(L, np.abs(residual)), np.finfo(float).tiny)
+    rows = problem.W[limited] * sizes / own[:, None]
+    sides = _sides(problem.sectors, start, transform, np.maximum(sizes, np.abs(start)), n)
+    cones = [clarabel.NonnegativeConeT(len(sides[1]))] if len(sides[1]) else []
+    cones += [clarabel.SecondOrderConeT(3)] * int(limited.sum() + np.isfinite(M).sum())
+    for tighter in TIGHTER if limited.any() else (0.0,):
+        parts = [
+            sides,
+            _discs(rows, residual / own, L * (1 - tighter) / own, n),
+            _weights(M * (1 - tighter), start, transform, np.maximum(M, sizes), n),
+        ]
+        A, b = np.concatenate([part for part, _ in parts]), np.concatenate([right for _, right in parts])
+        x, _ = _solved(_csc(np.triu(2 * H / unit)), 2 * g / unit, _csc(A), b, cones, 1e-10, careful=False)
+        found = within_limits(problem, start + transform @ unstretch(x))
+        if (np.abs(problem.Y + problem.W @ found) <= problem.residual).all():
+            return found
+    raise InfeasibleError("the limits can be met only to within rounding")
 
 
 def within_limits(problem: Problem, weights: ComplexArray) -> ComplexArray:
@@ -239,6 +277,57 @@ def _discs(
         A[:, 0, t] = -1.0
     b[:, 0], b[:, 1], b[:, 2] = head, known.real, known.imag
     return A.reshape(3 * m, n), b.reshape(3 * m)
+
+
+def _weights(
+    largest: FloatArray, base: ComplexArray, transform: ComplexArray, sizes: FloatArray, n: int
+) -> tuple[FloatArray, FloatArray]:
+    """Cones |base + transform x| ≤ largest, scaled, of the planes that are limited."""
+    heavy = np.isfinite(largest)
+    size = sizes[heavy]
+    return _discs(transform[heavy] / size[:, None], base[heavy] / size, largest[heavy] / size, n)
+
+
+def _sides(
+    sectors: Sequence[Arc | None], base: ComplexArray, transform: ComplexArray, sizes: FloatArray, n: int
+) -> tuple[FloatArray, FloatArray]:
+    """Rows b − A x ≥ 0: Re(c̄ D) ≥ 0 left of a sector's start and right of its end, D = base + T y."""
+    P, rows, right = len(base), [], []
+    for p, sector in enumerate(sectors):
+        if sector is None:
+            continue
+        start, end = sector[0], sector[0] + sector[1]
+        sides = [1j * np.exp(1j * start), -1j * np.exp(1j * end)]
+        for inward in sides if sector[1] < np.pi - 1e-12 else sides[:1]:
+            row = np.zeros(n)
+            row[: 2 * P] = -stretch(inward.conjugate() * transform[p, None])[0] / sizes[p]
+            rows.append(row)
+            right.append(float((inward.conjugate() * base[p]).real) / sizes[p])
+    return np.array(rows).reshape(len(rows), n), np.array(right)
+
+
+def _solved(
+    P: csc_matrix,
+    q: FloatArray,
+    A: csc_matrix,
+    b: FloatArray,
+    cones: list[Any],
+    tolerance: float,
+    careful: bool,
+) -> tuple[FloatArray, FloatArray]:
+    """The x that minimises ½ xᵀPx + qᵀx with b − A x in cones, and its dual."""
+    import clarabel
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+    settings.presolve_enable = False
+    settings.equilibrate_enable = careful
+    settings.max_threads = 1
+    found = clarabel.DefaultSolver(P, q, A, b, cones, settings).solve()
+    if "PrimalInfeasible" in str(found.status):
+        raise InfeasibleError("no weights are within the limits")
+    return np.array(found.x), np.array(found.z)
 
 
 def _pairs(z: FloatArray) -> ComplexArray:

@@ -14,13 +14,20 @@ from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.resolution import HOPELESS
 from balancing.data.errors import symmetric
 from balancing.data.limits import Limits
-from balancing.solvers.effective_variance import FLOOR, effective_variance
+from balancing.solvers.cone import AT_LIMIT
+from balancing.solvers.effective_variance import FLOOR, Effective, effective_variance
 from balancing.solvers.error_propagation import common_covariance, correction_jacobian
 from balancing.solvers.regularised import ridge, truncated
 from balancing.solvers.sampling import sampled_covariance
-from balancing.solvers.sectors import allowed_sectors, stands_in
 from balancing.solvers.solve import Method, Solution, solve
-from balancing.solvers.weighted_limits import STEPS, limited_fit
+from balancing.solvers.weighted_limits import (
+    RIVAL,
+    SETTLED_DRAWN,
+    LimitedProblem,
+    descend_all,
+    limited_fit,
+    limited_problem,
+)
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 
@@ -80,9 +87,9 @@ class Fitted:
     parts
         What of it comes from own errors, from those common at a speed and to a run, three times (2P, 2P).
     gap
-        Certified relative distance from the optimum; None for a closed form.
+        Certified relative distance from the optimum; None for a closed form or a search.
     chi_square, dof
-        Of the weighted fit: how well weights in these planes explain the readings.
+        Of the weighted fit: how well these weights explain the readings.
     explained
         Whether errors alone may leave so much.
     active_weights, active_residuals
@@ -214,44 +221,58 @@ def _weighted(stack: Stack) -> Fitted:
             "the trial runs tell too little of the planes for the weighted fit: its weights grow without "
             "bound; use larger trial weights, fewer planes or another method"
         )
-    if stack.limits is None or _kept(stack.limits, free.weights, free.residual):
-        parts = (free.covariance, *_shared(free.derivatives, stack))
-        total = symmetric(sum(parts[1:], parts[0]))
-        told = free.model_error == 0
-        return Fitted(free.weights, total, parts, chi_square=free.chi_square, dof=free.dof, explained=told)
-    limits, channels = stack.limits, _regular(stack.channels, free.model_error)
+    if stack.limits is None:
+        return _unlimited(stack, free)
+    return _weighted_within(stack, stack.channels, stack.limits, free)
 
-    def search(W: ComplexArray, Y: ComplexArray, rows: FloatArray, within: Limits) -> Solution:
-        names = (*(f"row {i + 1}" for i in range(len(stack.planes))), *stack.readings)
-        return solve(
-            W,
-            Y,
-            row_weights=rows,
-            limits=within,
-            names=stack.planes,
-            readings=names,
-            amplitude=stack.amplitude,
-            weight=stack.weight,
-        )
 
-    def limited(W: ComplexArray, Y: ComplexArray, start: ComplexArray, steps: int) -> Solution:
-        return limited_fit(W, Y, channels, stack.row_weights, limits, start, search, steps=steps)
+def _unlimited(stack: Stack, free: Effective) -> Fitted:
+    parts = (free.covariance, *_shared(free.derivatives, stack))
+    total = symmetric(sum(parts[1:], parts[0]))
+    told = free.model_error == 0
+    return Fitted(free.weights, total, parts, chi_square=free.chi_square, dof=free.dof, explained=told)
 
-    found = limited(stack.W, stack.Y, free.weights, STEPS)
+
+def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: Effective) -> Fitted:
+    """The weighted fit within limits; `free` is the one without."""
+    first = _solve(stack, "least-squares", stack.W, stack.Y, stack.row_weights)  # names limits in conflict
+
+    def given(W: ComplexArray, Y: ComplexArray, model_error: float) -> LimitedProblem:
+        return limited_problem(W, Y, _regular(channels, model_error), stack.row_weights, limits)
+
+    problem = given(stack.W, stack.Y, free.model_error)
+    ends = limited_fit(problem, (free.weights, first.weights))
+    D = ends[0].weights
+    if problem.kept(free.weights) and np.allclose(D, free.weights, rtol=1e-6, atol=0.0):  # no limit binds
+        return _unlimited(stack, free)
+    rivals = [end.weights for end in ends if end.objective <= ends[0].objective + RIVAL]
+
+    def again(W: ComplexArray, Y: ComplexArray) -> ComplexArray:
+        found = descend_all(given(W, Y, free.model_error), rivals, SETTLED_DRAWN)
+        return min(found, key=lambda end: end.objective).weights
+
     # drawn from the errors of the readings alone: what explains the residuals is the same in every job
-    covariance, words = _sampled(
-        stack, lambda W, Y: limited(W, Y, found.weights, 1).weights, _regular(stack.channels, 0.0)
-    )
+    covariance, words = _sampled(stack, again, _regular(channels, 0.0))
+    if free.inflation > 1:
+        words += (
+            "even without the limits, weights in these planes do not explain the vibration: what would be "
+            f"left is {free.inflation:.2g} times as large as the errors of the readings; unbalance outside "
+            "the planes (or a bow, or a rotor that is not linear) is likely, or errors larger than stated",
+        )
+    if not ends[0].settled:
+        words += (
+            "the weighted fit within the limits did not settle: better weights may exist; use larger trial "
+            "weights, fewer planes or another method",
+        )
     return Fitted(
-        found.weights,
+        D,
         covariance,
         (free.covariance, *_shared(free.derivatives, stack)),
-        found.gap,
-        free.chi_square,
-        free.dof,
-        free.model_error == 0,
-        active_weights=found.active_weights,
-        active_residuals=found.active_residuals,
+        chi_square=given(stack.W, stack.Y, 0.0).chi_square(D),
+        dof=free.dof,
+        explained=free.model_error == 0,
+        active_weights=np.abs(D) >= limits.max_weight * (1 - AT_LIMIT),
+        active_residuals=np.abs(stack.Y + stack.W @ D) >= limits.residual.ravel() * (1 - AT_LIMIT),
         warnings=words,
     )
 
@@ -272,14 +293,6 @@ def _sampled(
         return sampled_covariance(solver, stack.W, stack.Y, channels, common=stack.common), ()
     except ValueError as error:
         return None, (str(error),)
-
-
-def _kept(limits: Limits, D: ComplexArray, r: ComplexArray) -> bool:
-    return bool(
-        (np.abs(D) <= limits.max_weight * (1 + 1e-9)).all()
-        and (np.abs(r) <= limits.residual.ravel() * (1 + 1e-9)).all()
-        and all(stands_in(d, allowed_sectors(arcs)) for d, arcs in zip(D, limits.forbidden, strict=True))
-    )
 
 
 def _regularised(stack: Stack, method: str, strength: float | str | None, keep: float | None) -> Fitted:

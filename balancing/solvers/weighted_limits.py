@@ -1,108 +1,228 @@
-"""The fit by errors within limits: sequential cone programs.
+"""The fit by errors within limits: sequential cone programs with a line search, from several starts.
 
 The objective Q(D) of `balancing.solvers.effective_variance` is expanded about the last weights D_k with its
-exact gradient g and a Hermitian matrix H, the part of its Hessian that a complex matrix can express (for
-errors that are alike in both directions all of it):
+exact gradient g and its Hessian H, negative curvatures turned round:
 
-    Q(D) ≈ Q(D_k) + 2 Re gᴴ (D − D_k) + (D − D_k)ᴴ H (D − D_k) = |U (D − D_k) + U⁻ᴴ g|² + const.,   H = Uᴴ U,
+    Q(D) ≈ Q(D_k) + 2 gᵀ(d − d_k) + (d − d_k)ᵀ H (d − d_k), stretched.
 
-a least-squares problem with P rows, which `balancing.solvers.solve` takes with all limits; the readings stand
-beside them with weight 0, for their limits. Where the steps end, the exact gradient fulfils the conditions of
-the optimum, so the answer passes without a jump into that without limits.
+The minimum of that within the limits is a cone program. The limits are convex, if of each plane's allowed
+angles only the sector where its weight stands is looked at, so the whole way to that minimum keeps them, and
+is shortened until Q falls. Q has several minima where trial weights are weak or phases are known much better
+than amplitudes: the steps start from many weights spread over what the limits allow, and the best end is
+taken. That no better one exists is not certified.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.limits import Limits
+from balancing.data.limits import Arc, Limits
 from balancing.solvers import likelihood
-from balancing.solvers.solve import Solution
+from balancing.solvers.certificate import Problem
+from balancing.solvers.cone import problem
+from balancing.solvers.cone_program import InfeasibleError, quadratic_minimum
+from balancing.solvers.sectors import allowed_sectors, stands_in
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
-Search = Callable[[ComplexArray, ComplexArray, FloatArray, Limits], Solution]
-"""Least squares with limits of W, Y, row weights and limits."""
+STEPS = 200
+SETTLED, SETTLED_DRAWN = 1e-12, 1e-4
+"""Share of 1 + Q below which its expected fall ends the steps; for drawn readings."""
+SPREAD, PROJECTED, STARTS = 300, 60, 24
+"""So many weights are looked at, fewer where amplitudes are limited, and so many of them are started from."""
+RIVAL = 16.0
+"""For drawn readings the ends are started from again whose Q is larger than the best by at most so much."""
 
-STEPS = 50
-SETTLED = 1e-9
+_ROUNDING, _HALVINGS = 1e-7, 40
+_LEAST_CURVATURE = 1e-9
+_SAME = 1e-4
+_BEYOND = 3.0
 
 
-def limited_fit(
-    W: ComplexArray,
-    Y: ComplexArray,
-    channels: FloatArray,
-    row_weights: FloatArray | None,
-    limits: Limits,
-    start: ComplexArray,
-    search: Search,
-    *,
-    steps: int = STEPS,
-) -> Solution:
-    """Weights that minimise the sum of squared residuals in units of their errors, within limits.
+class LimitedProblem(NamedTuple):
+    """Q of the weights; their limits; the sectors of each plane (None: all angles)."""
+
+    fit: likelihood.Problem
+    limits: Problem
+    sectors: tuple[tuple[Arc, ...] | None, ...]
+
+    def kept(self, D: ComplexArray) -> bool:
+        """Whether weights are within the limits."""
+        limits = self.limits
+        return bool(
+            (np.abs(D) <= limits.max_weight).all()
+            and (np.abs(limits.Y + limits.W @ D) <= limits.residual).all()
+            and all(stands_in(v, s) for v, s in zip(D, self.sectors, strict=True))
+        )
+
+    def chi_square(self, D: ComplexArray) -> float:
+        """Σ rᵀ Σ⁻¹ r, without row weights (readings of weight 0 left out)."""
+        return float(likelihood.evaluate(self.fit, stretch(D)).each[self.fit.weight > 0].sum())
+
+
+class End(NamedTuple):
+    """Where steps ended: weights (P,), Q, and whether Q falls no further."""
+
+    weights: ComplexArray
+    objective: float
+    settled: bool
+
+
+def limited_problem(
+    W: ComplexArray, Y: ComplexArray, channels: FloatArray, row_weights: FloatArray | None, limits: Limits
+) -> LimitedProblem:
+    """As `effective_variance` takes it, with regular errors of every reading."""
+    w = np.ones(len(Y)) if row_weights is None else row_weights
+    sectors = tuple(allowed_sectors(arcs) for arcs in limits.forbidden)
+    most = np.where([s == () for s in sectors], 0.0, limits.max_weight)
+    return LimitedProblem(
+        likelihood.problem_of(W, Y, channels, w),
+        problem(W, Y, w, most, limits.residual.ravel()),
+        tuple(s or None for s in sectors),
+    )
+
+
+def limited_fit(given: LimitedProblem, starts: Sequence[ComplexArray]) -> list[End]:
+    """Minima of the sum of squared residuals in units of their errors, within limits.
 
     Parameters
     ----------
-    W, Y, channels, row_weights
-        As in `balancing.solvers.effective_variance.effective_variance`, with regular errors of every reading.
-    limits
-        Of these planes and readings.
-    start
-        Weights without limits, (P,).
-    search
-        Solves the linearised problems.
-    steps
-        At most; one is enough for weights that scatter about those of the limited fit.
+    given
+        The problem.
+    starts
+        Weights to start from, besides those spread over the limits; they may be beyond them.
 
     Returns
     -------
-    Solution
-        Its residual is Y + W D; the gap is that of the last linearised problem.
+    The minima found, the best first, no two alike. Where the steps from every start go on, the best of their
+    last weights.
 
     Raises
     ------
-    ValueError
+    InfeasibleError
         Limits that cannot be met.
     """
-    N, P = W.shape
-    problem = likelihood.problem_of(W, Y, channels, np.ones(N) if row_weights is None else row_weights)
-    stacked = Limits(
-        limits.max_weight,
-        np.concatenate((np.full(P, np.inf), limits.residual.ravel()))[None],
-        limits.forbidden,
-    )
-    rows = np.concatenate((np.ones(P), np.zeros(N)))
-    D = start
-    for _ in range(steps):
-        at = likelihood.evaluate(problem, stretch(D))
-        J = likelihood.jacobian(problem, at)[0]
-        U = _root(likelihood.hessian(problem, at), J.T @ J)
-        g = unstretch(likelihood.gradient(problem, at))
-        target = np.linalg.solve(U.conj().T, g) - U @ D
-        found = search(np.vstack((U, W)), np.concatenate((target, Y)), rows, stacked)
-        step, D = np.abs(found.weights - D).max(), found.weights
-        if step <= SETTLED * max(float(np.abs(D).max()), 1e-300):
-            break
-    return Solution(
-        weights=D,
-        residual=Y + W @ D,
-        method="least-squares",
-        objective=found.objective,
-        gap=found.gap,
-        active_weights=found.active_weights,
-        active_residuals=found.active_residuals[P:],
-    )
+    ends = descend_all(given, (*starts, *_spread(given, starts)))
+    settled = [end for end in ends if end.settled]
+    found: list[End] = []
+    for end in sorted(settled or ends, key=lambda end: end.objective):
+        if not any(
+            np.abs(end.weights - other.weights).max() <= _SAME * np.abs(other.weights).max()
+            for other in found
+        ):
+            found.append(end)
+    return found if settled else found[:1]
 
 
-def _root(hessian: FloatArray, positive: FloatArray) -> ComplexArray:
-    """U with Uᴴ U the Hermitian part of a stretched Hessian, or of a positive one instead."""
-    for matrix in (hessian, positive):
-        blocks = matrix.reshape(len(matrix) // 2, 2, -1, 2)
-        H = (blocks[:, 0, :, 0] + blocks[:, 1, :, 1]) / 2 + 1j * (blocks[:, 1, :, 0] - blocks[:, 0, :, 1]) / 2
+def descend_all(given: LimitedProblem, starts: Iterable[ComplexArray], settled: float = SETTLED) -> list[End]:
+    """Steps down from every start whose sectors the limits allow; `InfeasibleError` where there is none."""
+    ends = []
+    for D in starts:
         try:
-            return np.asarray(np.linalg.cholesky((H + H.conj().T) / 2).conj().T)
-        except np.linalg.LinAlgError:
+            ends.append(_descend(given, D, settled))
+        except InfeasibleError:
             continue
-    raise ValueError("the fit by errors has no curvature: the trial runs tell too little of the planes")
+    if not ends:
+        raise InfeasibleError("no weights are within the limits")
+    return ends
+
+
+def _descend(given: LimitedProblem, D: ComplexArray, settled: float) -> End:
+    """Steps down from some weights; the first one is taken whole where they are beyond the limits."""
+    d, kept = stretch(D), given.kept(D)
+    at = likelihood.evaluate(given.fit, d)
+    for _ in range(STEPS):
+        g = likelihood.gradient(given.fit, at)
+        H = _convex(likelihood.hessian(given.fit, at))
+        D, down = unstretch(d), -unstretch(g)
+        limits = replace(given.limits, sectors=_sectors_at(given, np.where(D == 0, down, D)))
+        step = stretch(quadratic_minimum(limits, D, g, H)) - d
+        expected, t = float(-2 * g @ step - step @ H @ step), 1.0
+        if kept and expected <= settled * (1 + at.objective):
+            return End(unstretch(d), at.objective, True)
+        new = likelihood.evaluate(given.fit, d + step)
+        if not kept:
+            d, at, kept = d + step, new, True
+            continue
+        while new.objective > at.objective - 1e-4 * t * expected and t > 0.5**_HALVINGS:
+            t /= 2
+            new = likelihood.evaluate(given.fit, d + t * step)
+        if new.objective >= at.objective:
+            return End(unstretch(d), at.objective, expected <= _ROUNDING * (1 + at.objective))
+        d, at = d + t * step, new
+    return End(unstretch(d), at.objective, False)
+
+
+def _convex(H: FloatArray) -> FloatArray:
+    """H with the absolute values of its curvatures, scaled."""
+    scale = np.sqrt(np.abs(np.diag(H)))
+    outer = np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(H / outer)
+    size = np.abs(values)
+    return np.asarray((vectors * np.maximum(size, _LEAST_CURVATURE * size.max())) @ vectors.T * outer)
+
+
+def _nearest(given: LimitedProblem, D: ComplexArray) -> ComplexArray:
+    """Weights within the limits, of an effect that differs least from that of D."""
+    none = np.zeros_like(D)
+    effect = np.repeat(_effect(given) ** 2, 2)
+    limits = replace(given.limits, sectors=_sectors_at(given, D))
+    return quadratic_minimum(limits, none, -effect * stretch(D), np.diag(effect))
+
+
+def _effect(given: LimitedProblem) -> FloatArray:
+    return np.asarray(np.linalg.norm(given.limits.W, axis=0))
+
+
+def _sectors_at(given: LimitedProblem, D: ComplexArray) -> tuple[Arc | None, ...]:
+    """Of each plane the sector in which its weight stands, the farthest from the ends."""
+
+    def depth(v: complex, arc: Arc) -> float:
+        return arc[1] / 2 - abs(float(np.angle(v * np.exp(-1j * (arc[0] + arc[1] / 2)))))
+
+    pairs = zip(D.tolist(), given.sectors, strict=True)
+    return tuple(None if s is None else max(s, key=lambda arc: depth(v, arc)) for v, s in pairs)
+
+
+def _spread(given: LimitedProblem, starts: Sequence[ComplexArray]) -> list[ComplexArray]:
+    """Weights all over the limits whose Q is smaller than that of neighbours in the same sectors."""
+    rng = np.random.default_rng(0)
+    effect, M, P = _effect(given), given.limits.max_weight, len(given.sectors)
+    amplitudes = bool(np.isfinite(given.limits.residual).any())
+    reach = np.minimum(M, _BEYOND * np.abs(starts * effect).max() / effect)
+    edge = np.where(np.isfinite(M), M, reach)
+    shape = (PROJECTED if amplitudes else SPREAD, P)
+    size = np.where(rng.random(shape) < 1 / 3, edge, reach * rng.random(shape))
+    points = size * np.exp(1j * np.transpose([_angles(s, shape[0], rng) for s in given.sectors]))
+    if amplitudes:
+        points = np.array(list(_possible(given, points))).reshape(-1, P)
+    where = [_sectors_at(given, D) for D in points]
+    Q = np.array([likelihood.evaluate(given.fit, stretch(D)).objective for D in points])
+    away = (np.abs(points[:, None] - points) * effect).sum(axis=2)
+    away[[[a != b for b in where] for a in where]] = np.inf
+    near = np.argsort(away, axis=1)[:, : 2 * P + 2]
+    around = np.where(np.isfinite(np.take_along_axis(away, near, axis=1)), Q[near], np.inf)
+    lowest = np.flatnonzero(around.min(axis=1, initial=np.inf) >= Q)
+    best = lowest[np.argsort(Q[lowest])]
+    rank = [sum(where[j] == where[i] for j in best[:k]) for k, i in enumerate(best)]  # all sectors take part
+    return list(points[best[np.argsort(rank, kind="stable")][:STARTS]])
+
+
+def _angles(sectors: Sequence[Arc] | None, n: int, rng: np.random.Generator) -> FloatArray:
+    """Angles drawn from the sectors."""
+    start, width = np.transpose(((0.0, 2 * np.pi),) if sectors is None else sectors)
+    chosen = rng.choice(len(start), n, p=width / width.sum())
+    return np.asarray(start[chosen] + width[chosen] * rng.random(n))
+
+
+def _possible(given: LimitedProblem, points: Iterable[ComplexArray]) -> Iterator[ComplexArray]:
+    """Each put within the limits, where they are possible in its sectors."""
+    for D in points:
+        try:
+            yield D if given.kept(D) else _nearest(given, D)
+        except InfeasibleError:
+            continue

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from balancing.correction.correction_text import method_words
 from rotorid.base.text import sentence
 from rotorid.report import conventions
 from rotorid.report.balance_data import sheet_data
@@ -23,13 +24,6 @@ if TYPE_CHECKING:
 RUNS_ABREAST = 4
 PLANES_ABREAST = 3
 
-_METHODS = {
-    "least-squares": "Least squares: the sum of squared amplitudes is the smallest possible.",
-    "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
-    "minmax": "Min–max: the largest amplitude is the smallest possible.",
-    "ridge": "Ridge: small weights where planes act alike.",
-    "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
-}
 _SOURCES = {
     "stated": "as stated in the job",
     "repeats": "from repeated readings",
@@ -86,7 +80,7 @@ def balance_report(
         "vibration": conventions.vibration_words(labels.vibration_unit),
         "weight": conventions.weight_words(labels.weight_unit),
         "seen": conventions.seen_from(labels),
-        "method": _METHODS.get(result.method, result.method),
+        "method": method_words(result),
         "errors": _SOURCES.get(result.error_source, result.error_source),
         "coefficients": _coefficients(influence, job, provenance),
         "turn": _turn(result),

@@ -207,3 +207,38 @@ def test_what_cannot_be():
         correct(influence, row_weights=np.ones(3))
     with pytest.raises(ValueError, match="all readings have the weight 0"):
         correct(influence, row_weights=np.zeros((S, C)))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"method": m} for m in ("least-squares", "weighted", "minmax")] + [{"strength": 0.05}, {"keep": 1}],
+)
+def test_a_reading_of_weight_zero_is_as_if_it_were_not_there(options):
+    trials, _ = job(outside=0.2)
+    rows = np.ones((S, C))
+    rows[:, 3] = 0
+    found = correct(estimate_influence(trials), row_weights=rows, **options)
+    fewer = Trials(
+        trials.runs,
+        trials.speeds,
+        trials.sensors[:3],
+        trials.planes,
+        trials.mean[..., :3],
+        trials.weights,
+        ERRORS,
+        Labels(),
+    )
+    direct = correct(estimate_influence(fewer), **options)
+    np.testing.assert_allclose(found.weights, direct.weights, rtol=1e-6)
+    assert found.condition_number == pytest.approx(direct.condition_number)
+    if options.get("method") != "minmax":  # else from draws of more readings
+        np.testing.assert_allclose(found.covariance, direct.covariance, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("method", ["least-squares", "weighted", "minmax"])
+def test_planes_must_be_told_apart_by_readings_that_count(method):
+    trials, _ = job()
+    rows = np.zeros((S, C))
+    rows[0, 0] = 1
+    with pytest.raises(UndeterminedError, match="at least 2 readings"):
+        correct(estimate_influence(trials), row_weights=rows, method=method)

@@ -375,3 +375,93 @@ def test_a_trade_off_weights_its_rows(answers, tmp_path):
     for row, own in zip(last["weights"], found["corrections"], strict=True):
         assert row["mass"] == pytest.approx(own["mass"], rel=0.01)
         assert row["angle_deg"] == pytest.approx(own["angle_deg"], abs=0.5)
+
+
+PHASES_KNOWN_BETTER = (
+    """run,speed_rpm,sensor,amplitude_um,phase_deg
+r0,3000,S0,42.79925,151.4198
+r0,3000,S1,40.246552,138.99406
+r0,3000,S2,25.918248,157.39612
+r0,3000,S3,17.89197,309.06396
+r0,3000,S4,28.809869,259.71954
+r0,3000,S5,25.843283,287.37291
+r1,3000,S0,53.925727,129.00532
+r1,3000,S1,45.352349,116.66446
+r1,3000,S2,42.570931,135.61228
+r1,3000,S3,22.596815,287.13296
+r1,3000,S4,28.23899,238.2984
+r1,3000,S5,34.507939,265.44605
+""",
+    "run,plane,mass_g,angle_deg\nr1,P0,1.7383619,297.75742\n",
+)
+
+
+def test_weighted_within_a_limit_is_the_best_place_and_nothing_is_certified(cli, tmp_path):
+    for name, text in zip(("runs.csv", "weights.csv"), PHASES_KNOWN_BETTER, strict=True):
+        (tmp_path / name).write_text(text)
+    args = ["balance", tmp_path / "runs.csv", tmp_path / "weights.csv", "--method", "weighted"]
+    args += ["--amplitude-error", "10", "--phase-error", "0.3", "--max-mass", "2.1007779985187103g"]
+    found = cli(*args, "--json").json
+    # 578 at 180°, 885 at 190°, 92 at 170°
+    assert found["chi_square"] == pytest.approx(32.6, abs=0.05)
+    assert found["corrections"][0]["angle_deg"] == pytest.approx(166.7, abs=0.1)
+    assert found["duality_gap"] is None
+    text = cli(*args).out
+    assert "χ² 32.6 with 10 degrees" in text
+    assert "certified" not in text
+
+
+def test_objective_of_weighted_readings_is_named(cli, tmp_path):
+    job = job_with(tmp_path, '[sensors."probe 4"]\nweight = 3\n')
+    out = cli("balance", job, "--method", "minmax", "--best-planes", "2", "--trade-off").out
+    assert "the largest weighted amplitude is the smallest possible" in " ".join(out.split())
+    assert "by largest weighted amplitude after correction" in out
+    assert "The least largest weighted amplitude that a total weight leaves" in out
+    assert "sum of squared weighted amplitudes" in cli("balance", job).out
+    assert "weighted amplitude" not in cli("balance", JOB, "--method", "minmax", "--trade-off").out
+    sheet = tmp_path / "sheet.html"
+    assert cli("balance", job, "--method", "minmax", "--report", sheet).code == 0
+    assert "largest weighted amplitude" in sheet.read_text()
+
+
+@pytest.mark.parametrize("weights", ['[sensors."probe 4"]\nweight = 0\n', "speed_weights"])
+@pytest.mark.parametrize("method", METHODS)
+def test_weight_zero_counts_only_for_its_limit(answers, cli, tmp_path, method, weights):
+    job = job_with(tmp_path, "" if weights == "speed_weights" else weights)
+    if weights == "speed_weights":
+        job.write_text('speed_weights = { "5400" = 0 }\n' + job.read_text())
+
+    def ignored(row):
+        return row["speed_rpm"] == 5400 if weights == "speed_weights" else row["sensor"] == "probe 4"
+
+    args = (job, "--method", method)
+    free = answers(*args)
+    largest = max(r["after"] for r in free["residuals"] if ignored(r))
+    limit = 0.97 * largest
+    held = answers(*args, "--limit", f"{limit}") if weights == "speed_weights" else None
+    held = held or answers(*args, "--limit", f"probe 4={limit}")
+    assert all(r["after"] <= limit * (1 + 1e-9) for r in held["residuals"] if ignored(r))
+    assert any("largest amplitude" in words for words in held["limits_that_bind"])
+    for more in (("--best-planes", "2"), ("--trade-off",), ("--max-mass", "300")):
+        assert cli("balance", *args, *more).code == 0
+
+
+@pytest.mark.parametrize("soft", [("--ridge", "0.01"), ("--ridge", "auto"), ("--truncate", "2")])
+def test_weight_zero_with_ridge_and_truncation(answers, tmp_path, soft):
+    without = job_with(tmp_path, "")
+    rows = (TURBO / "runs.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "runs.csv").write_text("".join(row for row in rows if "probe 4" not in row))
+    left_out = answers(without, *soft)
+    zero = answers(job_with(tmp_path, '[sensors."probe 4"]\nweight = 0\n'), *soft)
+    np.testing.assert_allclose(vectors(zero), vectors(left_out), rtol=1e-9)
+    assert zero["condition_number"] == pytest.approx(left_out["condition_number"])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_split_keeps_the_limit_of_a_sensor_of_weight_zero(answers, tmp_path, method):
+    job = job_with(tmp_path, "")
+    job.write_text((TURBO / "holes.toml").read_text() + '\n[sensors."probe 4"]\nweight = 0\n')
+    free = answers(job, "--split", "--method", method)
+    size = max(r["after"] for r in free["mounting"]["residuals"] if r["sensor"] == "probe 4")
+    held = answers(job, "--split", "--method", method, "--limit", f"probe 4={1.1 * size}")
+    assert max(r["after"] for r in held["mounting"]["residuals"] if r["sensor"] == "probe 4") <= 1.1 * size
