@@ -79,8 +79,10 @@ def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: 
             size = np.exp(rng.uniform(np.log(0.3), np.log(1.5))) * abs(D[plane])
             weights[plane] = size * np.exp(2j * np.pi * rng.random())
     Y = np.einsum("scp,rp->rsc", W, T - D)
-    size = np.sqrt(np.mean(np.abs(D) ** 2))
-    Y = Y + run * between_runs(rng, kind, Y, W * size)
+    effect = W * np.sqrt(np.mean(np.abs(D) ** 2))
+    Y = Y + run * between_runs(rng, kind, Y, effect)
+    floor = np.sqrt(np.mean(np.sum(np.abs(effect) ** 2, axis=-1)))
+    scatter = RunScatter(0.0, run / told * floor) if kind == KINDS[-1] else RunScatter(run / told)
     a, b = rng.standard_normal((2, 3 if "repeats" in source else 1, *Y.shape))
     stated, between = "stated" in source, source in ("stated", "stated, spare runs") and run > 0
     trials = Trials(
@@ -91,7 +93,7 @@ def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: 
         readings=Y * (1 + reading * a) * np.exp(1j * reading * b),
         weights=T,
         errors=ReadingErrors(reading / told, reading / told) if stated else None,
-        run_errors=RunScatter(run / told) if between else None,
+        run_errors=scatter if between else None,
     )
     return Job(trials, D, 2 * (S * C * (spare + 1) - P))
 

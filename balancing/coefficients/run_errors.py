@@ -4,8 +4,7 @@ Mounting, thermal state, drift and what is not linear change a whole run, howeve
 Y of a run has, besides its own error, one of the variance p²|Y|² + w²|W T|² + f² in each direction, in
 proportion to the reading, to what the mounted weights do, and to neither; of three kinds: its own at each
 sensor; common to the sensors at a speed; common to the run. What is common changes all readings in proportion
-(p), as other weights do (w), or as a further unbalance does (f): along the influence vector, in which all
-planes together move the sensors most. On a real rig nearly all of it is common (`sample_data/rk4`): errors
+(p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is common (`sample_data/rk4`): errors
 taken as independent then cover single planes, but not their sum.
 
 Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
@@ -127,19 +126,15 @@ def _root(function: Callable[[float], float], within: FloatArray) -> float:
 
 
 class Runs(NamedTuple):
-    """Readings and what the mounted weights do of them, (R, S, C), and the influence vector, (S, C).
-
-    The latter of root mean square 1 at each speed.
-    """
+    """Readings and what the mounted weights do of them, (R, S, C), and what unbalances do, (P, S, C)."""
 
     Y: ComplexArray
     effect: ComplexArray
-    vector: ComplexArray
+    unbalance: ComplexArray
 
-    @property
-    def along(self) -> ComplexArray:
-        """What errors in common go along, (3, R, S, C)."""
-        return np.stack((self.Y, self.effect, np.broadcast_to(self.vector, self.Y.shape)))
+    def along(self, r: int) -> ComplexArray:
+        """What errors in common of a run go along, (2 + P, S, C): of p, of w, and the rest of f."""
+        return np.concatenate((self.Y[[r]], self.effect[[r]], self.unbalance))
 
     @property
     def size(self) -> FloatArray:
@@ -154,7 +149,7 @@ class Runs(NamedTuple):
 
 def runs_of(Y: ComplexArray, weights: ComplexArray, W: ComplexArray) -> Runs:
     """Runs with the readings (R, S, C) and weights (R, P) at the coefficients (S, C, P)."""
-    return Runs(Y, np.einsum("scp,rp->rsc", W, weights), influence_vector(W))
+    return Runs(Y, np.einsum("scp,rp->rsc", W, weights), unbalances(W))
 
 
 class Rows(NamedTuple):
@@ -225,7 +220,7 @@ def corrected_row(
 
 
 class RunColumns(NamedTuple):
-    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 3, S, C)."""
+    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 2 + P, S, C)."""
 
     own: FloatArray
     common: ComplexArray
@@ -234,17 +229,17 @@ class RunColumns(NamedTuple):
 def run_columns(run: RunErrors, runs: Runs) -> RunColumns:
     """Of such runs; the common ones as `Influence.common`."""
     own = np.einsum("b,brsc->rsc", run.sizes[:, 0] ** 2, runs.size)
-    common = [np.moveaxis(run.sizes[:, k, None, None, None] * runs.along, 0, 1) for k in (2, 1)]
-    return RunColumns(own, np.stack(common))
+    along = np.stack([runs.along(r) for r in range(len(runs.Y))])
+    p, w, f = run.sizes[:, [2, 1]]
+    each = np.stack((p, w, *[f] * len(runs.unbalance)), axis=1)
+    return RunColumns(own, each[:, None, :, None, None] * along)
 
 
-def influence_vector(W: ComplexArray) -> ComplexArray:
-    """In which all planes together move the sensors most, (S, C), of root mean square 1 at each speed."""
-    norms = np.linalg.norm(W, axis=(0, 1))
-    direction = np.linalg.svd((W / np.where(norms > 0, norms, 1.0)).reshape(-1, W.shape[-1]))[2][0].conj()
-    found = W @ (direction / np.where(norms > 0, norms, 1.0))
-    size = np.sqrt(np.mean(np.abs(found) ** 2, axis=1, keepdims=True))
-    return np.asarray(np.where(size > 0, found / np.where(size > 0, size, 1.0), 1.0))
+def unbalances(W: ComplexArray) -> ComplexArray:
+    """What further unbalances do, one in each plane, of equal effect and together of mean square 1, (P, S, C)."""
+    columns = np.moveaxis(W, -1, 0)
+    size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(1, 2), keepdims=True) * len(columns))
+    return np.asarray(columns / np.where(size > 0, size, 1.0))
 
 
 def marginal(common: ComplexArray) -> FloatArray:
@@ -331,8 +326,10 @@ def _of_row(rows: Rows, k: int, runs: Runs, grid: Grid) -> Spectrum:
     S, C = rows.e.shape[1:]
     n = S * C
     own = np.einsum("mb,r,brsc->msc", grid.mixtures, rows.share[k], runs.size).reshape(-1, n)
-    columns = (np.sqrt(rows.share[k])[:, None, None] * runs.along).reshape(3, -1, n)
-    common = np.einsum("mb,bij->mij", grid.mixtures, columns.swapaxes(1, 2) @ columns.conj())
+    root = np.sqrt(rows.share[k])[:, None, None]
+    columns = [root * runs.Y, root * runs.effect, np.sqrt(rows.share[k].sum()) * runs.unbalance]
+    each = [column.reshape(-1, n) for column in columns]
+    common = np.einsum("mb,bij->mij", grid.mixtures, [F.T @ F.conj() for F in each])
     by_speed = common * np.kron(np.eye(S), np.ones((C, C)))
     # of both directions; the least is rounding
     V = 2 * np.einsum("hk,kmij->mhij", grid.shares, [own[:, :, None] * np.eye(n), by_speed, common])
