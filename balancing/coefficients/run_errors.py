@@ -14,9 +14,9 @@ the corrected reading, Y₀ + W D, free of D. For a complex normal error of cova
 
 taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of the kinds. The
 grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once. A
-covariance of n numbers, λ times one of known size, is passed on with degrees of freedom ν:
+covariance of n numbers, with the eigenvalues λ relative to the one stated, is passed on with degrees of freedom ν:
 
-    s² = exp E[log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of λ χ²(n) over s².
+    log s² = E[mean log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of Σ λ χ²(1), over s².
 
 Source: restricted maximum likelihood (Patterson and Thompson 1971).
 """
@@ -79,35 +79,43 @@ class RunErrors:
         p, w, f = np.sum(self.sizes**2, axis=1)
         return np.asarray(p * np.abs(readings) ** 2 + w * np.abs(effect) ** 2 + f)
 
-    def degrees(
-        self, shares: FloatArray, n: int, reading_dof: float | None = None
-    ) -> tuple[float, float | None]:
-        """Scale and degrees of freedom of a covariance (n, n) that holds these errors.
+    def degrees(self, parts: FloatArray, reading_dof: float | None = None) -> tuple[float, float | None]:
+        """Scale and degrees of freedom of a covariance that holds these errors.
 
         Parameters
         ----------
-        shares
-            Of the readings' own errors and of the three kinds in it, (4,), sum 1.
-        n
-            Its size: the region of n numbers at 95 % is exact.
+        parts
+            What of it comes from the readings' own errors and from the three kinds, (4, n, n).
         reading_dof
             Degrees of freedom of the readings' own errors; None: known.
 
         Returns
         -------
-        s² to multiply it by, and ν of Student's t and F; None (normal) where nothing is open.
+        s² to multiply it by, and ν of Student's t and F (the region of n numbers at 95 % is exact); None
+        (normal) where nothing is open.
         """
         from scipy.special import chdtr, chdtri, fdtri
 
-        values = shares[0] * (self.ratios[:, 0] if self.merged else 1.0) + self.ratios @ shares[1:]
-        values = np.maximum(values, 1e-6 * values.max())
-        size = float(np.exp(self.probability @ np.log(values)))
-        spread = 0.0 if reading_dof is None else float(shares[0]) ** 2 / reading_dof
+        total = parts.sum(axis=0)
+        n = len(total)
+        std = np.sqrt(np.maximum(np.diag(total), 1e-300))
+        values, vectors = np.linalg.eigh(total / np.outer(std, std))
+        root = vectors / np.sqrt(np.maximum(values, 1e-12 * values[-1])) / std[:, None]
+        white = root.T @ parts @ root
+        share = float(np.trace(white[0])) / n
+        spread = 0.0 if reading_dof is None else share**2 / reading_dof
+        likely = self.probability > _LIKELY * self.probability.max()
+        weight, ratios = self.probability[likely] / self.probability[likely].sum(), self.ratios[likely]
+        first = ratios[:, 0] if self.merged else np.ones(len(ratios))
+        each = np.einsum("gk,kij->gij", np.column_stack((first, ratios)), white)
+        values = np.linalg.eigvalsh(each).clip(1e-9)
+        size = float(np.exp(weight @ np.log(values).mean(axis=1)))
         if values.max() - values.min() < 1e-3 * size:
             return size, 1 / spread if spread else None
-        bound = _root(
-            lambda c: float(self.probability @ chdtr(n, c / values)) - 0.95, chdtri(n, 0.05) * values
-        )
+        # a sum of squares of unlike variances is a χ² of the same mean and variance
+        unit = (values**2).sum(axis=1) / values.sum(axis=1)
+        dof = values.sum(axis=1) / unit
+        bound = _root(lambda c: float(weight @ chdtr(dof, c / unit)) - 0.95, chdtri(dof, 0.05) * unit)
         wanted = bound / size
         if wanted <= chdtri(n, 0.05) * 1.001:
             return bound / float(chdtri(n, 0.05)), 1 / spread if spread else None
