@@ -93,7 +93,7 @@ def difference(influence: balancing.Influence, one: balancing.Trials) -> balanci
     assert bare is not None and covariance is not None and common is not None and errors is not None
     columns = run_columns(influence.run_errors, runs_of(one.mean, one.weights, influence.W))
     flip = np.array([-1.0, -1.0, *np.ones(covariance.shape[-1] - 2)])  # −Y₀, and the new run's own
-    more = np.zeros((2, 3, *common.shape[2:]), dtype=complex)
+    more = np.zeros((2, columns.common.shape[2], *common.shape[2:]), dtype=complex)
     more[..., 0] = columns.common[:, 0]
     joint = covariance * np.outer(flip, flip) + marginal(more)
     own = mean_covariance(one, errors)[0] + columns.own[0, ..., None, None] * np.eye(2)

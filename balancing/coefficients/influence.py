@@ -314,7 +314,7 @@ def joint_covariance(
     total = sum(each[1:], each[0])
     shares = shares_of(each, total)
     own_between = float(shares[1] / (shares[0] + shares[1])) if shares[:2].any() else 0.0
-    return symmetric(total), common, run.degrees(shares, 2, model.dof)[1], own_between
+    return symmetric(total), common, run.degrees(shares[:, None, None] * np.eye(2), model.dof)[1], own_between
 
 
 def _gain(A: ComplexArray, reading: FloatArray, between: FloatArray) -> ComplexArray:

@@ -4,8 +4,7 @@ Mounting, thermal state, drift and what is not linear change a whole run, howeve
 Y of a run has, besides its own error, one of the variance p²|Y|² + w²|W T|² + f² in each direction, in
 proportion to the reading, to what the mounted weights do, and to neither; of three kinds: its own at each
 sensor; common to the sensors at a speed; common to the run. What is common changes all readings in proportion
-(p), as other weights do (w), or as a further unbalance does (f): along the influence vector, in which all
-planes together move the sensors most. On a real rig nearly all of it is common (`sample_data/rk4`): errors
+(p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is common (`sample_data/rk4`): errors
 taken as independent then cover single planes, but not their sum.
 
 Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
@@ -15,9 +14,9 @@ the corrected reading, Y₀ + W D, free of D. For a complex normal error of cova
 
 taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of the kinds. The
 grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once. A
-covariance of n numbers, λ times one of known size, is passed on with degrees of freedom ν:
+covariance of n numbers, with the eigenvalues λ relative to the one stated, is passed on with degrees of freedom ν:
 
-    s² = exp E[log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of λ χ²(n) over s².
+    log s² = E[mean log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of Σ λ χ²(1), over s².
 
 Source: restricted maximum likelihood (Patterson and Thompson 1971).
 """
@@ -41,13 +40,12 @@ SIZES = np.geomspace(3e-4, 1.0, 12)
 """Whole size relative to the root mean square reading; refined where the likelihood is."""
 MIXTURES = np.array([(1.0, 0, 0), (0.6, 0, 0.4), (0, 0, 1.0), (0, 0.5, 0.5), (0.5, 0.5, 0)])
 """Shares of p, w and f in the mean variance of the readings."""
-SHARES = (0.04, 0.3, 0.6, 1.0)
-"""Of the kind own in the variance; no error between runs is common to all sensors to the last digit."""
+SHARES = (0.04, 0.3, 0.6)
+"""Of the kind own in the variance, or 1; no error between runs is common to all sensors to the last digit."""
 EXPLAINED = 0.95
 """Level of the test by which the corrected reading takes part."""
 FINE = 20
 _LIKELY, _UNLIKELY, _POSSIBLE = 1e-5, 1e-3, 0.05
-_DIFFUSE = 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,35 +87,43 @@ class RunErrors:
         p, w, f = np.sum(self.sizes**2, axis=1)
         return np.asarray(p * np.abs(readings) ** 2 + w * np.abs(effect) ** 2 + f)
 
-    def degrees(
-        self, shares: FloatArray, n: int, reading_dof: float | None = None
-    ) -> tuple[float, float | None]:
-        """Scale and degrees of freedom of a covariance (n, n) that holds these errors.
+    def degrees(self, parts: FloatArray, reading_dof: float | None = None) -> tuple[float, float | None]:
+        """Scale and degrees of freedom of a covariance that holds these errors.
 
         Parameters
         ----------
-        shares
-            Of the readings' own errors and of the three kinds in it, (4,), sum 1.
-        n
-            Its size: the region of n numbers at 95 % is exact.
+        parts
+            What of it comes from the readings' own errors and from the three kinds, (4, n, n).
         reading_dof
             Degrees of freedom of the readings' own errors; None: known.
 
         Returns
         -------
-        s² to multiply it by, and ν of Student's t and F; None (normal) where nothing is open.
+        s² to multiply it by, and ν of Student's t and F (the region of n numbers at 95 % is exact); None
+        (normal) where nothing is open.
         """
         from scipy.special import chdtr, chdtri, fdtri
 
-        values = shares[0] * (self.ratios[:, 0] if self.merged else 1.0) + self.ratios @ shares[1:]
-        values = np.maximum(values, 1e-6 * values.max())
-        size = float(np.exp(self.probability @ np.log(values)))
-        spread = 0.0 if reading_dof is None else float(shares[0]) ** 2 / reading_dof
+        total = parts.sum(axis=0)
+        n = len(total)
+        std = np.sqrt(np.maximum(np.diag(total), 1e-300))
+        values, vectors = np.linalg.eigh(total / np.outer(std, std))
+        root = vectors / np.sqrt(np.maximum(values, 1e-12 * values[-1])) / std[:, None]
+        white = root.T @ parts @ root
+        share = float(np.trace(white[0])) / n
+        spread = 0.0 if reading_dof is None else share**2 / reading_dof
+        likely = self.probability > _LIKELY * self.probability.max()
+        weight, ratios = self.probability[likely] / self.probability[likely].sum(), self.ratios[likely]
+        first = ratios[:, 0] if self.merged else np.ones(len(ratios))
+        each = np.einsum("gk,kij->gij", np.column_stack((first, ratios)), white)
+        values = np.linalg.eigvalsh(each).clip(1e-9)
+        size = float(np.exp(weight @ np.log(values).mean(axis=1)))
         if values.max() - values.min() < 1e-3 * size:
             return size, 1 / spread if spread else None
-        bound = _root(
-            lambda c: float(self.probability @ chdtr(n, c / values)) - 0.95, chdtri(n, 0.05) * values
-        )
+        # a sum of squares of unlike variances is a χ² of the same mean and variance
+        unit = (values**2).sum(axis=1) / values.sum(axis=1)
+        dof = values.sum(axis=1) / unit
+        bound = _root(lambda c: float(weight @ chdtr(dof, c / unit)) - 0.95, chdtri(dof, 0.05) * unit)
         wanted = bound / size
         if wanted <= chdtri(n, 0.05) * 1.001:
             return bound / float(chdtri(n, 0.05)), 1 / spread if spread else None
@@ -136,19 +142,15 @@ def _root(function: Callable[[float], float], within: FloatArray) -> float:
 
 
 class Runs(NamedTuple):
-    """Readings and what the mounted weights do of them, (R, S, C), and the influence vector, (S, C).
-
-    The latter of root mean square 1 at each speed.
-    """
+    """Readings and what the mounted weights do of them, (R, S, C), and what unbalances do, (P, S, C)."""
 
     Y: ComplexArray
     effect: ComplexArray
-    vector: ComplexArray
+    unbalance: ComplexArray
 
-    @property
-    def along(self) -> ComplexArray:
-        """What errors in common go along, (3, R, S, C)."""
-        return np.stack((self.Y, self.effect, np.broadcast_to(self.vector, self.Y.shape)))
+    def along(self, r: int) -> ComplexArray:
+        """What errors in common of a run go along, (2 + P, S, C): of p, of w, and the rest of f."""
+        return np.concatenate((self.Y[[r]], self.effect[[r]], self.unbalance))
 
     @property
     def size(self) -> FloatArray:
@@ -163,7 +165,7 @@ class Runs(NamedTuple):
 
 def runs_of(Y: ComplexArray, weights: ComplexArray, W: ComplexArray) -> Runs:
     """Runs with the readings (R, S, C) and weights (R, P) at the coefficients (S, C, P)."""
-    return Runs(Y, np.einsum("scp,rp->rsc", W, weights), influence_vector(W))
+    return Runs(Y, np.einsum("scp,rp->rsc", W, weights), unbalances(W))
 
 
 class Rows(NamedTuple):
@@ -234,7 +236,7 @@ def corrected_row(
 
 
 class RunColumns(NamedTuple):
-    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 3, S, C)."""
+    """Errors between runs: own variance of each reading, (R, S, C); common columns, (2, R, 2 + P, S, C)."""
 
     own: FloatArray
     common: ComplexArray
@@ -243,17 +245,17 @@ class RunColumns(NamedTuple):
 def run_columns(run: RunErrors, runs: Runs) -> RunColumns:
     """Of such runs; the common ones as `Influence.common`."""
     own = np.einsum("b,brsc->rsc", run.sizes[:, 0] ** 2, runs.size)
-    common = [np.moveaxis(run.sizes[:, k, None, None, None] * runs.along, 0, 1) for k in (2, 1)]
-    return RunColumns(own, np.stack(common))
+    along = np.stack([runs.along(r) for r in range(len(runs.Y))])
+    p, w, f = run.sizes[:, [2, 1]]
+    each = np.stack((p, w, *[f] * len(runs.unbalance)), axis=1)
+    return RunColumns(own, each[:, None, :, None, None] * along)
 
 
-def influence_vector(W: ComplexArray) -> ComplexArray:
-    """In which all planes together move the sensors most, (S, C), of root mean square 1 at each speed."""
-    norms = np.linalg.norm(W, axis=(0, 1))
-    direction = np.linalg.svd((W / np.where(norms > 0, norms, 1.0)).reshape(-1, W.shape[-1]))[2][0].conj()
-    found = W @ (direction / np.where(norms > 0, norms, 1.0))
-    size = np.sqrt(np.mean(np.abs(found) ** 2, axis=1, keepdims=True))
-    return np.asarray(np.where(size > 0, found / np.where(size > 0, size, 1.0), 1.0))
+def unbalances(W: ComplexArray) -> ComplexArray:
+    """What further unbalances do, one in each plane, of equal effect and together of mean square 1, (P, S, C)."""
+    columns = np.moveaxis(W, -1, 0)
+    size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(1, 2), keepdims=True) * len(columns))
+    return np.asarray(columns / np.where(size > 0, size, 1.0))
 
 
 def marginal(common: ComplexArray) -> FloatArray:
@@ -275,84 +277,99 @@ def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
     return np.asarray(values / values.sum() if values.sum() > 0 else np.eye(len(values))[0])
 
 
-def _grid(whole: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> FloatArray:
-    """Squares of `RunErrors.sizes` with all sizes, mixtures and shares, (G, 3, 3)."""
+class Grid(NamedTuple):
+    """Points: every size, every mixture of p, w and f (M, 3), every set of shares of the kinds (H, 3).
+
+    A mixture gives squares of `RunErrors.sizes` relative to the square of the size.
+    """
+
+    sizes: FloatArray
+    mixtures: FloatArray
+    shares: FloatArray
+
+    @property
+    def points(self) -> FloatArray:
+        """Squares of `RunErrors.sizes`, sizes first, (G, 3, 3)."""
+        found = np.einsum("g,mb,hk->gmhbk", self.sizes**2, self.mixtures, self.shares)
+        return np.asarray(found.reshape(-1, 3, 3))
+
+
+def _grid(sizes: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> Grid:
+    """Of all mixtures and shares that such runs tell apart."""
     _, S, C = runs.Y.shape
     shares = [(1.0, 0.0, 0.0)]
     if S * C > 1:
-        shares += [(own, 0.0, 1 - own) for own in SHARES[:-1]]
+        shares += [(own, 0.0, 1 - own) for own in SHARES]
     if S > 1 and C > 1:
-        shares += [
-            (own, (1 - own) * part, (1 - own) * (1 - part)) for own in SHARES[:-1] for part in (0.5, 1.0)
-        ]
+        shares += [(own, (1 - own) * part, (1 - own) * (1 - part)) for own in SHARES for part in (0.5, 1.0)]
     used = mixtures[(mixtures[:, 1] == 0) | bool(runs.mean[1] > 0)]
     each = used / np.where(runs.mean > 0, runs.mean, 1.0) * runs.mean[0]
-    points = np.einsum("g,mb,hk->gmhbk", whole**2, each, np.array(shares))
-    return np.asarray(points.reshape(-1, 3, 3))
+    return Grid(sizes, each, np.array(shares))
 
 
-def likelihood(rows: Rows, runs: Runs, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Log det Σ and eᴴ Σ⁻¹ e of residuals at every point of a grid (G, 3, 3), (G,) each."""
-    own = np.einsum("gb,kr,brsc->gksc", at[..., 0], rows.share, runs.size)
-    p, w, f = np.sqrt(rows.share)[..., None, None] * runs.along[:, None]  # (K, R, S, C)
-    # the influence vector is the same in every run: one column
-    f = np.sqrt(rows.share.sum(axis=1))[:, None, None, None] * runs.vector
-    columns = np.concatenate((p, w, f), axis=1)  # (K, M, S, C)
+class Spectrum(NamedTuple):
+    """Residuals in coordinates that are independent for errors of every size s: variance s² + `least`.
 
-    def scale(kind: int) -> FloatArray:
-        each = np.sqrt(at[..., kind])
-        return np.repeat(each, (len(runs.Y), len(runs.Y), 1), axis=1)
-
-    return _gaussian(rows, rows.known + own, columns, scale(1), scale(2))
-
-
-def _gaussian(
-    rows: Rows, variance: FloatArray, columns: ComplexArray, by_speed: FloatArray, by_run: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Log det Σ and eᴴ Σ⁻¹ e, (G,) each.
-
-    Own variances (G, K, S, C) in one direction; columns (K, M, S, C) in common, times the scales (G, M).
+    `parts` (M·H, n) are the squares of the coordinates, `log` (M·H,) what their scales add to log det Σ.
     """
-    K, S, C = rows.e.shape
-    P = rows.free.shape[-1]
-    d = 2 * np.maximum(variance, 1e-12 * np.mean(np.abs(rows.e) ** 2) + 1e-300)  # of both directions
-    last = np.zeros((K, P, S, C), dtype=complex)
-    last[-1:] = np.moveaxis(rows.free, -1, 0)
-    U = np.concatenate((columns, last), axis=1)
-    weighted = U / d[:, :, None]  # (G, K, M, S, C)
-    gram = np.einsum("gkmsc,knsc->gksmn", weighted.conj(), U)
-    h = np.einsum("gkmsc,ksc->gksm", weighted.conj(), rows.e)
-    q = np.einsum("gksc,ksc->gk", 1 / d, np.abs(rows.e) ** 2)
-    log = np.log(d).sum(axis=(2, 3))
-    free = 0.0 if not P else np.mean(np.abs(rows.e[-1]) ** 2) / np.mean(np.abs(rows.free) ** 2)
 
-    def scales(common: FloatArray, unknown: float) -> FloatArray:
-        return np.asarray(
-            np.sqrt(2 * np.concatenate((common**2, np.full((len(common), P), unknown)), axis=1))
-        )
+    log: FloatArray
+    least: FloatArray
+    parts: FloatArray
 
-    if S > 1:
-        gram, h, less, more = _reduced(gram, h, scales(by_speed, 0.0)[:, None, None])
-        q, log = q - less.sum(axis=-1), log + more.sum(axis=-1)
-    else:
-        by_run = np.hypot(by_run, by_speed)
-    wide = scales(by_run, _DIFFUSE * free)[:, None]
-    _, _, less, more = _reduced(gram.sum(axis=2), h.sum(axis=2), wide)
-    return (log + more).sum(axis=1), np.maximum((q - less).sum(axis=1), 0.0)
+    def at(self, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Log det Σ and eᴴ Σ⁻¹ e at every size, (sizes · M · H,) each."""
+        log, q = np.empty((2, len(sizes), len(self.log)))
+        for k, size in enumerate(sizes):
+            variance = np.maximum(size**2 + self.least, 1e-300)
+            log[k] = self.log + np.log(variance).sum(axis=1)
+            q[k] = (self.parts / variance).sum(axis=1)
+        return log.ravel(), q.ravel()
 
 
-def _reduced(
-    gram: ComplexArray, h: ComplexArray, scale: FloatArray
-) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
-    """Uᴴ Σ⁻¹ U, Uᴴ Σ⁻¹ e, what eᴴ Σ⁻¹ e loses and log det Σ gains, when Σ gets U scale² Uᴴ (Woodbury)."""
-    n = gram.shape[-1]
-    sides = scale[..., None] * np.concatenate((gram, h[..., None]), axis=-1)
-    inner = np.eye(n) + sides[..., :n] * scale[..., None, :]
-    log = np.linalg.slogdet(inner)[1]
-    solved = np.linalg.solve(inner, sides)
-    found = np.swapaxes(sides[..., :n].conj(), -1, -2) @ solved
-    less = np.sum(scale * h.conj() * solved[..., n], axis=-1).real
-    return gram - found[..., :n], h - found[..., n], less, log
+def spectrum(rows: Rows, runs: Runs, grid: Grid) -> Spectrum:
+    """Of all rows, at every mixture and share of a grid."""
+    found = [_of_row(rows, k, runs, grid) for k in range(len(rows.e))]
+    return Spectrum(
+        np.sum([each.log for each in found], axis=0),
+        np.concatenate([each.least for each in found], axis=1),
+        np.concatenate([each.parts for each in found], axis=1),
+    )
+
+
+def _of_row(rows: Rows, k: int, runs: Runs, grid: Grid) -> Spectrum:
+    """Σ = s² V + K = L U (s² + μ) Uᴴ Lᴴ, with V = L Lᴴ and the eigenvalues μ of L⁻¹ K L⁻ᴴ."""
+    S, C = rows.e.shape[1:]
+    n = S * C
+    own = np.einsum("mb,r,brsc->msc", grid.mixtures, rows.share[k], runs.size).reshape(-1, n)
+    root = np.sqrt(rows.share[k])[:, None, None]
+    columns = [root * runs.Y, root * runs.effect, np.sqrt(rows.share[k].sum()) * runs.unbalance]
+    each = [column.reshape(-1, n) for column in columns]
+    common = np.einsum("mb,bij->mij", grid.mixtures, [F.T @ F.conj() for F in each])
+    by_speed = common * np.kron(np.eye(S), np.ones((C, C)))
+    # of both directions; the least is rounding
+    V = 2 * np.einsum("hk,kmij->mhij", grid.shares, [own[:, :, None] * np.eye(n), by_speed, common])
+    V = V.reshape(-1, n, n) + 1e-9 * np.trace(V, axis1=2, axis2=3).mean() / n * np.eye(n)
+    known = 2 * rows.known[k].ravel()
+    e, V, K = _without(rows.free if k == len(rows.e) - 1 else rows.free[..., :0], rows.e[k], V, known)
+    L = np.linalg.cholesky(V)
+    inverse = np.linalg.inv(L)
+    least, U = np.linalg.eigh(inverse @ K @ inverse.conj().swapaxes(1, 2))
+    parts = np.abs(U.conj().swapaxes(1, 2) @ (inverse @ e)[..., None])[..., 0] ** 2
+    log = 2 * np.log(np.einsum("gii->gi", L).real).sum(axis=1)
+    return Spectrum(log, np.maximum(least, 0.0), parts)
+
+
+def _without(
+    free: ComplexArray, e: ComplexArray, V: ComplexArray, known: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Residuals and their covariances, (…, n, n) and a diagonal, without what the free unknowns do."""
+    n, P = e.size, free.shape[-1]
+    if not P:
+        return e.ravel(), V, np.diag(known).astype(complex)
+    basis = np.linalg.qr(free.reshape(n, P), mode="complete")[0][:, P:]
+    left = basis.conj().T
+    return left @ e.ravel(), left @ V @ basis, left @ (known[:, None] * basis)
 
 
 def estimated(rows: Sequence[Rows], runs: Runs) -> RunErrors:
@@ -366,26 +383,28 @@ def estimated(rows: Sequence[Rows], runs: Runs) -> RunErrors:
         All of them.
     """
     coarse = _grid(SIZES, runs)
-    rows = _agreeing(rows, runs, coarse, _posterior(rows[:1], runs, coarse))
-    table = _posterior(rows, runs, coarse).reshape(len(SIZES), -1)
+    found = [spectrum(each, runs, coarse) for each in rows if each.dof > 0]
+    found = _agreeing(rows, found, SIZES, _posterior(found[:1], SIZES))
+    table = _posterior(found, SIZES).reshape(len(SIZES), -1)
     seen = np.flatnonzero(table.sum(axis=1) > _LIKELY * table.sum(axis=1).max())
     low, high = SIZES[max(seen[0] - 1, 0)], SIZES[min(seen[-1] + 1, len(SIZES) - 1)]
     sizes = np.geomspace(low, high, FINE)
-    kept = np.flatnonzero(table.sum(axis=0) > _UNLIKELY * table.sum(axis=0).max())
-    fine = _grid(sizes, runs).reshape(FINE, -1, 3, 3)[:, kept].reshape(-1, 3, 3)
-    probability = _posterior(rows, runs, fine)
+    probability = _posterior(found, sizes)
     cumulated = np.cumsum(probability.reshape(FINE, -1).sum(axis=1))
     limits = np.interp((0.025, 0.975), cumulated, sizes) * np.sqrt(runs.mean[0])
-    return _of_grid(fine, probability, runs, "estimated", (float(limits[0]), float(limits[1])))
+    points = coarse._replace(sizes=sizes).points
+    return _of_grid(points, probability, runs, "estimated", (float(limits[0]), float(limits[1])))
 
 
 def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origin: Origin) -> RunErrors:
     """Errors of known size; the data (as `estimated`) say only how much of them is common."""
-    at = _known(runs, relative, floor)
-    if not at.any():
+    grid = _known(runs, relative, floor)
+    if not grid.sizes.any():
         return RunErrors(origin=origin)
-    rows = _agreeing(rows, runs, at[:1], np.ones(1))
-    return _of_grid(at, _posterior(rows, runs, at), runs, origin, None)
+    found = [spectrum(each, runs, grid) for each in rows if each.dof > 0]
+    found = _agreeing(rows, found, grid.sizes, np.ones(len(grid.points)))
+    probability = _posterior(found, grid.sizes) if found else _normal(np.zeros(len(grid.points)))
+    return _of_grid(grid.points, probability, runs, origin, None)
 
 
 def scatter(
@@ -396,7 +415,8 @@ def scatter(
     Whatever is common: shares count by how well they fit at the best size.
     """
     n = sum(each.dof for each in rows)
-    log, q = _likelihood(rows, runs, _known(runs, relative, floor))
+    grid = _known(runs, relative, floor)
+    log, q = _likelihood([spectrum(each, runs, grid) for each in rows], grid.sizes)
     weight = _normal(-log - n * np.log(np.maximum(q, 1e-300)))
     return float(np.sqrt(weight @ q / n)), _chance(q, n, weight)
 
@@ -422,56 +442,57 @@ def seen_in(
     common
         Columns of the residual in common, as `Influence.common`: (2, M, S, C).
     """
-    rows = Rows(residual[None], np.ones((1, 1)), own[None], W)
-    if rows.dof <= 0:
+    dof = residual.size - W.shape[-1]
+    if dof <= 0:
         return 1.0, run
-    share = np.array([1 - between, between])
-    first = run.ratios[:, 0]
-    factor = share[0] * (first if run.merged else 1.0) + share[1] * first
-    columns = np.zeros((2, 0, *own.shape)) if common is None else common
-    M = columns.shape[1]
-    scale = np.sqrt(run.ratios[:, 1:].T)
-    nothing = np.zeros((len(first), M))
-    by_run = np.concatenate((np.repeat(scale[1][:, None], M, axis=1), nothing), axis=1)
-    by_speed = np.concatenate((nothing, np.repeat(scale[0][:, None], M, axis=1)), axis=1)
-    both = np.concatenate((columns[0], columns[1]))[None]
-    log, q = _gaussian(rows, factor[:, None, None, None] * own[None, None], both, by_speed, by_run)
-    known = np.log(np.maximum(run.probability, 1e-300))
-    return _chance(q, rows.dof, run.probability), replace(run, probability=_normal(known - log - q))
+    likely = run.probability > _UNLIKELY * run.probability.max()
+    probability, ratios = _normal(np.log(run.probability[likely])), run.ratios[likely]
+    first = ratios[:, 0]
+    factor = (1 - between) * (first if run.merged else 1.0) + between * first
+    n = residual.size
+    F = np.zeros((2, 1, n)) if common is None else common.reshape(2, -1, n)
+    whole, by_speed = F.swapaxes(1, 2) @ F.conj()
+    by_speed = by_speed * np.kron(np.eye(len(residual)), np.ones((residual.shape[1],) * 2))
+    parts = 2 * np.stack((np.diag(own.ravel()).astype(complex), by_speed, whole))
+    e, parts, _ = _without(W, residual, parts, own.ravel())
+    V = np.einsum("gk,kij->gij", np.column_stack((factor, ratios[:, 1:])), parts)
+    V += 1e-12 * np.trace(V, axis1=1, axis2=2).max() * np.eye(len(e))
+    q = (e.conj() @ np.linalg.solve(V, e[:, None])[..., 0].T).real
+    seen = _normal(np.log(probability) - np.linalg.slogdet(V)[1] - q)
+    return _chance(q, dof, probability), replace(run, probability=seen, ratios=ratios)
 
 
-def _agreeing(rows: Sequence[Rows], runs: Runs, at: FloatArray, probability: FloatArray) -> Sequence[Rows]:
-    """The rows without the corrected reading where it is beyond what the grid explains (95 %).
+def _agreeing(
+    rows: Sequence[Rows], found: Sequence[Spectrum], sizes: FloatArray, probability: FloatArray
+) -> list[Spectrum]:
+    """Without that of the corrected reading where it is beyond what the grid explains (95 %).
 
     Unbalance outside the planes leaves such a rest; it says nothing of the errors.
     """
-    kept = [each for each in rows if not each.free.shape[-1]]
-    for each in (each for each in rows if each.free.shape[-1]):
-        q = likelihood(each, runs, at)[1]
-        if _chance(q, each.dof, probability) > 1 - EXPLAINED:
-            kept.append(each)
-    return kept
+    used = [each for each in rows if each.dof > 0]
+    return [
+        each
+        for row, each in zip(used, found, strict=True)
+        if not row.free.shape[-1] or _chance(each.at(sizes)[1], row.dof, probability) > 1 - EXPLAINED
+    ]
 
 
-def _known(runs: Runs, relative: float, floor: float) -> FloatArray:
+def _known(runs: Runs, relative: float, floor: float) -> Grid:
     """Every share of errors of one size, p and f."""
     parts = np.array([relative**2, 0.0, floor**2]) * runs.mean
-    mixture = parts / (parts.sum() or 1.0)
-    return _grid(np.sqrt([parts.sum() / runs.mean[0]]), runs, mixture[None])
+    whole = parts.sum()
+    mixture = parts / whole if whole else np.array([1.0, 0.0, 0.0])
+    return _grid(np.sqrt([whole / (runs.mean[0] or 1.0)]), runs, mixture[None])
 
 
-def _likelihood(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sum of `likelihood` over all rows."""
-    log, q = np.zeros((2, len(at)))
-    for each in rows:
-        if each.dof > 0:
-            more = likelihood(each, runs, at)
-            log, q = log + more[0], q + more[1]
-    return log, q
+def _likelihood(found: Sequence[Spectrum], sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sum over all rows."""
+    log, q = zip(*(each.at(sizes) for each in found), strict=True)
+    return np.sum(log, axis=0), np.sum(q, axis=0)
 
 
-def _posterior(rows: Sequence[Rows], runs: Runs, at: FloatArray) -> FloatArray:
-    log, q = _likelihood(rows, runs, at)
+def _posterior(found: Sequence[Spectrum], sizes: FloatArray) -> FloatArray:
+    log, q = _likelihood(found, sizes)
     return _normal(-log - q)
 
 

@@ -93,8 +93,8 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
         for p, nothing in zip(result.planes, empty, strict=True)
         if nothing
     ]
-    unexplained = result.chi_square is not None and result.fit_dof and not result.explained
-    if unexplained and not result.active:
+    told = result.explained or result.active
+    if result.chi_square is not None and result.fit_dof and not told:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "

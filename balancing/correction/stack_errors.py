@@ -8,14 +8,7 @@ import numpy as np
 
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import (
-    RunErrors,
-    Runs,
-    influence_vector,
-    run_columns,
-    seen_in,
-    shares_of,
-)
+from balancing.coefficients.run_errors import RunErrors, run_columns, runs_of, seen_in
 from balancing.data.errors import reading_covariance, symmetric
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
@@ -66,9 +59,9 @@ class StackErrors:
         if fitted.covariance is None or not fitted.parts:
             return fitted.covariance, self.start.model.dof
         run = self._after(fitted.weights)[1] if self.fresh and fitted.explained else self.run
-        own, speed, whole = shares_of(fitted.parts, symmetric(sum(fitted.parts[1:], fitted.parts[0])))
-        shares = np.array([own * (1 - self.between), own * self.between, speed, whole])
-        scale, dof = run.degrees(shares, len(fitted.covariance), self.start.model.dof)
+        own, speed, whole = fitted.parts
+        parts = np.stack((own * (1 - self.between), own * self.between, speed, whole))
+        scale, dof = run.degrees(parts, self.start.model.dof)
         return fitted.covariance * scale, dof
 
     def check_run(self, D: ComplexArray, after: ComplexArray) -> FloatArray:
@@ -88,9 +81,7 @@ class StackErrors:
         from scipy.special import gammaincinv
 
         each = self.check_run(D, after).reshape(-1, 2, 2)
-        further = run_columns(
-            self.run, Runs(after[None], (after - self.Y)[None], influence_vector(self.W))
-        ).common
+        further = run_columns(self.run, runs_of(after[None], D[None], self.W)).common
         columns = further.reshape(2, -1, *after.shape)
         if self.common is not None:
             columns = np.concatenate((self.common @ np.concatenate(([1.0], D)), columns), axis=1)
