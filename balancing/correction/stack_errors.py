@@ -49,9 +49,9 @@ class StackErrors:
     between: float
     fresh: bool
 
-    def explain(self, D: ComplexArray) -> bool:
-        """Whether errors alone may leave what the weights leave (95 %)."""
-        return self._after(D)[0] > 1 - UNEXPLAINED
+    def explain(self, D: ComplexArray, chance: float = 1 - UNEXPLAINED) -> bool:
+        """Whether errors alone may leave what the weights leave: more, with at least this probability."""
+        return self._after(D)[0] > chance
 
     def weights(self, fitted: Fitted) -> tuple[FloatArray | None, float | None]:
         """Covariance of the weights, (2P, 2P), and its degrees of freedom."""
