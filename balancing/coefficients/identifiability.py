@@ -118,24 +118,16 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
 _REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 
-def check_resolution(
-    influence: Influence,
-    W: ComplexArray,
-    covariance: FloatArray | None,
-    planes: Sequence[str],
-    *,
-    refuse: bool,
-) -> tuple[str, ...]:
+def check_resolution(influence: Influence, planes: Sequence[str], *, refuse: bool) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
+
+    Errors that are assumed refuse nothing: the digits of the readings do, or without an end of them, for
+    coefficients from runs, a condition number that no instrument supports.
 
     Parameters
     ----------
     influence
-        Where the coefficients come from.
-    W
-        Those in question, stacked, shape (N, P), of full rank.
-    covariance
-        Of (Re W₁, Im W₁, …) of each reading, (N, 2P, 2P), or None.
+        Coefficients at the speeds and sensors in question, of full rank in these planes.
     planes
         Names.
     refuse
@@ -152,26 +144,41 @@ def check_resolution(
     """
     if len(planes) < 2:
         return ()
-    if covariance is not None and covariance.any():
-        found = resolution(W, covariance)
-        if found.significant(len(W), influence.dof):
-            return ()
-        ratio = np.sqrt(found.chi_square / found.n)
-        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
-        alike = _large(found.direction)
-    elif covariance is None and influence.last_run is not None:
-        singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-        if singular[0] <= HOPELESS * singular[-1]:
-            return ()
-        condition = singular[0] / singular[-1]
-        within = f": no instrument supports a condition number of {condition:.2g}"
-        alike = acting_alike(W)
-    else:
+    chosen = [influence.planes.index(plane) for plane in planes]
+    W = influence.W[..., chosen].reshape(-1, len(chosen))
+    assumed = influence.error_source == "assumed"
+    alike, within = _unresolved(influence, chosen, influence.digits if assumed else influence.covariance)
+    if not within and assumed:
+        refuse = False
+        alike, within = _unresolved(influence, chosen, influence.covariance)
+    if not within:
         return ()
     words = _alike(W, alike, planes) + within + _REMEDY
     if refuse:
         raise refusal(words, influence.warnings)
     return (words,)
+
+
+def _unresolved(
+    influence: Influence, chosen: list[int], covariance: FloatArray | None
+) -> tuple[list[int], str]:
+    """Planes that act alike within the errors of a covariance of (Y₀, W), and how; none and no words."""
+    W = influence.W[..., chosen].reshape(-1, len(chosen))
+    if covariance is not None and covariance[..., 2:, 2:].any():
+        index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
+        own = covariance[..., index[:, None], index].reshape(-1, len(index), len(index))
+        found = resolution(W, own)
+        if found.significant(len(W), influence.dof):
+            return [], ""
+        ratio = np.sqrt(found.chi_square / found.n)
+        return _large(found.direction), (
+            f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        )
+    singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+    condition = singular[0] / singular[-1]
+    if covariance is None and influence.last_run is not None and condition > HOPELESS:
+        return acting_alike(W), f": no instrument supports a condition number of {condition:.2g}"
+    return [], ""
 
 
 def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:

@@ -81,6 +81,8 @@ class Influence:
         What the user should know.
     notes
         What the user may want to know.
+    digits
+        The covariance that the digits of the readings alone would give; None: they have no end.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
     """
@@ -103,6 +105,7 @@ class Influence:
     reading_dof: float | None = None
     own_between: float = 0.0
     notes: tuple[str, ...] = ()
+    digits: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -112,6 +115,7 @@ class Influence:
         self._frozen("W", (S, C, P), complex)
         self._frozen("baseline", (S, C), complex)
         self._frozen("covariance", (S, C, 2 * P + 2, 2 * P + 2), float)
+        self._frozen("digits", (S, C, 2 * P + 2, 2 * P + 2), float)
         self._frozen("last_weights", (P,), complex)
         if self.common is not None:
             self._frozen("common", (2, np.shape(self.common)[1], S, C, P + 1), complex)
@@ -148,6 +152,7 @@ class Influence:
             baseline=cut(self.baseline),
             covariance=cut(self.covariance),
             common=common,
+            digits=cut(self.digits),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -219,9 +224,9 @@ def estimate_influence(trials: Trials) -> Influence:
     if merged:
         model, run = _as_readings(run, trials, model)
         reading = mean_covariance(trials, model.errors)
-    found, G, runs = _with_errors(trials, A, theta, reading, model, run)
+    found, runs = _with_errors(trials, A, theta, reading, model, run)
     try:
-        check_effects(trials, found.W, found.covariance if known(model) else _digits(trials, G))
+        check_effects(trials, found.W, found.covariance if known(model) else found.digits)
     except UndeterminedError as error:
         raise refusal(str(error), trials.warnings + repeated) from error
     warnings = trials.warnings + repeated + model.warnings
@@ -255,8 +260,8 @@ def _with_errors(
     reading: FloatArray,
     model: ErrorModel,
     run: RunErrors,
-) -> tuple[Influence, ComplexArray, Runs]:
-    """Coefficients with rows weighted by known errors, starting from others (S, C, P + 1); gain; runs."""
+) -> tuple[Influence, Runs]:
+    """Coefficients with rows weighted by known errors, starting from others (S, C, P + 1)."""
     Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
     between = run.variance(trials.mean, np.einsum("scp,rp->rsc", theta[..., 1:], trials.weights))
     G = _gain(A, reading, between)
@@ -282,8 +287,9 @@ def _with_errors(
         run_errors=run,
         reading_dof=model.dof,
         own_between=own_between,
+        digits=_digits(trials, G),
     )
-    return found, G, runs
+    return found, runs
 
 
 def unseen(run: RunErrors) -> tuple[str, ...]:

@@ -305,8 +305,8 @@ def correct(  # noqa: PLR0913
     ------
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
-        at 95 % (`balancing.coefficients.resolution`); for coefficients from runs with unknown errors above a
-        condition number of 1000, which no instrument supports.
+        at 95 % (`balancing.coefficients.resolution`). Assumed errors only warn: the digits of the readings
+        refuse, or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
@@ -328,7 +328,8 @@ def correct(  # noqa: PLR0913
     if not soft:
         check_planes(W, names)
         coefficients = coefficients_of(influence, used, chosen)
-        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
+        every = range(len(influence.sensors))
+        unclear = check_resolution(influence.part(used, every), names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
             small = optimism(W, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()

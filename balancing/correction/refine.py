@@ -318,6 +318,7 @@ def _partly(
         W=placed("W"),
         baseline=placed("baseline"),
         covariance=placed("covariance"),
+        digits=placed("digits") if part.digits is not None and rest.digits is not None else None,
         common=common,
         dof=min((d for d in (rest.dof, part.dof) if d is not None), default=None),
         warnings=tuple(dict.fromkeys((*alone.warnings, *part.warnings, words))),
