@@ -136,11 +136,13 @@ def estimate_unbalance(  # noqa: PLR0913
         rows = np.moveaxis(stretch(G).reshape(2 * Q, N, 2), 1, 0)
         shared = _shared(common, U, N)
         own = variance - marginal(shared[..., None]).reshape(N, 2, 2)
-        out = symmetric(sum(common_covariance(rows, shared[..., None]), np.einsum("nai,nij,nbj->ab", rows, own, rows)))
+        out = symmetric(
+            sum(common_covariance(rows, shared[..., None]), np.einsum("nai,nij,nbj->ab", rows, own, rows))
+        )
         white = _whitening(own, shared)
         left = white(residual[:, None])[:, :1]
         if method != "ridge":  # the least that unbalance at the stations leaves
-            fitted = white(A @ basis)
+            fitted = white((A @ basis).astype(complex))
             left -= fitted @ np.linalg.lstsq(fitted, left, rcond=RCOND)[0]
         chi_square = float(np.sum(left**2))
     result = Unbalance(
@@ -246,7 +248,9 @@ def _whitening(own: FloatArray, shared: ComplexArray) -> Callable[[ComplexArray]
     """How to divide readings (N, j) by the root of their covariance, into real ones (2N, 2j)."""
     S, C = shared.shape[2:]
     diagonal = np.repeat(_sigma(own) ** 2, 2).reshape(S, 2 * C)
-    white, _ = whitening(diagonal[..., None] * np.eye(2 * C), real_columns(shared[1]), real_columns(shared[0]))
+    white, _ = whitening(
+        diagonal[..., None] * np.eye(2 * C), real_columns(shared[1]), real_columns(shared[0])
+    )
     return lambda z: white(stretch(z).reshape(S, 2 * C, -1)).reshape(2 * len(z), -1)
 
 

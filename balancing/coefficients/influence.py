@@ -148,7 +148,7 @@ class Influence:
             self,
             speeds=self.speeds[list(speeds)],
             sensors=tuple(self.sensors[c] for c in sensors),
-            W=cut(self.W),
+            W=self.W[np.ix_(speeds, sensors)],
             baseline=cut(self.baseline),
             covariance=cut(self.covariance),
             common=common,

@@ -292,14 +292,14 @@ def _joint(
         blocks[:, :, r, :, r, :] += own[r]
     if start.common is None:
         return symmetric(V), each
-    before = start.common[(slice(None), slice(None), *pick)] @ factors.T
+    before = start.common[:, :, pick[0], pick[1]] @ factors.T
     return symmetric(V), np.concatenate((before, each), axis=1)
 
 
 def _by_speed(V: FloatArray) -> FloatArray:
     """Covariances of independent channels (S, C, n, n) as one at each speed, (S, C n, C n)."""
     S, C, n, _ = V.shape
-    return np.einsum("scij,cd->scidj", V, np.eye(C)).reshape(S, C * n, C * n)
+    return np.asarray(np.einsum("scij,cd->scidj", V, np.eye(C)).reshape(S, C * n, C * n))
 
 
 def _columns(common: ComplexArray) -> FloatArray:

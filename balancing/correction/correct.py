@@ -334,7 +334,7 @@ def correct(  # noqa: PLR0913
             small = optimism(W, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(W, names)
-    errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
+    errors = stack_errors(influence, start, used, chosen)
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,

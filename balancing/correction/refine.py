@@ -293,10 +293,10 @@ def _partly(
     common = np.zeros((*part.common.shape[:2], *rest.common.shape[2:]), dtype=complex)
     common[:, : rest.common.shape[1]] = rest.common
     at = np.ix_(rows, columns)
-    common[(slice(None), slice(None), *at)] = part.common
+    common[:, :, at[0], at[1]] = part.common
 
     def placed(name: str) -> AnyArray:
-        array = getattr(rest, name).copy()
+        array: AnyArray = getattr(rest, name).copy()
         array[at] = getattr(part, name)
         return array
 

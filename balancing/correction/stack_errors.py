@@ -35,8 +35,6 @@ class StackErrors:
         Errors between runs.
     between
         `Influence.own_between`.
-    fresh
-        Whether the vibration is that of new runs, which have not yet told of the errors.
     """
 
     W: ComplexArray
@@ -47,7 +45,6 @@ class StackErrors:
     start: Start
     run: RunErrors
     between: float
-    fresh: bool
 
     def explain(self, D: ComplexArray, chance: float = 1 - UNEXPLAINED) -> bool:
         """Whether errors alone may leave what the weights leave: more, with at least this probability."""
@@ -57,7 +54,7 @@ class StackErrors:
         """Covariance of the weights, (2P, 2P), and its degrees of freedom."""
         if fitted.covariance is None or not fitted.parts:
             return fitted.covariance, self.start.model.dof
-        run = self._after(fitted.weights)[1] if self.fresh and fitted.explained else self.run
+        run = self._after(fitted.weights)[1] if self.start.fresh and fitted.explained else self.run
         own, speed, whole = shares_of(fitted.parts, symmetric(sum(fitted.parts[1:], fitted.parts[0])))
         shares = np.array([own * (1 - self.between), own * self.between, speed, whole])
         scale, dof = run.degrees(shares, len(fitted.covariance), self.start.model.dof)
@@ -78,7 +75,7 @@ class StackErrors:
 
 
 def stack_errors(
-    influence: Influence, start: Start, used: list[int], chosen: list[int], *, fresh: bool
+    influence: Influence, start: Start, used: list[int], chosen: list[int]
 ) -> StackErrors | None:
     """Of these speeds and planes; None where the errors are unknown.
 
@@ -88,8 +85,6 @@ def stack_errors(
         Coefficients and the vibration to correct.
     used, chosen
         Indices of speeds and planes.
-    fresh
-        Whether the vibration is that of new runs.
     """
     own = start.own
     if start.covariance is None or own is None or start.model.errors is None:
@@ -106,5 +101,4 @@ def stack_errors(
         start,
         influence.run_errors,
         influence.own_between,
-        fresh,
     )

@@ -30,7 +30,7 @@ from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
 from balancing.solvers.methods import Stack, fit_weights
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
 from rotorid.base.units import rpm
 
@@ -227,7 +227,9 @@ def verdict_of_check(
     name = check.runs[run]
     one = check.readings[:, [range(len(check.runs))[run]]]
     steps = None if check.steps is None else check.steps[:, :, [range(len(check.runs))[run]]]
-    bare = replace(check, runs=(name,), readings=one, steps=steps, planes=(), weights=np.zeros((1, 0)))
+    bare = replace(
+        check, runs=(name,), readings=one, steps=steps, planes=(), weights=np.zeros((1, 0), dtype=complex)
+    )
     start = starting_point(known, bare)
     warnings = start.warnings
     rows: list[Judgement] = []
@@ -236,7 +238,7 @@ def verdict_of_check(
         used = tuple(known.planes[p] for p in chosen)
         W, Y = known.W[..., chosen].reshape(-1, len(chosen)), start.readings.ravel()
         check_planes(W, used)
-        errors = stack_errors(known, start, list(range(len(at))), chosen, fresh=True)
+        errors = stack_errors(known, start, list(range(len(at))), chosen)
         own, common = (None, None) if errors is None else (errors.channels, errors.common)
         names = reading_names(known.sensors, known.speeds)
         found = fit_weights(Stack(W, Y, own, None, None, used, names, str, str, common), "least-squares")

@@ -152,7 +152,7 @@ def mount(
             )
         total = np.array([there.get(plane, 0.0) for plane in planes])
         Y = Y + influence.W[at] @ np.array([there.get(plane, 0.0) for plane in influence.planes])
-    errors = stack_errors(influence, start, at, chosen, fresh=False)
+    errors = stack_errors(influence, start, at, chosen)
     rows = None if row_weights is None else row_weights[at].ravel()
     if correction.method == "weighted" and errors is not None:
         each = prediction_covariance(correction.weights, errors.channels)

@@ -120,7 +120,7 @@ def whitening(
 
 
 def real_columns(common: ComplexArray) -> FloatArray:
-    """Columns (M, S, n) of independent complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
+    """Columns (M, S, n) of complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
     M, S, n = common.shape
     return np.asarray(np.transpose(_block(common), (1, 2, 3, 0, 4)).reshape(S, 2 * n, 2 * M))
 
