@@ -23,7 +23,7 @@ of station q is made: where it is that of the unit matrix, the station is determ
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -35,9 +35,16 @@ from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
 from balancing.coefficients.resolution import HOPELESS
+from balancing.coefficients.run_errors import marginal
 from balancing.data.conventions import Labels
+from balancing.data.errors import symmetric
 from balancing.data.trials import Trials, check_names
-from balancing.solvers.error_propagation import prediction_covariance
+from balancing.solvers.error_propagation import (
+    common_covariance,
+    prediction_covariance,
+    real_columns,
+    whitening,
+)
 from balancing.unbalance_result import Unbalance
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, stretch
@@ -58,6 +65,7 @@ def estimate_unbalance(  # noqa: PLR0913
     method: Method = "minimum-norm",
     names: Sequence[str] | None = None,
     covariance: ArrayLike | None = None,
+    common: ComplexArray | None = None,
     ridge: float | None = None,
     shapes: ArrayLike | None = None,
     masses: ArrayLike | None = None,
@@ -78,6 +86,9 @@ def estimate_unbalance(  # noqa: PLR0913
     covariance
         Of (Re Y, Im Y) of each reading, (N, 2, 2), or of (Re Y, Im Y, Re W₁, Im W₁, …), (N, 2Q + 2, 2Q + 2);
         rows then count by their variance. Default: unknown.
+    common
+        What of it the readings have in common, as `balancing.Influence.common`, (2, M, S, C, Q + 1) with
+        S C = N; default: nothing.
     ridge
         λ relative to the largest singular value, for "ridge"; default: chosen as described above.
     shapes
@@ -119,12 +130,21 @@ def estimate_unbalance(  # noqa: PLR0913
         G = basis @ G
         U = G @ y
     residual = y - A @ U
-    out = None
+    out = chi_square = None
     if channels is not None:
         variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
-        rows = stretch(G).reshape(2 * Q, N, 2)
-        out = np.einsum("ani,nij,bnj->ab", rows, variance, rows, optimize=True)
-    chi_square = None if variance is None else float(np.sum((np.abs(residual) / _sigma(variance)) ** 2))
+        rows = np.moveaxis(stretch(G).reshape(2 * Q, N, 2), 1, 0)
+        shared = _shared(common, U, N)
+        own = variance - marginal(shared[..., None]).reshape(N, 2, 2)
+        out = symmetric(
+            sum(common_covariance(rows, shared[..., None]), np.einsum("nai,nij,nbj->ab", rows, own, rows))
+        )
+        white = _whitening(own, shared)
+        left = white(residual[:, None])[:, :1]
+        if method != "ridge":  # the least that unbalance at the stations leaves
+            fitted = white((A @ basis).astype(complex))
+            left -= fitted @ np.linalg.lstsq(fitted, left, rcond=RCOND)[0]
+        chi_square = float(np.sum(left**2))
     result = Unbalance(
         stations=stations,
         unbalance=U,
@@ -177,6 +197,7 @@ def unbalance_of_run(
         method=method,
         names=influence.planes,
         covariance=None if start.covariance is None else start.covariance.reshape(-1, n, n),
+        common=start.common,
         ridge=ridge,
         shapes=shapes,
         masses=masses,
@@ -212,6 +233,25 @@ def _channels(covariance: ArrayLike | None, N: int, Q: int) -> FloatArray | None
     if not np.isfinite(channels).all() or not channels.any():
         raise ValueError("the covariance of the readings must be finite and not all zero")
     return channels
+
+
+def _shared(common: ComplexArray | None, U: ComplexArray, N: int) -> ComplexArray:
+    """What Y − W U has in common, (2, M, S, C)."""
+    if common is None:
+        return np.zeros((2, 0, 1, N), dtype=complex)
+    if common.shape[2] * common.shape[3] != N or common.shape[4] != len(U) + 1:
+        raise ValueError(f"what {N} readings have in common has not the shape {common.shape}")
+    return np.asarray(common @ np.concatenate(([1.0], -U)))
+
+
+def _whitening(own: FloatArray, shared: ComplexArray) -> Callable[[ComplexArray], FloatArray]:
+    """How to divide readings (N, j) by the root of their covariance, into real ones (2N, 2j)."""
+    S, C = shared.shape[2:]
+    diagonal = np.repeat(_sigma(own) ** 2, 2).reshape(S, 2 * C)
+    white, _ = whitening(
+        diagonal[..., None] * np.eye(2 * C), real_columns(shared[1]), real_columns(shared[0])
+    )
+    return lambda z: white(stretch(z).reshape(S, 2 * C, -1)).reshape(2 * len(z), -1)
 
 
 def _sigma(variance: FloatArray) -> FloatArray:

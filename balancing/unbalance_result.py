@@ -44,7 +44,8 @@ class Unbalance:
         Of (Re U₁, Im U₁, …) from the errors of the readings (and coefficients, if given), shape (2Q, 2Q);
         None: unknown. What the readings leave open is not in it.
     chi_square
-        Σ |residual|²/σ² with σ of a reading in one direction; None where errors are unknown.
+        Σ |residual|²/σ² with σ of a reading in one direction, its correlations with others allowed for; None
+        where errors are unknown.
     condition_number
         Largest by smallest singular value of what is determined.
     ridge

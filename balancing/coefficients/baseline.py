@@ -21,13 +21,16 @@ from rotorid.regression import stretch
 SPEED_TOLERANCE = 0.005
 """Speeds that differ by less, relatively, count as one."""
 
+SAME = 1e-9
+"""Readings that differ by less, relatively, are the same ones, written and read again."""
+
 
 class Start(NamedTuple):
     """What `correct` starts from.
 
     Y₀ (S, C), the covariance of (Y₀, W) per channel or None, errors of a reading, words for the user, how to
-    print, what is mounted: run, planes, weights (None: nothing), and what of the errors the channels have in
-    common (as `Influence.common`).
+    print, what is mounted: run, planes, weights (None: nothing), what of the errors the channels have in
+    common (as `Influence.common`), and whether Y₀ is of new runs, which have not yet told of the errors.
     """
 
     readings: ComplexArray
@@ -37,6 +40,7 @@ class Start(NamedTuple):
     labels: Labels
     mounted: tuple[str, tuple[str, ...], ComplexArray] | None
     common: ComplexArray | None = None
+    fresh: bool = False
 
     @property
     def own(self) -> FloatArray | None:
@@ -81,15 +85,7 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
                 "these influence coefficients are stored ones without a vibration to correct: "
                 "give the readings of a baseline run"
             )
-        return Start(
-            influence.baseline,
-            influence.covariance,
-            known,
-            (),
-            influence.labels,
-            _last_run(influence),
-            influence.common,
-        )
+        return _as_measured(influence, influence.baseline)
     if isinstance(baseline, Trials):
         return _from_runs(influence, baseline, known)
     readings = np.array(baseline, dtype=complex)
@@ -97,11 +93,27 @@ def starting_point(influence: Influence, baseline: Trials | ArrayLike | None) ->
         raise ValueError(f"the baseline must have shape {influence.W.shape[:2]} (speeds, sensors)")
     if not np.isfinite(readings).all():
         raise ValueError("the readings of the baseline must be finite; found NaN or infinity")
+    if _same(influence, readings):
+        return _as_measured(influence, readings)._replace(mounted=None)
     if known.errors is None:
         return Start(readings, None, known, (), influence.labels, None)
     variance = reading_covariance(readings, known.errors)
     nothing = np.zeros(len(influence.planes), dtype=complex)
     return _with_coefficients(influence, readings, readings[None], variance, nothing[None], known)
+
+
+def _as_measured(influence: Influence, readings: ComplexArray) -> Start:
+    """The vibration that the coefficients were measured with: their errors belong together."""
+    known = ErrorModel(influence.errors, influence.reading_dof, influence.error_source)
+    mounted = _last_run(influence)
+    return Start(readings, influence.covariance, known, (), influence.labels, mounted, influence.common)
+
+
+def _same(influence: Influence, readings: ComplexArray) -> bool:
+    """Whether the readings of a bare rotor are those that the coefficients were measured with."""
+    if influence.baseline is None or influence.covariance is None:
+        return False
+    return bool(np.abs(readings - influence.baseline).max() <= SAME * np.abs(readings).max())
 
 
 def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start:
@@ -123,6 +135,10 @@ def _from_runs(influence: Influence, trials: Trials, known: ErrorModel) -> Start
             trials.labels,
             _mounted_last(influence, trials, mounted),
         )
+    if len(trials.runs) == 1 and trials.errors in (None, influence.errors) and _same(influence, readings):
+        start = _as_measured(influence, readings)
+        last = _mounted_last(influence, trials, mounted)
+        return start._replace(labels=trials.labels, mounted=last, warnings=notes)
     variance = mean_covariance(trials, model.errors)[pick].mean(axis=0) / len(trials.runs)
     start = _with_coefficients(
         influence, readings, trials.mean[pick], variance, mounted, _joined(model, known)
@@ -237,7 +253,7 @@ def _with_coefficients(
         before = influence.common.copy()
         before[..., 0] = -before[..., 1:] @ mounted.mean(axis=0)
         common = np.concatenate((before, common), axis=1)
-    return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common)
+    return Start(readings, symmetric(covariance), model, warnings, influence.labels, None, common, fresh=True)
 
 
 def _joined(model: ErrorModel, known: ErrorModel) -> ErrorModel:

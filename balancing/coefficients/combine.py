@@ -1,14 +1,16 @@
 """Measured and computed influence coefficients together, each counting by how well it is known.
 
-Of one reading let z hold all that is known, stacked: the measured (Y₀, W) and the computed W, stretched, with
-the covariance C (block diagonal: the model and the measurement know nothing of each other). Where both speak
+Of one reading let z hold all that is known, stacked: the measured (Y₀, W) and the computed W, with the
+covariance C (block diagonal: the model and the measurement know nothing of each other). Where both speak
 of the same plane they must agree: A z = 0 for the differences A z. The best linear estimate that obeys it is
 
-    ẑ = z − C Aᵀ (A C Aᵀ)⁻¹ A z,   with the covariance   C − C Aᵀ (A C Aᵀ)⁻¹ A C
+    ẑ = M z,   M = 1 − C Aᵀ (A C Aᵀ)⁻¹ A,   with the covariance   M C Mᵀ
 
-(least (ẑ − z)ᵀ C⁻¹ (ẑ − z), Lagrange). For a single number it is the mean weighted by 1/variance. What is
-measured together with a coefficient profits too: the reading of the bare rotor, and planes that only one side
-has, through their correlation.
+(least (ẑ − z)ᵀ C⁻¹ (ẑ − z), Lagrange). For a single number it is the mean weighted by 1/variance, both
+directions of a reading as their mean. What is measured together with a coefficient profits too: the reading
+of the bare rotor, and planes that only one side has, through their correlation. M also acts on what the
+channels of the measurement have in common; it is chosen for each channel alone. Errors of the model are taken
+as independent of each other (`balancing.model_influence`).
 
 Whether both agree within their errors: d = W_measured − W_computed of one plane and reading has the
 covariance S = C_measured + C_computed, and χ² = dᵀ S⁻¹ d has two degrees of freedom.
@@ -23,9 +25,11 @@ import numpy as np
 from balancing.coefficients.baseline import SPEED_TOLERANCE
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
+from balancing.coefficients.resolution import hermitian
 from balancing.data.errors import symmetric
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
+from rotorid.regression import stretch
 
 LEVEL = 0.99
 """Of the test whether both agree, for all coefficients together."""
@@ -70,6 +74,7 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     S, C, P = len(speeds), len(sensors), len(planes)
     W, Y = np.empty((S, C, P), dtype=complex), np.zeros((S, C), dtype=complex)
     covariance = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
+    common = np.zeros((2, _columns(measured) + _columns(computed), S, C, P + 1), dtype=complex)
     known, differences = np.zeros((S, C), dtype=bool), []
     for s, c in np.ndindex(S, C):
         a = _place(measured, ours[s], sensors[c])
@@ -80,8 +85,8 @@ def combine(measured: Influence, computed: Influence) -> Influence:
                 f"there is neither a measured nor a computed coefficient of plane {lacking!r} at sensor "
                 f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
             )
-        z, own, found = _reading(measured, a, computed, b, planes)
-        Y[s, c], W[s, c], covariance[s, c] = z[0], z[1:], own
+        z, covariance[s, c], common[:, :, s, c], found = _reading(measured, a, computed, b, planes)
+        Y[s, c], W[s, c] = z[0], z[1:]
         known[s, c] = a is not None
         differences += [(chi, p, c, s) for p, chi in found]
     mounted = measured.last_weights
@@ -101,6 +106,8 @@ def combine(measured: Influence, computed: Influence) -> Influence:
         W=W,
         baseline=Y if measured.baseline is not None and not dropped else None,
         covariance=covariance,
+        common=common,
+        digits=None,
         warnings=measured.warnings
         + computed.warnings
         + _contradictions(differences, planes, sensors, speeds, measured.dof)
@@ -161,43 +168,49 @@ def _reading(
     computed: Influence,
     b: tuple[int, int] | None,
     planes: tuple[str, ...],
-) -> tuple[ComplexArray, FloatArray, list[tuple[int, float]]]:
-    """(Y₀, W) of one reading (P + 1,), its covariance, and χ² of the planes that both sides have."""
+) -> tuple[ComplexArray, FloatArray, ComplexArray, list[tuple[int, float]]]:
+    """(Y₀, W) of one reading (P + 1,), covariance, common columns, χ² of the planes that both sides have."""
     first = measured.planes if a is not None else ()
     second = computed.planes if b is not None else ()
-    z = np.zeros(1 + len(first) + len(second), dtype=complex)
+    n, m = 1 + len(first), _columns(measured)
+    z = np.zeros(n + len(second), dtype=complex)
     covariance = np.zeros((2 * len(z), 2 * len(z)))
-    n, m = 1 + len(first), 2 + 2 * len(first)
+    common = np.zeros((2, m + _columns(computed), len(z)), dtype=complex)
     if a is not None:
         assert measured.covariance is not None
         z[0] = 0.0 if measured.baseline is None else measured.baseline[a]
         z[1:n] = measured.W[a]
-        covariance[:m, :m] = measured.covariance[a]
+        covariance[: 2 * n, : 2 * n] = measured.covariance[a]
+        if measured.common is not None:
+            common[:, :m, :n] = measured.common[(slice(None), slice(None), *a)]
     if b is not None:
         assert computed.covariance is not None
         z[n:] = computed.W[b]
-        covariance[m:, m:] = computed.covariance[b][2:, 2:]
-    v, chi = z.view(np.float64), []
+        covariance[2 * n :, 2 * n :] = computed.covariance[b][2:, 2:]
+        if computed.common is not None:
+            common[:, m:, n:] = computed.common[(slice(None), slice(None), *b)][..., 1:]
+    M, chi = np.eye(len(z), dtype=complex), []
     both = [(1 + first.index(p), n + second.index(p), planes.index(p)) for p in first if p in second]
     if both:
-        A = np.zeros((2 * len(both), len(v)))
+        A = np.zeros((len(both), len(z)))
         for k, (i, j, p) in enumerate(both):
-            for part in (0, 1):
-                A[2 * k + part, 2 * i + part], A[2 * k + part, 2 * j + part] = 1.0, -1.0
-            rows = A[2 * k : 2 * k + 2]
-            chi.append((p, float(rows @ v @ _inverse(rows @ covariance @ rows.T) @ rows @ v)))
-        K = covariance @ A.T @ _inverse(A @ covariance @ A.T)
-        v = v - K @ (A @ v)
-        covariance = symmetric(covariance - K @ A @ covariance)
-    merged = v.view(np.complex128)
-    order = [0, *(1 + first.index(p) if p in first else n + second.index(p) for p in planes)]
-    index = np.array([[2 * i, 2 * i + 1] for i in order]).ravel()
-    return merged[order], covariance[np.ix_(index, index)], chi
+            A[k, i], A[k, j] = 1.0, -1.0
+            rows = stretch(A[k : k + 1])
+            d = rows @ stretch(z)
+            chi.append((p, float(d @ _inverse(rows @ covariance @ rows.T) @ d)))
+        H = hermitian(covariance[None])[0]
+        M -= H @ A.T @ _inverse(A @ H @ A.T) @ A
+    M = M[[0, *(1 + first.index(p) if p in first else n + second.index(p) for p in planes)]]
+    return M @ z, symmetric(stretch(M) @ covariance @ stretch(M).T), common @ M.T, chi
 
 
-def _inverse(S: FloatArray) -> FloatArray:
+def _columns(side: Influence) -> int:
+    return 0 if side.common is None else side.common.shape[1]
+
+
+def _inverse(S: AnyArray) -> AnyArray:
     """Inverse of a covariance of differences; zero where nothing has an error."""
-    root = np.sqrt(np.diag(S))
+    root = np.sqrt(np.diag(S).real)
     scale = np.outer(*(np.where(root > 0, root, 1.0),) * 2)
     return np.asarray(np.linalg.pinv(S / scale, rcond=1e-12, hermitian=True) / scale)
 

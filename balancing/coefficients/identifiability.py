@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.coefficients.resolution import HOPELESS, resolution
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.regression import Estimate, least_squares
 
 if TYPE_CHECKING:
@@ -119,27 +119,23 @@ _REMEDY = "; their weights are not determined: leave one out, or add sensors or 
 
 
 def check_resolution(
-    influence: Influence,
-    W: ComplexArray,
-    covariance: FloatArray | None,
-    planes: Sequence[str],
-    *,
-    refuse: bool,
+    influence: Influence, planes: Sequence[str], *, refuse: bool, counts: BoolArray | None = None
 ) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
+
+    Errors that are assumed refuse nothing: the digits of the readings do, or without an end of them, for
+    coefficients from runs, a condition number that no instrument supports.
 
     Parameters
     ----------
     influence
-        Where the coefficients come from.
-    W
-        Those in question, stacked, shape (N, P), of full rank.
-    covariance
-        Of (Re W₁, Im W₁, …) of each reading, (N, 2P, 2P), or None.
+        Coefficients at the speeds and sensors in question, of full rank in these planes.
     planes
         Names.
     refuse
         Or warn.
+    counts
+        Readings, speed by speed, that count, (N,); default all.
 
     Returns
     -------
@@ -152,26 +148,43 @@ def check_resolution(
     """
     if len(planes) < 2:
         return ()
-    if covariance is not None and covariance.any():
-        found = resolution(W, covariance)
-        if found.significant(len(W), influence.dof):
-            return ()
-        ratio = np.sqrt(found.chi_square / found.n)
-        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
-        alike = _large(found.direction)
-    elif covariance is None and influence.last_run is not None:
-        singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-        if singular[0] <= HOPELESS * singular[-1]:
-            return ()
-        condition = singular[0] / singular[-1]
-        within = f": no instrument supports a condition number of {condition:.2g}"
-        alike = acting_alike(W)
-    else:
+    chosen = [influence.planes.index(plane) for plane in planes]
+    W = influence.W[..., chosen].reshape(-1, len(chosen))
+    assumed = influence.error_source == "assumed"
+    counts = np.ones(len(W), dtype=bool) if counts is None else counts
+    first = influence.digits if assumed else influence.covariance
+    alike, within = _unresolved(influence, chosen, first, counts)
+    if not within and assumed:
+        refuse = False
+        alike, within = _unresolved(influence, chosen, influence.covariance, counts)
+    if not within:
         return ()
-    words = _alike(W, alike, planes) + within + _REMEDY
+    words = _alike(W[counts], alike, planes) + within + _REMEDY
     if refuse:
         raise refusal(words, influence.warnings)
     return (words,)
+
+
+def _unresolved(
+    influence: Influence, chosen: list[int], covariance: FloatArray | None, counts: BoolArray
+) -> tuple[list[int], str]:
+    """Planes that act alike within the errors of a covariance of (Y₀, W), and how; none and no words."""
+    W = influence.W[..., chosen].reshape(-1, len(chosen))[counts]
+    if covariance is not None and covariance[..., 2:, 2:].any():
+        index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
+        own = covariance[..., index[:, None], index].reshape(-1, len(index), len(index))[counts]
+        found = resolution(W, own)
+        if found.significant(len(W), influence.dof):
+            return [], ""
+        ratio = np.sqrt(found.chi_square / found.n)
+        return _large(found.direction), (
+            f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        )
+    singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+    condition = singular[0] / singular[-1]
+    if covariance is None and influence.last_run is not None and condition > HOPELESS:
+        return acting_alike(W), f": no instrument supports a condition number of {condition:.2g}"
+    return [], ""
 
 
 def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:

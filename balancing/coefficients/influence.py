@@ -6,6 +6,7 @@ are all the same relation; nothing needs a special case. Source: [S] (34)–(39)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from balancing.coefficients.run_errors import (
     EXPLAINED,
     RunColumns,
     RunErrors,
+    Runs,
     corrected_row,
     estimated,
     given,
@@ -36,7 +38,7 @@ from balancing.data.trials import ReadingErrors, Trials, check_names, check_spee
 
 if TYPE_CHECKING:
     import pandas as pd
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import RPM
 from rotorid.regression import gain
 
@@ -79,6 +81,8 @@ class Influence:
         What the user should know.
     notes
         What the user may want to know.
+    digits
+        The covariance that the digits of the readings alone would give; None: they have no end.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
     """
@@ -101,6 +105,7 @@ class Influence:
     reading_dof: float | None = None
     own_between: float = 0.0
     notes: tuple[str, ...] = ()
+    digits: FloatArray | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -110,6 +115,7 @@ class Influence:
         self._frozen("W", (S, C, P), complex)
         self._frozen("baseline", (S, C), complex)
         self._frozen("covariance", (S, C, 2 * P + 2, 2 * P + 2), float)
+        self._frozen("digits", (S, C, 2 * P + 2, 2 * P + 2), float)
         self._frozen("last_weights", (P,), complex)
         if self.common is not None:
             self._frozen("common", (2, np.shape(self.common)[1], S, C, P + 1), complex)
@@ -130,6 +136,24 @@ class Influence:
     def unit(self) -> str:
         """Unit of a coefficient, such as "um_pp/g"."""
         return f"{self.labels.vibration_unit or '1'}/{self.labels.weight_unit or '1'}"
+
+    def part(self, speeds: Sequence[int], sensors: Sequence[int]) -> Influence:
+        """Those at some speeds and sensors, by their indices."""
+
+        def cut(array: AnyArray | None) -> AnyArray | None:
+            return None if array is None else array[np.ix_(speeds, sensors)]
+
+        common = None if self.common is None else self.common[:, :, speeds][:, :, :, sensors]
+        return replace(
+            self,
+            speeds=self.speeds[list(speeds)],
+            sensors=tuple(self.sensors[c] for c in sensors),
+            W=self.W[np.ix_(speeds, sensors)],
+            baseline=cut(self.baseline),
+            covariance=cut(self.covariance),
+            common=common,
+            digits=cut(self.digits),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: one row per speed, sensor and plane; phases lead, weights turn with the rotation."""
@@ -200,22 +224,53 @@ def estimate_influence(trials: Trials) -> Influence:
     if merged:
         model, run = _as_readings(run, trials, model)
         reading = mean_covariance(trials, model.errors)
-    W = theta[..., 1:]
-    between = run.variance(trials.mean, np.einsum("scp,rp->rsc", W, trials.weights))
+    found, runs = _with_errors(trials, A, theta, reading, model, run)
+    try:
+        check_effects(trials, found.W, found.covariance if known(model) else found.digits)
+    except UndeterminedError as error:
+        raise refusal(str(error), trials.warnings + repeated) from error
+    warnings = trials.warnings + repeated + model.warnings
+    if model.source == "stated" and R > P + 1:
+        warnings += check_consistency(trials, A, reading, runs)
+    return replace(found, warnings=warnings, notes=weak_trials(trials, found.W) + unseen(run))
+
+
+def estimate_like(trials: Trials, other: Influence) -> Influence:
+    """Influence coefficients with the errors of other runs of the same rotor, without any words.
+
+    Parameters
+    ----------
+    trials
+        As `estimate_influence`.
+    other
+        Coefficients in which these runs, or more of them, took part.
+    """
+    A = np.column_stack((np.ones(len(trials.runs)), trials.weights)).astype(complex)
+    reading = mean_covariance(trials, other.errors)
+    G = _gain(A, reading, np.zeros(reading.shape[:3]))
+    theta = np.einsum("scpr,scr->scp", G, np.moveaxis(trials.mean, 0, -1))
+    model = ErrorModel(other.errors, other.reading_dof, other.error_source)
+    return _with_errors(trials, A, theta, reading, model, other.run_errors)[0]
+
+
+def _with_errors(
+    trials: Trials,
+    A: ComplexArray,
+    theta: ComplexArray,
+    reading: FloatArray,
+    model: ErrorModel,
+    run: RunErrors,
+) -> tuple[Influence, Runs]:
+    """Coefficients with rows weighted by known errors, starting from others (S, C, P + 1)."""
+    Y = np.moveaxis(trials.mean, 0, -1)  # (S, C, R)
+    between = run.variance(trials.mean, np.einsum("scp,rp->rsc", theta[..., 1:], trials.weights))
     G = _gain(A, reading, between)
     theta = np.einsum("scpr,scr->scp", G, Y)
     # a rotor at rest is at rest: what is left of its readings is rounding
     theta[..., 0][np.abs(theta[..., 0]) < EQUAL * np.abs(Y).max(axis=-1)] = 0.0
     runs = runs_of(trials.mean, trials.weights, theta[..., 1:])
     covariance, common, dof, own_between = joint_covariance(G, reading, run_columns(run, runs), run, model)
-    try:
-        check_effects(trials, theta[..., 1:], covariance if known(model) else _digits(trials, G))
-    except UndeterminedError as error:
-        raise refusal(str(error), trials.warnings + repeated) from error
-    warnings = trials.warnings + repeated + model.warnings
-    if model.source == "stated" and R > P + 1:
-        warnings += check_consistency(trials, A, reading, runs)
-    return Influence(
+    found = Influence(
         speeds=trials.speeds,
         sensors=trials.sensors,
         planes=trials.planes,
@@ -226,15 +281,15 @@ def estimate_influence(trials: Trials) -> Influence:
         errors=model.errors,
         error_source=model.source,
         labels=trials.labels,
-        warnings=warnings,
         last_run=trials.runs[-1],
         last_weights=trials.weights[-1],
         common=common,
         run_errors=run,
         reading_dof=model.dof,
         own_between=own_between,
-        notes=weak_trials(trials, theta[..., 1:]) + unseen(run),
+        digits=_digits(trials, G),
     )
+    return found, runs
 
 
 def unseen(run: RunErrors) -> tuple[str, ...]:

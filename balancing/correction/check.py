@@ -1,14 +1,15 @@
 """Whether a check run shows what was predicted: the difference against the errors of both.
 
 A reading in a check run with weights T mounted is predicted as Y₀ + W T. It differs from that by the errors
-of the prediction, dY₀ + dW T, and by its own, which repeated readings reduce. At given T these errors are
-independent from reading to reading (`balancing.solvers.error_propagation`); two check runs share those of the
-prediction, so all runs of one sensor and speed have one common covariance
+of the prediction, dY₀ + dW T, by its own, which repeated readings reduce, and by what its run has of its own
+(`balancing.coefficients.run_errors`). All runs share the errors of the prediction, and sensors and speeds
+those between runs; V is the covariance of all differences together,
 
-    V = B Σ Bᵀ + diag(own covariances),    B = rows (1, T_run) stretched, Σ = covariance of (Y₀, W),
+    V = B Σ Bᵀ + Σ_run own errors + columns in common,    B = rows (1, T_run) stretched,
 
-and χ² = Σ dᵀ V⁻¹ d over sensors and speeds has 2 × runs × sensors × speeds degrees of freedom. Where the
-errors are estimates with ν degrees of freedom, χ²/n is compared with Fisher's F(n, ν).
+with Σ that of (Y₀, W), and χ² = dᵀ V⁻¹ d has n = 2 × runs × sensors × speeds degrees of freedom. Where errors
+are estimates, χ²/n is compared with Fisher's F(n, ν), ν by `RunErrors.degrees` with the shares that each kind
+of error has in χ².
 
 Existing unbalance, wherever it sits, is in Y₀ and explains no difference in a linear rotor. A difference
 that the errors do not explain means that something changed or is not linear; what a change of the weights
@@ -17,20 +18,24 @@ in the correction planes explains is found by fitting d = W δ.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.coefficients.baseline import match_speeds, starting_point
+from balancing.coefficients.baseline import Start, match_speeds, starting_point
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import both_directions, tail
+from balancing.coefficients.run_errors import RunColumns, marginal, run_columns, runs_of
 from balancing.correction.correct import Correction
 from balancing.data.conventions import Labels
 from balancing.data.errors import error_model, reading_covariance, symmetric
-from balancing.data.trials import ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from balancing.data.trials import Trials
+from balancing.solvers.error_propagation import real_columns, whitening
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.regression import stretch
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -197,17 +202,24 @@ def compare_check(
         degrees = [d for d in (dof, own.dof if by_repeats else None) if d is not None]
         dof = min(degrees, default=None)
         used = own.errors if by_repeats and own.errors is not None else errors
-        V = _joint_covariance(T, start.covariance[pick], predicted, check, used, np.abs(before).max())
+        single = reading_covariance(predicted, both_directions(used)) / check.repeats[..., None, None]
+        single += (_EXACT * np.abs(before).max()) ** 2 * np.eye(2)
+        further = run_columns(influence.run_errors, runs_of(predicted, T, W))
+        V, common = _joint(start, pick, T, single, further)
+        blocks = V + marginal(common)
         R = len(check.runs)
-        blocks = V.reshape(*V.shape[:2], R, 2, R, 2)
-        covariance = np.moveaxis(np.einsum("scrarb->scrab", blocks), 2, 0)
+        covariance = np.einsum("scrarb->rscab", blocks.reshape(*blocks.shape[:2], R, 2, R, 2))
         d = _vectors(achieved - predicted)
-        distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, _solve(covariance, d)))
-        stacked = np.moveaxis(d, 0, 2).reshape(*V.shape[:2], 2 * R)
-        chi_square = float(np.sum(stacked * _solve(V, stacked)))
-        probability = tail(chi_square, stacked.size, dof)
+        distance = np.sqrt(np.einsum("rsci,rsci->rsc", d, np.linalg.solve(covariance, d[..., None])[..., 0]))
+        white, shares = whitening(_by_speed(V), *map(_columns, common[::-1]))
+        stacked = np.moveaxis(d, 0, 2).reshape(len(at), -1, 1)
+        between = influence.own_between
+        kinds = np.array([shares[0] * (1 - between), shares[0] * between, *shares[1:]])
+        scale, dof = influence.run_errors.degrees(kinds, d.size, dof)
+        chi_square = float(np.sum(white(stacked) ** 2)) / scale
+        probability = tail(chi_square, d.size, dof)
         explained = probability >= 1 - LEVEL
-        change = None if explained else _change(W, stacked, V, dof)
+        change = None if explained else _change(W, white(stacked), white, scale, dof)
         if influence.covariance is None:
             warnings += (
                 "the errors of the influence coefficients are not known: the prediction is less certain "
@@ -261,61 +273,64 @@ def _index(name: str, names: tuple[str, ...], what: str) -> int:
     return names.index(name)
 
 
-def _joint_covariance(
-    T: ComplexArray,
-    channels: FloatArray,
-    predicted: ComplexArray,
-    check: Trials,
-    errors: ReadingErrors,
-    largest: float,
-) -> FloatArray:
-    """Covariance (S, C, 2R, 2R) of all differences of each sensor and speed."""
-    R, S, C = predicted.shape
+def _joint(
+    start: Start, pick: tuple[IndexArray, ...], T: ComplexArray, single: FloatArray, further: RunColumns
+) -> tuple[FloatArray, ComplexArray]:
+    """Own covariance of all differences of each sensor and speed (S, C, 2R, 2R), and common columns.
+
+    The latter as `Influence.common`, (2, M, S, C, R).
+    """
+    R, S, C = single.shape[:3]
     factors = np.column_stack((np.ones(R), T))
-    B = np.empty((R, 2, factors.shape[1], 2))
-    B[:, 0, :, 0] = B[:, 1, :, 1] = factors.real
-    B[:, 0, :, 1] = -factors.imag
-    B[:, 1, :, 0] = factors.imag
-    rows = B.reshape(2 * R, -1)
-    V = np.asarray(rows @ channels @ rows.T)
-    own = reading_covariance(predicted, both_directions(errors)) / check.repeats[..., None, None]
-    own += (_EXACT * largest) ** 2 * np.eye(2)
+    rows = stretch(factors)
+    assert start.own is not None
+    V = np.asarray(rows @ start.own[pick] @ rows.T)
+    own = single + further.own[..., None, None] * np.eye(2)
     blocks = V.reshape(S, C, R, 2, R, 2)
+    each = np.einsum("krmsc,rq->krmscq", further.common, np.eye(R)).reshape(2, -1, S, C, R)
     for r in range(R):
         blocks[:, :, r, :, r, :] += own[r]
-    return symmetric(V)
+    if start.common is None:
+        return symmetric(V), each
+    before = start.common[:, :, pick[0], pick[1]] @ factors.T
+    return symmetric(V), np.concatenate((before, each), axis=1)
 
 
-def _change(W: ComplexArray, d: FloatArray, V: FloatArray, dof: float | None) -> ComplexArray | None:
+def _by_speed(V: FloatArray) -> FloatArray:
+    """Covariances of independent channels (S, C, n, n) as one at each speed, (S, C n, C n)."""
+    S, C, n, _ = V.shape
+    return np.asarray(np.einsum("scij,cd->scidj", V, np.eye(C)).reshape(S, C * n, C * n))
+
+
+def _columns(common: ComplexArray) -> FloatArray:
+    return real_columns(common.reshape(*common.shape[:2], -1))
+
+
+def _change(
+    W: ComplexArray,
+    target: FloatArray,
+    white: Callable[[FloatArray], FloatArray],
+    scale: float,
+    dof: float | None,
+) -> ComplexArray | None:
     """Weights δ (P,), the same in all runs, for which W δ explains the differences; None if none do.
 
-    Generalised least squares over the stretched channels: minimises Σ (d − A δ)ᵀ V⁻¹ (d − A δ) with A the
-    stretched row of W repeated for every run.
+    Generalised least squares over the stretched channels: minimises (d − A δ)ᵀ V⁻¹ (d − A δ) with A the
+    stretched row of W repeated for every run; `target` is `white` d.
     """
     S, C, P = W.shape
-    n = d.shape[-1]
-    rows = d.size - 2 * P
+    rows = target.size - 2 * P
     if rows <= 0:
         return None
-    A = np.empty((S, C, 2, P, 2))
-    A[..., 0, :, 0] = A[..., 1, :, 1] = W.real
-    A[..., 0, :, 1] = -W.imag
-    A[..., 1, :, 0] = W.imag
-    stacked = np.tile(A.reshape(S, C, 2, 2 * P), (1, 1, n // 2, 1))
-    root = np.linalg.cholesky(V)
-    white = np.linalg.solve(root, stacked).reshape(-1, 2 * P)
-    target = np.linalg.solve(root, d[..., None]).ravel()
-    scale = np.linalg.norm(white, axis=0)
-    scale[scale == 0] = 1.0
-    solution = np.linalg.lstsq(white / scale, target, rcond=1e-10)[0] / scale
-    chi_square = float(np.sum((target - white @ solution) ** 2))
+    A = np.repeat(stretch(W.reshape(-1, P)).reshape(S, C, 1, 2, 2 * P), target.size // (2 * S * C), axis=2)
+    matrix = white(A.reshape(S, -1, 2 * P)).reshape(-1, 2 * P)
+    size = np.linalg.norm(matrix, axis=0)
+    size[size == 0] = 1.0
+    solution = np.linalg.lstsq(matrix / size, target.ravel(), rcond=1e-10)[0] / size
+    chi_square = float(np.sum((target.ravel() - matrix @ solution) ** 2)) / scale
     if tail(chi_square, rows, dof) < 1 - LEVEL:
         return None
     return np.asarray(solution[::2] + 1j * solution[1::2])
-
-
-def _solve(covariance: FloatArray, vectors: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.solve(covariance, vectors[..., None])[..., 0])
 
 
 def _vectors(z: ComplexArray) -> FloatArray:

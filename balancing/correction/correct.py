@@ -312,8 +312,8 @@ def correct(  # noqa: PLR0913
     ------
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
-        at 95 % (`balancing.coefficients.resolution`); for coefficients from runs with unknown errors above a
-        condition number of 1000, which no instrument supports.
+        at 95 % (`balancing.coefficients.resolution`). Assumed errors only warn: the digits of the readings
+        refuse, or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
@@ -337,14 +337,17 @@ def correct(  # noqa: PLR0913
     if not soft:
         check_planes(felt, names)
         coefficients = coefficients_of(influence, used, chosen)
+        every = range(len(influence.sensors))
+        unclear = check_resolution(
+            influence.part(used, every), names, refuse=refuse, counts=None if rows is None else rows > 0
+        )
         if coefficients is not None and rows is not None:
             coefficients = coefficients[rows > 0]
-        unclear = check_resolution(influence, felt, coefficients, names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
             small = optimism(felt, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(felt, names)
-    errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
+    errors = stack_errors(influence, start, used, chosen)
     kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,

@@ -22,7 +22,7 @@ import numpy as np
 
 from balancing.coefficients.baseline import match_speeds
 from balancing.coefficients.identifiability import UndeterminedError
-from balancing.coefficients.influence import Influence, estimate_influence
+from balancing.coefficients.influence import Influence, estimate_influence, estimate_like
 from balancing.data.trials import Trials
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
@@ -226,6 +226,7 @@ def _joined(
         readings=_side_by_side(blocks),
         weights=np.concatenate(weights),
         errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
+        run_errors=next((each.run_errors for each in (trials, *checks) if each.run_errors is not None), None),
         labels=trials.labels,
         warnings=tuple(dict.fromkeys(word for each in (trials, *checks) for word in each.warnings)),
         steps=_side_by_side(steps) if rounded else None,
@@ -269,7 +270,8 @@ def _partly(
 ) -> Influence:
     """Refined where all check runs were read; elsewhere the coefficients of the trial runs alone.
 
-    Sensors and speeds are independent of each other: only the errors of a reading are common to all.
+    The errors of all runs hold for both. A column of `Influence.common` belongs to a run: that of a trial run
+    is the same on either side.
     """
     if alone is None:
         alone = estimate_influence(trials)  # raises, and says why
@@ -278,8 +280,6 @@ def _partly(
             "the check runs have no sensor and speed in common: give those together that were read alike"
         )
     joint = _joined(trials, checks, corrections, rows, columns)
-    if joint.errors is None and alone.errors is not None:
-        joint = replace(joint, errors=alone.errors)
     unknown = [plane for plane in joint.planes if plane not in alone.planes]
     if unknown:
         raise UndeterminedError(
@@ -287,20 +287,19 @@ def _partly(
             "at every speed: read all of them, or leave the weight out"
         )
     part = estimate_influence(joint)
+    rest = estimate_like(trials, part)
+    assert part.common is not None
+    assert rest.common is not None
+    common = np.zeros((*part.common.shape[:2], *rest.common.shape[2:]), dtype=complex)
+    common[:, : rest.common.shape[1]] = rest.common
     at = np.ix_(rows, columns)
-    assert alone.baseline is not None
-    assert part.baseline is not None
-    W, baseline = alone.W.copy(), alone.baseline.copy()
-    W[at], baseline[at] = part.W, part.baseline
-    errors = alone if part.errors is None else part
-    covariance = None
-    if part.covariance is not None and part.errors is not None:
-        known = alone.covariance
-        if known is None:  # the trial runs alone do not tell their errors, all runs do
-            known = _covariance(replace(trials, errors=part.errors))
-        if known is not None:
-            covariance = known.copy()
-            covariance[at] = part.covariance
+    common[:, :, at[0], at[1]] = part.common
+
+    def placed(name: str) -> AnyArray:
+        array: AnyArray = getattr(rest, name).copy()
+        array[at] = getattr(part, name)
+        return array
+
     lacking = [
         f"{name!r} at {rpm_text(speed)}"
         for s, speed in enumerate(trials.speeds)
@@ -316,22 +315,14 @@ def _partly(
         part,
         speeds=alone.speeds,
         sensors=alone.sensors,
-        W=W,
-        baseline=baseline,
-        covariance=covariance,
-        errors=errors.errors,
-        dof=min((d for d in (alone.dof, part.dof) if d is not None), default=None),
-        error_source=errors.error_source,
+        W=placed("W"),
+        baseline=placed("baseline"),
+        covariance=placed("covariance"),
+        digits=placed("digits") if part.digits is not None and rest.digits is not None else None,
+        common=common,
+        dof=min((d for d in (rest.dof, part.dof) if d is not None), default=None),
         warnings=tuple(dict.fromkeys((*alone.warnings, *part.warnings, words))),
     )
-
-
-def _covariance(trials: Trials) -> FloatArray | None:
-    """Of the coefficients of the trial runs alone; None where they do not tell them from zero."""
-    try:
-        return estimate_influence(trials).covariance
-    except UndeterminedError:
-        return None
 
 
 def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:

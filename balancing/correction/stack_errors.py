@@ -9,7 +9,7 @@ import numpy as np
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors, run_columns, runs_of, seen_in
-from balancing.data.errors import reading_covariance, symmetric
+from balancing.data.errors import reading_covariance
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.methods import Fitted
@@ -36,8 +36,6 @@ class StackErrors:
         Errors between runs.
     between
         `Influence.own_between`.
-    fresh
-        Whether the vibration is that of new runs, which have not yet told of the errors.
     """
 
     W: ComplexArray
@@ -48,17 +46,16 @@ class StackErrors:
     start: Start
     run: RunErrors
     between: float
-    fresh: bool
 
-    def explain(self, D: ComplexArray) -> bool:
-        """Whether errors alone may leave what the weights leave (95 %)."""
-        return self._after(D)[0] > 1 - UNEXPLAINED
+    def explain(self, D: ComplexArray, chance: float = 1 - UNEXPLAINED) -> bool:
+        """Whether errors alone may leave what the weights leave: more, with at least this probability."""
+        return self._after(D)[0] > chance
 
     def weights(self, fitted: Fitted) -> tuple[FloatArray | None, float | None]:
         """Covariance of the weights, (2P, 2P), and its degrees of freedom."""
         if fitted.covariance is None or not fitted.parts:
             return fitted.covariance, self.start.model.dof
-        run = self._after(fitted.weights)[1] if self.fresh and fitted.explained else self.run
+        run = self._after(fitted.weights)[1] if self.start.fresh and fitted.explained else self.run
         own, speed, whole = fitted.parts
         parts = np.stack((own * (1 - self.between), own * self.between, speed, whole))
         scale, dof = run.degrees(parts, self.start.model.dof)
@@ -106,7 +103,7 @@ class StackErrors:
 
 
 def stack_errors(
-    influence: Influence, start: Start, used: list[int], chosen: list[int], *, fresh: bool
+    influence: Influence, start: Start, used: list[int], chosen: list[int]
 ) -> StackErrors | None:
     """Of these speeds and planes; None where the errors are unknown.
 
@@ -116,8 +113,6 @@ def stack_errors(
         Coefficients and the vibration to correct.
     used, chosen
         Indices of speeds and planes.
-    fresh
-        Whether the vibration is that of new runs.
     """
     own = start.own
     if start.covariance is None or own is None or start.model.errors is None:
@@ -134,5 +129,4 @@ def stack_errors(
         start,
         influence.run_errors,
         influence.own_between,
-        fresh,
     )

@@ -4,7 +4,7 @@ One value with errors against one limit: `balancing.correction.judgement`.
 
 Residual unbalance from a check run: with the coefficients W of the planes, the vibration Y that is left is
 that of the weights û with W û = Y in the least-squares sense, û = W⁺ Y; what would have to be added is −û.
-Errors of Y and W both count (`balancing.solvers.error_propagation` with D = −û, residual r = Y + W D).
+Errors of Y and W both count, as in `correct` by least squares, with D = −û.
 Predicted: what is mounted, M, less what the readings ask for, D; û = M − D with the covariance of D.
 """
 
@@ -20,19 +20,19 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import check_planes
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.repeatability import tail
 from balancing.correction.choice import plane_indices
 from balancing.correction.correct import Correction
+from balancing.correction.correction_warnings import reading_names
 from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
+from balancing.correction.stack_errors import stack_errors
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
-from balancing.solvers.error_propagation import correction_covariance, prediction_covariance
+from balancing.solvers.methods import Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import wrap
 from rotorid.base.units import rpm
-from rotorid.regression import gain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
 _GRAM_MM = 1e6
 POOR = 1e-3
 """Probability of χ² below which unbalance in the planes does not explain the readings."""
+_UNEXPLAINED = (
+    "unbalance in these planes does not explain the readings within their errors: there is more, "
+    "elsewhere on the rotor or not from unbalance; the residual is less certain than it seems"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,58 +223,33 @@ def verdict_of_check(
     if unknown:
         raise ValueError(f"there are no coefficients of sensor {unknown[0]!r}, which the check run has")
     pick = np.ix_(at, [influence.sensors.index(name) for name in check.sensors])
-    known = replace(
-        influence,
-        speeds=influence.speeds[at],
-        sensors=check.sensors,
-        W=influence.W[pick],
-        baseline=None,
-        covariance=None if influence.covariance is None else influence.covariance[pick],
-    )
+    known = influence.part(at, [influence.sensors.index(name) for name in check.sensors])
     name = check.runs[run]
     one = check.readings[:, [range(len(check.runs))[run]]]
-    bare = replace(check, runs=(name,), readings=one, planes=(), weights=np.zeros((1, 0), dtype=complex))
+    steps = None if check.steps is None else check.steps[:, :, [range(len(check.runs))[run]]]
+    bare = replace(
+        check, runs=(name,), readings=one, steps=steps, planes=(), weights=np.zeros((1, 0), dtype=complex)
+    )
     start = starting_point(known, bare)
     warnings = start.warnings
     rows: list[Judgement] = []
     if tolerance is not None:
         chosen = plane_indices(known, planes or tolerance.planes)
-        used = [known.planes[p] for p in chosen]
+        used = tuple(known.planes[p] for p in chosen)
         W, Y = known.W[..., chosen].reshape(-1, len(chosen)), start.readings.ravel()
         check_planes(W, used)
-        D = -(gain(W) @ Y)
-        covariance = None
-        if start.covariance is not None:
-            columns = [0, 1, *(k for p in chosen for k in (2 + 2 * p, 3 + 2 * p))]
-            own = start.covariance[..., columns, :][..., columns].reshape(len(Y), len(columns), len(columns))
-            covariance = correction_covariance(W, D, Y + W @ D, own)
-            warnings += _unexplained(
-                Y + W @ D, prediction_covariance(D, own), 2 * len(chosen), start.model.dof
-            )
-        rows += judge_unbalance(-D, covariance, tolerance, used, radii=radii, dof=start.model.dof)
+        errors = stack_errors(known, start, list(range(len(at))), chosen)
+        own, common = (None, None) if errors is None else (errors.channels, errors.common)
+        names = reading_names(known.sensors, known.speeds)
+        found = fit_weights(Stack(W, Y, own, None, None, used, names, str, str, common), "least-squares")
+        covariance, dof = (None, None) if errors is None else errors.weights(found)
+        if errors is not None and not errors.explain(found.weights, POOR):
+            warnings += (_UNEXPLAINED,)
+        rows += judge_unbalance(-found.weights, covariance, tolerance, used, radii=radii, dof=dof)
     own_errors = None if start.covariance is None else start.covariance[..., :2, :2]
     limit = None if limits is None else limits.residual[pick]
     rows += _readings(check.sensors, known.speeds, start.readings, own_errors, limit, start.model.dof)
     return _verdict(rows, f"check run {name}", start.labels, warnings)
-
-
-def _unexplained(r: ComplexArray, covariance: FloatArray, fitted: int, dof: float | None) -> tuple[str, ...]:
-    """Warn where weights in the planes do not explain the readings: χ² of what is left, r (N,)."""
-    vector = np.stack((r.real, r.imag), axis=-1)
-    trace = np.trace(covariance, axis1=1, axis2=2)
-    known = trace > 0
-    n = 2 * int(np.count_nonzero(known)) - fitted
-    if n <= 0:
-        return ()
-    # errors in one direction only make a block singular
-    regular = covariance[known] + 1e-9 * trace[known, None, None] * np.eye(2)
-    each = np.linalg.solve(regular, vector[known][..., None])[..., 0]
-    if tail(float(np.sum(vector[known] * each)), n, dof) >= POOR:
-        return ()
-    return (
-        "unbalance in these planes does not explain the readings within their errors: there is more, "
-        "elsewhere on the rotor or not from unbalance; the residual is less certain than it seems",
-    )
 
 
 def _readings(

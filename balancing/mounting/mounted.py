@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.influence import Influence
 from balancing.correction.correct import Correction
-from balancing.data.errors import reading_covariance
+from balancing.correction.stack_errors import stack_errors
 from balancing.data.trials import Trials
 from balancing.mounting.discrete import Discrete, solve_discrete
 from balancing.mounting.holes import Holes, Mounting
@@ -139,6 +139,7 @@ def mount(
     W = influence.W[at][..., chosen].reshape(-1, len(chosen))
     Y = correction.before
     stays = correction.mounted if on_top else None
+    total = np.zeros(len(planes), dtype=complex)
     if stays is not None:
         there = dict(zip(stays[1], stays[2], strict=True))
         unnamed = [
@@ -149,14 +150,13 @@ def mount(
                 f"the holes in which weights of run {stays[0]!r} stand are not named, and must stay free: "
                 f'taken = {{ "3" = 10 }} (hole and weight) in [planes.{unnamed[0]}] of the job'
             )
+        total = np.array([there.get(plane, 0.0) for plane in planes])
         Y = Y + influence.W[at] @ np.array([there.get(plane, 0.0) for plane in influence.planes])
-    channels = None
-    if start.covariance is not None and correction.errors is not None:
-        index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in chosen)])
-        channels = start.covariance[at][..., index[:, None], index].reshape(-1, len(index), len(index))
+    errors = stack_errors(influence, start, at, chosen)
     rows = None if row_weights is None else row_weights[at].ravel()
-    if correction.method == "weighted" and channels is not None:
-        variance = np.trace(prediction_covariance(correction.weights, channels), axis1=1, axis2=2) / 2
+    if correction.method == "weighted" and errors is not None:
+        each = prediction_covariance(correction.weights, errors.channels)
+        variance = np.trace(each, axis1=1, axis2=2) / 2
         rows = (1.0 if rows is None else rows) / np.sqrt(np.maximum(variance, 1e-6 * variance.max()))
     found = solve_discrete(
         W,
@@ -170,10 +170,7 @@ def mount(
     )
     found = replace(found, mountings=tuple(map(_fewest, found.mountings, own)))
     after = Y + (W @ found.weights).reshape(Y.shape)
-    after_covariance = None
-    if channels is not None and correction.errors is not None:
-        single = reading_covariance(after, correction.errors)
-        after_covariance = single + prediction_covariance(found.weights, channels).reshape(single.shape)
+    after_covariance = None if errors is None else errors.check_run(total + found.weights, after)
     return Mounted(correction, own, found, after, after_covariance, None if stays is None else stays[0])
 
 

@@ -15,6 +15,8 @@ both, dY₀ + dW D, and by its own.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from balancing.data.errors import symmetric
@@ -79,10 +81,48 @@ def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, 
     _, M, S, C, n = common.shape
     columns = np.stack((common, 1j * common), axis=-1).view(np.float64).reshape(2, M, S, C, n, 2, 2)
     F = np.swapaxes(columns, -1, -2).reshape(2, M, S * C, 2 * n, 2)
-    moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, -1, 2).sum(axis=3)
-    run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, -1, 2)
+    moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, J.shape[1], 2).sum(axis=3)
+    run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, J.shape[1], 2)
     first, second = (np.einsum("mqu,mpu->qp", part, part) for part in (run, speed))
     return first, second
+
+
+def whitening(
+    own: FloatArray, speed: FloatArray, run: FloatArray
+) -> tuple[Callable[[FloatArray], FloatArray], FloatArray]:
+    """How to divide readings by the root of their joint covariance, and what that consists of.
+
+    Parameters
+    ----------
+    own
+        Covariance of the readings at each speed by errors of their own, (S, n, n).
+    speed, run
+        Columns of errors common at a speed, (S, n, m), and to all speeds, (S, n, k), as `real_columns`.
+
+    Returns
+    -------
+    Function of vectors (S, n, j): independent and of variance 1 after it; and shares of the three kinds in
+    the mean square of what it makes of errors.
+    """
+    root = np.linalg.cholesky(symmetric(own + speed @ np.swapaxes(speed, -1, -2)))
+    moved = np.linalg.solve(root, run)
+    S, n, k = moved.shape
+    Q, s, _ = np.linalg.svd(moved.reshape(S * n, k), full_matrices=False)
+    less = 1 - 1 / np.sqrt(1 + s**2)
+
+    def white(vectors: FloatArray) -> FloatArray:
+        x = np.linalg.solve(root, vectors).reshape(S * n, -1)
+        return np.asarray((x - Q @ (less[:, None] * (Q.T @ x))).reshape(vectors.shape))
+
+    whole = float(np.sum(s**2 / (1 + s**2))) / (S * n)
+    at_speed = float(np.sum(np.linalg.solve(root, speed) ** 2)) / (S * n)
+    return white, np.array([(1 - whole) * (1 - at_speed), (1 - whole) * at_speed, whole])
+
+
+def real_columns(common: ComplexArray) -> FloatArray:
+    """Columns (M, S, n) of complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
+    M, S, n = common.shape
+    return np.asarray(np.transpose(_block(common), (1, 2, 3, 0, 4)).reshape(S, 2 * n, 2 * M))
 
 
 def _block(z: ComplexArray) -> FloatArray:

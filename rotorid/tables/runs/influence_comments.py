@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import NamedTuple, get_args
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_errors import Origin, RunErrors
 from balancing.data.conventions import Labels
 from balancing.data.errors import Source
 from balancing.data.trials import ReadingErrors
@@ -31,19 +33,42 @@ PHASE_MEANING = "phase_deg is the phase reading that a weight at angle 0 causes"
 ERRORS_MEANING = (
     "std and correlation are those of influence*cos(phase_deg), re, and of influence*sin(phase_deg), im"
 )
+BASELINE_MEANING = "rows of (baseline): the vibration without weights, in the unit of the vibration"
 _SIZES = ("amplitude_percent", "phase_deg", "floor")
-_KEYS = (*_SIZES, "source", "degrees_of_freedom")
-_SOURCES = tuple(word for word in get_args(Source) if word != "unknown")
+_RUN = ("run_percent", "run_weights_percent", "run_floor")
+"""Own, common at a speed, common to the run; one number alone: common to the run."""
+_DEGREES = ("degrees_of_freedom", "reading_degrees_of_freedom")
+_COUNTS = {**dict.fromkeys((*_SIZES, *_DEGREES), (1,)), **dict.fromkeys(_RUN, (1, 3))}
+_COUNTS |= {"run_share": (1,), "run_interval": (2,), "run_case": (4,)}
+_WORDS = {"source": tuple(word for word in get_args(Source) if word != "unknown")}
+_WORDS |= {"run_source": get_args(Origin), "run_merged": ("yes", "no")}
+_KEYS = (
+    *_SIZES,
+    "source",
+    *_DEGREES,
+    *_RUN,
+    "run_source",
+    "run_share",
+    "run_interval",
+    "run_case",
+    "run_merged",
+)
 _LINE = re.compile(r"errors?\s*[.:=]\s*(.*)", re.IGNORECASE)
 _STATEMENT = re.compile(r"(\w+)\s*[:=]\s*[\"']?(.*?)[\"']?")
 
 
 class Errors(NamedTuple):
-    """Errors of a single reading, their degrees of freedom, and where they come from."""
+    """Errors of a single reading, degrees of freedom of the coefficients, where they come from.
+
+    Degrees of freedom of a reading, errors between runs, and their share as `Influence.own_between`.
+    """
 
     reading: ReadingErrors | None = None
-    dof: int | None = None
+    dof: float | None = None
     source: Source = "unknown"
+    reading_dof: float | None = None
+    run: RunErrors = RunErrors()
+    between: float = 0.0
 
 
 def read_conventions(source: str, comments: Sequence[str], problems: Problems) -> dict[str, str]:
@@ -69,54 +94,88 @@ def read_conventions(source: str, comments: Sequence[str], problems: Problems) -
     return said
 
 
-def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:  # noqa: C901
+def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
     """Errors of a reading from comment lines such as `# errors.phase_deg = 2`, or what is unknown."""
     before = len(problems)
-    said: dict[str, tuple[str, int]] = {}
+    numbers: dict[str, list[list[float]]] = {}
+    words: dict[str, str] = {}
+    first = ""
     for number, comment in enumerate(table.comments):
         line = _LINE.fullmatch(comment)
         if line is None:
             continue
         statement = _STATEMENT.fullmatch(line[1])
         key = statement[1].casefold() if statement else ""
-        if statement is None or key not in _KEYS:
-            hint = did_you_mean(key, _KEYS)
-            expected = f"# errors.KEY = VALUE with one of the keys {listing(_KEYS)}{hint}"
-            problems.add(table.source, _row(table, number), None, f"# {comment}", expected)
-        elif key in said:
-            problems.add(table.source, _row(table, number), None, f"# {comment}", f"errors.{key} once")
-        else:
-            said[key] = (statement[2], number)
-
-    def complain(key: str, expected: str) -> None:
-        number = said[key][1]
-        problems.add(table.source, _row(table, number), None, f"# {table.comments[number]}", expected)
-
-    sizes: dict[str, float] = {}
-    for key in (key for key in (*_SIZES, "degrees_of_freedom") if key in said):
         try:
-            sizes[key] = parse_number(said[key][0])
+            if statement is None or key not in _KEYS:
+                hint = did_you_mean(key, _KEYS)
+                raise NotANumber(f"# errors.KEY = VALUE with one of the keys {listing(_KEYS)}{hint}")
+            if (key in numbers or key in words) and key != "run_case":
+                raise NotANumber(f"errors.{key} once")
+            if key in _WORDS:
+                words[key] = _word(statement[2], _WORDS[key])
+            else:
+                numbers.setdefault(key, []).append(_numbers(statement[2], key))
         except NotANumber as reason:
-            complain(key, str(reason))
-            continue
-        if sizes[key] < 0:
-            complain(key, "a number of 0 or more")
-    dof = sizes.pop("degrees_of_freedom", None)
-    if dof is not None and dof >= 0 and (dof < 1 or dof != int(dof)):
-        complain("degrees_of_freedom", "a whole number from 1")
-    source = said["source"][0] if "source" in said else "stated"
-    found = next((word for word in _SOURCES if word == " ".join(source.casefold().split())), None)
-    if found is None:
-        complain("source", f"one of {listing(map(repr, _SOURCES))}{did_you_mean(source, _SOURCES)}")
-    if len(problems) > before or not said:
+            problems.add(table.source, _row(table, number), None, f"# {comment}", str(reason))
+        first = first or comment
+    if len(problems) > before or not (numbers or words):
         return Errors()
+    value = {key: found[0][0] for key, found in numbers.items()}
+    sizes = {key: value[key] for key in _SIZES if key in value}
     if not any(sizes.values()):
         expected = f"an error of a reading above 0 with it: # errors.{listing(_SIZES)}"
-        complain(next(iter(said)), expected)
+        problems.add(table.source, _row(table, table.comments.index(first)), None, f"# {first}", expected)
         return Errors()
-    assert found is not None
-    stated = StatedErrors(**sizes).in_si(Labels(vibration_scale=vibration.scale))
-    return Errors(stated, None if dof is None else int(dof), found)
+    dof, reading_dof = (value.get(key) for key in _DEGREES)
+    if not any(key.startswith("run_") for key in (*numbers, *words)):
+        reading_dof = reading_dof or dof
+    return Errors(
+        StatedErrors(**sizes).in_si(Labels(vibration_scale=vibration.scale)),
+        dof,
+        cast("Source", words.get("source", "stated")),
+        reading_dof,
+        _run_errors(numbers, words, vibration.scale),
+        value.get("run_share", 0.0),
+    )
+
+
+def _numbers(text: str, key: str) -> list[float]:
+    values = [parse_number(word) for word in text.split()]
+    if len(values) not in _COUNTS[key]:
+        raise NotANumber(f"{listing([str(n) for n in _COUNTS[key]])} numbers with spaces between them")
+    if min(values) < 0:
+        raise NotANumber("a number of 0 or more")
+    if key in _DEGREES and not values[0]:
+        raise NotANumber("a number above 0")
+    return values
+
+
+def _word(text: str, known: Sequence[str]) -> str:
+    found = " ".join(text.casefold().split())
+    if found not in known:
+        raise NotANumber(f"one of {listing(map(repr, known))}{did_you_mean(text, known)}")
+    return found
+
+
+def _run_errors(
+    numbers: Mapping[str, list[list[float]]], words: Mapping[str, str], scale: float
+) -> RunErrors:
+    sizes = np.zeros((3, 3))
+    for k, key in enumerate(_RUN):
+        if key in numbers:
+            row = numbers[key][0]
+            sizes[k, -len(row) :] = np.array(row) / (scale if key == "run_floor" else 100.0)
+    cases = np.array(numbers.get("run_case", [[1.0, 1.0, 1.0, 1.0]]))
+    interval = numbers.get("run_interval")
+    return RunErrors(
+        sizes,
+        cast("Origin", words.get("run_source", "stated" if sizes.any() else "none")),
+        None if interval is None else (interval[0][0] / scale, interval[0][1] / scale),
+        cases[:, 0] / (cases[:, 0].sum() or 1.0),
+        cases[:, 1:],
+        words.get("run_merged") == "yes",
+    )
 
 
 def _row(table: Table, number: int) -> int | None:
@@ -143,12 +202,29 @@ def check_notes(notes: Sequence[str]) -> None:
 def error_comments(influence: Influence, labels: Labels) -> tuple[str, ...]:
     """Comment lines that `read_errors` reads; none where nothing is known."""
     lines = [] if influence.covariance is None else [ERRORS_MEANING]
-    errors = influence.errors
-    if errors is not None:
-        sizes = (100.0 * errors.amplitude, np.degrees(errors.phase), errors.floor * labels.vibration_scale)
-        lines += [f"errors.{key} = {float(size)!r}" for key, size in zip(_SIZES, sizes, strict=True) if size]
-        if influence.error_source != "unknown":
-            lines.append(f"errors.source = {influence.error_source}")
-        if influence.dof is not None:
-            lines.append(f"errors.degrees_of_freedom = {influence.dof}")
-    return tuple(lines)
+    lines += [] if influence.baseline is None else [BASELINE_MEANING]
+    errors, run, scale = influence.errors, influence.run_errors, labels.vibration_scale
+    if errors is None:
+        return tuple(lines)
+    said: dict[str, ArrayLike | None] = {
+        "amplitude_percent": 100 * errors.amplitude,
+        "phase_deg": np.degrees(errors.phase),
+        "floor": errors.floor * scale,
+        "degrees_of_freedom": influence.dof,
+        "reading_degrees_of_freedom": influence.reading_dof,
+    }
+    words: dict[str, str] = {"source": influence.error_source} if influence.error_source != "unknown" else {}
+    cases = np.zeros((0, 4))
+    if run.origin != "none":
+        said |= dict(zip(_RUN, run.sizes * [[100.0], [100.0], [scale]], strict=True))
+        said["run_share"] = influence.own_between
+        said["run_interval"] = None if run.interval is None else np.multiply(run.interval, scale)
+        words |= {"run_source": run.origin, "run_merged": "yes" if run.merged else "no"}
+        cases = np.column_stack((run.probability, run.ratios))
+    lines += [f"errors.{key} = {_shown(value)}" for key, value in said.items() if np.any(value)]
+    lines += [f"errors.{key} = {word}" for key, word in words.items()]
+    return (*lines, *(f"errors.run_case = {_shown(case)}" for case in cases))
+
+
+def _shown(values: ArrayLike | None) -> str:
+    return " ".join(repr(float(value)) for value in np.ravel(np.asarray(values, dtype=float)))

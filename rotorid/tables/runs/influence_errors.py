@@ -3,19 +3,27 @@
 The columns `std_re_<unit>` and `std_im_<unit>` hold one standard deviation of influence·cos(phase_deg) and
 influence·sin(phase_deg), as the table itself writes them; `correlation_re_im_<plane>` the correlation of the
 first of this row's coefficient with the second of the same sensor's and speed's coefficient of the named
-plane. Correlations with the readings of a bare rotor are not stored: they belong to readings that a later
-baseline run replaces.
+plane. Rows of the plane `(baseline)` hold the vibration of the bare rotor that the coefficients were measured
+with, in the unit of the vibration, and its correlations with them.
+
+What sensors and speeds have in common stands in pairs of columns `common_run_1_re`, `common_run_1_im`, …, and
+`common_speed_1_re`, …: an error moves every coefficient by its column, as a complex share of the root mean
+square of the two standard deviations, times an independent complex number with parts of variance 1: one
+number for the column, or one for each speed. Without the rows of `(baseline)` a later run has errors of its
+own only; without the columns `common_…` sensors and speeds count as independent.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_errors import marginal
 from balancing.data.conventions import Labels
-from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.tables.reader.columns import Column, Table, must_be
 from rotorid.tables.reader.grid import Grid, show
 from rotorid.tables.reader.number import SMALLEST
@@ -23,13 +31,17 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader, ratio, spelt
 
 PARTS = ("re", "im")
+BASELINE = "(baseline)"
+"""In the column of the plane: the vibration without weights."""
+_COMMON = re.compile(r"common_(run|speed)_\d+_(re|im)")
+_NOTHING = 1e-14
 _ROUNDING = 1e-9
 _INDEFINITE = 1e-6
 
 
 def error_columns(grid: Grid, influence_unit: UnitReader) -> tuple[Column, ...]:
     """The columns of errors that a table must have, if it has any of them; else none."""
-    if not any(name.startswith(("std_", "correlation_")) for name in grid.header):
+    if not any(name.startswith(("std_", "correlation_", "common_")) for name in grid.header):
         return ()
     unit = next((name.partition("_")[2] for name in grid.header if name.startswith("influence_")), "")
 
@@ -39,8 +51,11 @@ def error_columns(grid: Grid, influence_unit: UnitReader) -> tuple[Column, ...]:
         return influence_unit(name)
 
     columns = [Column(f"std_{part}", same, (f"std_{part}_{unit}",)) for part in PARTS]
-    for plane in _planes(grid):
-        columns += [Column(_correlation(a, b, plane), ratio) for a in PARTS for b in PARTS]
+    planes = _planes(grid)
+    for plane in dict.fromkeys((*planes, BASELINE)):
+        needed = plane in planes
+        columns += [Column(_correlation(a, b, plane), ratio, (), needed) for a in PARTS for b in PARTS]
+    columns += [Column(name, ratio, (), False) for name in grid.header if _COMMON.fullmatch(name)]
     return tuple(columns)
 
 
@@ -57,8 +72,8 @@ def _correlation(a: str, b: str, plane: object) -> str:
 
 def read_covariance(
     table: Table, places: IndexArray, planes: Sequence[str], sign: int, problems: Problems
-) -> FloatArray | None:
-    """Covariance of the coefficients in SI and phase lead, or None without such columns or with problems.
+) -> tuple[FloatArray, ComplexArray] | None:
+    """Covariance in SI and phase lead, what is common of it; None without such columns or with problems.
 
     Parameters
     ----------
@@ -67,7 +82,7 @@ def read_covariance(
     places
         Index of the row of each coefficient, shape (S, C, P).
     planes
-        Names, length P.
+        Names, length P, `BASELINE` among them or not.
     sign
         −1 where the phases of the table lag.
     problems
@@ -75,7 +90,7 @@ def read_covariance(
 
     Returns
     -------
-    (S, C, 2P + 2, 2P + 2) as `Influence.covariance`, zero where the reading of the bare rotor stands.
+    (S, C, 2P, 2P), and as `Influence.common`, (2, M, S, C, P).
     """
     if "std_re" not in table:
         return None
@@ -101,9 +116,27 @@ def read_covariance(
     if len(problems) > before:
         return None
     std = np.stack([table.numbers(f"std_{part}")[places] for part in PARTS], axis=-1).reshape(S, C, 2 * P)
+    common = _read_common(table, places, sign) * np.sqrt(np.mean(std.reshape(S, C, P, 2) ** 2, axis=-1))
     std = std * np.tile([1.0, float(sign)], P)
-    out = np.zeros((S, C, 2 * P + 2, 2 * P + 2))
-    out[..., 2:, 2:] = (R + np.swapaxes(R, -1, -2)) / 2 * std[..., None] * std[..., None, :]
+    covariance = (R + np.swapaxes(R, -1, -2)) / 2 * std[..., None] * std[..., None, :]
+    own, scale = covariance - marginal(common), np.where(std > 0, np.abs(std), 1.0)
+    for s, c in np.ndindex(S, C):
+        if np.linalg.eigvalsh(own[s, c] / np.outer(scale[s, c], scale[s, c]))[0] < -_INDEFINITE:
+            stem = next(name for name in table.fields if name.startswith("common_"))
+            expected = "no more in common than the standard deviations and correlations of this row say"
+            table.complain(problems, int(places[s, c, 0]), stem, expected)
+            return None
+    return covariance, common
+
+
+def _read_common(table: Table, places: IndexArray, sign: int) -> ComplexArray:
+    """Shares that errors have in common, (2, M, S, C, P); an im without a re counts, too."""
+    names = sorted({name[:-3] for name in table.fields if name.startswith("common_")})
+    out = np.zeros((2, len(names), *places.shape), dtype=complex)
+    for m, name in enumerate(names):
+        for part, unit in zip(PARTS, (1, 1j * sign), strict=True):
+            if f"{name}_{part}" in table:
+                out[int(name.startswith("common_speed")), m] += unit * table.numbers(f"{name}_{part}")[places]
     return out
 
 
@@ -141,26 +174,57 @@ def _check_correlations(
             table.complain(problems, int(places[s, c, i // 2]), stem, expected)
 
 
-def error_values(influence: Influence, labels: Labels) -> Mapping[str, FloatArray]:
-    """The columns of errors by their names, shape (S·C·P,) each; none where the errors are unknown."""
+def error_values(influence: Influence, labels: Labels, rows: Sequence[str]) -> Mapping[str, FloatArray]:
+    """The columns of errors by their names, shape (S·C·n,) each; none where the errors are unknown.
+
+    Rows: the planes, after `BASELINE` where that is written.
+    """
     if influence.covariance is None:
         return {}
-    S, C, P = influence.W.shape
-    scale = labels.vibration_scale / labels.weight_scale
+    S, C = influence.W.shape[:2]
+    n, first = len(rows), 1 + len(influence.planes) - len(rows)
+    scale = (
+        labels.vibration_scale * np.array([1.0, *(1 / labels.weight_scale for _ in influence.planes)])[first:]
+    )
     above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""
-    flip = np.tile([1.0, float(labels.phase_sign)], P)
-    covariance = influence.covariance[..., 2:, 2:] * np.outer(flip, flip)
+    flip = np.tile([1.0, float(labels.phase_sign)], n)
+    covariance = influence.covariance[..., 2 * first :, 2 * first :] * np.outer(flip, flip)
     std = np.sqrt(np.maximum(np.einsum("scii->sci", covariance), 0.0))
-    std = np.where(std * scale < SMALLEST, 0.0, std)
+    std = np.where(std * np.repeat(scale, 2) < SMALLEST, 0.0, std)
     safe = np.where(std > 0, std, 1.0)
     R = np.where((std > 0)[..., None] & (std > 0)[..., None, :], covariance, 0.0)
     R = R / safe[..., None] / safe[..., None, :]
-    R = np.where(np.abs(R) < SMALLEST, 0.0, np.clip(R, -1.0, 1.0))  # no reader accepts smaller ones
-    R[..., np.arange(2 * P), np.arange(2 * P)] = 1.0
-    each, blocks = std.reshape(S, C, P, 2) * scale, R.reshape(S, C, P, 2, P, 2)
+    R = _written(np.clip(R, -1.0, 1.0))
+    R[..., np.arange(2 * n), np.arange(2 * n)] = 1.0
+    each, blocks = std.reshape(S, C, n, 2), R.reshape(S, C, n, 2, n, 2)
     unit = f"{above}per_{labels.weight_unit}"
-    out = {f"std_{part}_{unit}": each[..., a].ravel() for a, part in enumerate(PARTS)}
-    for q, plane in enumerate(influence.planes):
+    out = {f"std_{part}_{unit}": (each[..., a] * scale).ravel() for a, part in enumerate(PARTS)}
+    for q, plane in enumerate(rows):
         for a, b in np.ndindex(2, 2):
             out[_correlation(PARTS[a], PARTS[b], plane)] = blocks[..., a, q, b].ravel()
+    if influence.common is None:
+        return out
+    size = np.sqrt(np.mean(each**2, axis=-1))
+    share = np.where(size > 0, influence.common[..., first:] / np.where(size > 0, size, 1.0), 0.0)
+    run = _fewest(share[0].reshape(-1, S * C * n)).reshape(-1, S, C, n)
+    speeds = [_fewest(share[1, :, s].reshape(-1, C * n)).reshape(-1, C, n) for s in range(S)]
+    speed = np.zeros((max(map(len, speeds)), S, C, n), dtype=complex)
+    for s, columns in enumerate(speeds):
+        speed[: len(columns), s] = columns
+    for kind, found in (("run", run), ("speed", speed)):
+        for m, column in enumerate(found, 1):
+            out[f"common_{kind}_{m}_re"] = _written(column.real).ravel()
+            out[f"common_{kind}_{m}_im"] = _written(labels.phase_sign * column.imag).ravel()
     return out
+
+
+def _fewest(columns: ComplexArray) -> ComplexArray:
+    """As few columns (M, n) as make the same covariance."""
+    s, right = np.linalg.svd(columns, full_matrices=False)[1:]
+    kept = s > _NOTHING * s.max(initial=0.0)
+    return np.asarray(s[kept, None] * right[kept])
+
+
+def _written(values: FloatArray) -> FloatArray:
+    """Without numbers so small that no reader accepts them."""
+    return np.where(np.abs(values) < SMALLEST, 0.0, values)

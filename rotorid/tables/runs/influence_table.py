@@ -29,7 +29,7 @@ from rotorid.tables.runs.influence_comments import (
     read_conventions,
     read_errors,
 )
-from rotorid.tables.runs.influence_errors import error_columns, error_values, read_covariance
+from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
 from rotorid.tables.runs.runs_table import PHASE, SPEED
 from rotorid.tables.runs.speeds import same_speed, show_speed
 
@@ -114,8 +114,8 @@ def read_influence(
     Returns
     -------
     balancing.Influence
-        In SI, phase lead, with labels to print in and without a baseline; with the covariance of the
-        coefficients and the errors of a reading where the table has them (`write_influence`).
+        In SI, phase lead, with labels to print in; with a baseline, the covariance of the coefficients and
+        the errors of a reading where the table has them (`write_influence`).
 
     Raises
     ------
@@ -146,7 +146,7 @@ def load_influence(
     must_be(table, "phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
     sensor, plane = table.texts("sensor"), table.texts("plane")
     sensors = tuple(dict.fromkeys(name for name in sensor if name))
-    planes = tuple(dict.fromkeys(name for name in plane if name))
+    planes = tuple(sorted({name: 0 for name in plane if name}, key=lambda name: name != BASELINE))
     speeds = sorted({float(value) for value in speed if value > 0})
     at = [{value: k for k, value in enumerate(values)} for values in (speeds, sensors, planes)]
     seen: dict[tuple[int, int, int], int] = {}
@@ -177,7 +177,7 @@ def load_influence(
     for key, i in seen.items():
         places[key] = i
     vibration, weight = _split(table.unit("influence").name)
-    covariance = read_covariance(table, places, planes, sign, problems)
+    known = read_covariance(table, places, planes, sign, problems)
     errors = read_errors(table, vibration, problems)
     if len(problems) > before:
         return None
@@ -189,18 +189,42 @@ def load_influence(
         phase=phase or as_phase(said.get("phase", "lead")),
         angles=angles or as_angles(said.get("angles", "with rotation")),
     )
+    theta, covariance, common = _whole(polar(size, angle, sign)[places], known, planes, weight.scale)
     influence = Influence(
         speeds=np.array(speeds),
         sensors=sensors,
-        planes=planes,
-        W=polar(size, angle, sign)[places],
+        planes=tuple(name for name in planes if name != BASELINE),
+        W=theta[..., 1:],
+        baseline=theta[..., 0] if BASELINE in planes else None,
         covariance=covariance,
+        common=common,
         dof=errors.dof,
         errors=errors.reading,
         error_source=errors.source,
+        reading_dof=errors.reading_dof,
+        run_errors=errors.run,
+        own_between=errors.between,
         labels=labels,
     )
     return Stored(influence, said)
+
+
+def _whole(
+    values: ComplexArray, known: tuple[FloatArray, ComplexArray] | None, planes: Sequence[str], scale: float
+) -> tuple[ComplexArray, FloatArray | None, ComplexArray | None]:
+    """(Y₀, W), covariance and common columns of rows with a baseline or without, and then zero there."""
+    to = np.array([1 / scale if name == BASELINE else 1.0 for name in planes])
+    first = 0 if BASELINE in planes else 1
+    n = len(planes) + first
+    theta = np.zeros((*values.shape[:2], n), dtype=complex)
+    theta[..., first:] = values * to
+    if known is None:
+        return theta, None, None
+    covariance = np.zeros((*values.shape[:2], 2 * n, 2 * n))
+    covariance[..., 2 * first :, 2 * first :] = known[0] * np.outer(np.repeat(to, 2), np.repeat(to, 2))
+    common = np.zeros((*known[1].shape[:-1], n), dtype=complex)
+    common[..., first:] = known[1] * to
+    return theta, covariance, common
 
 
 def influence_frame(coefficients: Coefficients, labels: Labels | None = None) -> pd.DataFrame:
@@ -217,23 +241,29 @@ def influence_frame(coefficients: Coefficients, labels: Labels | None = None) ->
     -------
     pandas.DataFrame
         `speed_rad_s`, `sensor`, `plane`, `influence_<unit>`, `phase_deg`; where their errors are known,
-        also `std_re_<unit>`, `std_im_<unit>` and the correlations.
+        also `std_re_<unit>`, `std_im_<unit>`, the correlations and what is common.
     """
     import pandas as pd
 
     labels = labels or labels_of(coefficients)
-    W = np.asarray(coefficients.W)
-    S, C, P = W.shape
+    values, rows = (
+        np.asarray(coefficients.W) / labels.weight_scale,
+        [str(name) for name in coefficients.planes],
+    )
+    own = coefficients if isinstance(coefficients, Influence) else None
+    if own is not None and own.baseline is not None and BASELINE not in rows:
+        values, rows = np.concatenate((own.baseline[..., None], values), axis=-1), [BASELINE, *rows]
+    S, C, n = values.shape
     above = f"{labels.vibration_unit}_" if labels.vibration_unit else ""
-    size, phase = labels.vibration(W / labels.weight_scale)
+    size, phase = labels.vibration(values)
     return pd.DataFrame(
         {
-            "speed_rad_s": np.repeat(np.asarray(coefficients.speeds, dtype=float), C * P),
-            "sensor": [str(label(name)) for _ in range(S) for name in coefficients.sensors for _ in range(P)],
-            "plane": [str(name) for _ in range(S * C) for name in coefficients.planes],
+            "speed_rad_s": np.repeat(np.asarray(coefficients.speeds, dtype=float), C * n),
+            "sensor": [str(label(name)) for _ in range(S) for name in coefficients.sensors for _ in range(n)],
+            "plane": rows * (S * C),
             f"influence_{above}per_{labels.weight_unit}": size.ravel(),
             "phase_deg": phase.ravel(),
-            **(error_values(coefficients, labels) if isinstance(coefficients, Influence) else {}),
+            **({} if own is None else error_values(own, labels, rows)),
         }
     )
 
@@ -247,8 +277,10 @@ def labels_of(coefficients: Coefficients) -> Labels:
 def write_influence(path: str | Path, influence: Coefficients, notes: Sequence[str] = ()) -> None:
     """Write influence coefficients to `.csv` or `.xlsx`: with their conventions, and errors where known.
 
-    What is stored of the errors: the covariance of the coefficients, and the errors of a reading with their
-    source and degrees of freedom. The readings of the bare rotor are not stored: a later job has its own.
+    What is stored of the errors: the covariance of the coefficients, what sensors and speeds have in common,
+    the errors of a reading and between runs, their source and degrees of freedom; and the readings of the
+    bare rotor, with which the errors are correlated. A later job with readings of its own has errors of its
+    own; the same readings have the same errors as before.
 
     Parameters
     ----------
@@ -334,14 +366,7 @@ def fit_to_readings(
     if not trials.planes and unit.name == "kg_m":
         unit = units.UNBALANCE["g_mm"]  # a model speaks SI; nobody weighs a correction in kg·m
     labels = replace(ours, weight_unit=unit.name, weight_scale=unit.scale)
-    return replace(
-        influence,
-        speeds=trials.speeds,
-        sensors=trials.sensors,
-        W=influence.W[np.ix_(rows, columns)],
-        covariance=None if influence.covariance is None else influence.covariance[np.ix_(rows, columns)],
-        labels=labels,
-    )
+    return replace(influence.part(rows, columns), speeds=trials.speeds, labels=labels)
 
 
 def _kind(unit: str) -> str:
