@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 LEVEL = 0.95
 """A difference whose χ² would be exceeded by errors alone in less than 5 % of all jobs is not explained."""
 
+_DIRECTIONS = 8
 _EXACT = 1e-9
 """Nothing is known better than this share of the largest reading."""
 
@@ -215,7 +216,9 @@ def compare_check(
         stacked = np.moveaxis(d, 0, 2).reshape(len(at), -1, 1)
         between = influence.own_between
         kinds = np.array([shares[0] * (1 - between), shares[0] * between, *shares[1:]])
-        scale, dof = influence.run_errors.degrees(kinds, d.size, dof)
+        # all directions alike: so many tell the degrees of freedom
+        unit = np.eye(min(d.size, _DIRECTIONS))
+        scale, dof = influence.run_errors.degrees(kinds[:, None, None] * unit, dof)
         chi_square = float(np.sum(white(stacked) ** 2)) / scale
         probability = tail(chi_square, d.size, dof)
         explained = probability >= 1 - LEVEL
