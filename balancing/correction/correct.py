@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.convention_test import ConventionTest
-from balancing.coefficients.identifiability import check_planes, check_resolution
+from balancing.coefficients.identifiability import UndeterminedError, check_planes, check_resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.choice import coefficients_of, plane_indices, rows_of
@@ -330,6 +330,7 @@ def correct(  # noqa: PLR0913
     rows = rows_of(row_weights, influence.W.shape[:2], used)
     felt = W if rows is None else W[rows > 0]  # what weights of 0 leave says how well planes are told apart
     soft = strength is not None or keep is not None
+    asked = method
     if method is None:
         method = "weighted" if start.covariance is not None and not soft else "least-squares"
     unclear: tuple[str, ...] = ()
@@ -362,7 +363,13 @@ def correct(  # noqa: PLR0913
         None if errors is None else errors.common,
         None if errors is None else errors.explain,
     )
-    fitted = fit_weights(stack, method, strength=strength, keep=keep)
+    try:
+        fitted = fit_weights(stack, method, strength=strength, keep=keep)
+    except UndeterminedError as error:
+        if asked is not None or start.model.source != "assumed":
+            raise
+        method, unclear = "least-squares", (*unclear, f"{error}; least squares is used")
+        fitted = fit_weights(stack, method)
     D = fitted.weights
     if stack.limits is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)

@@ -68,10 +68,10 @@ def test_a_forgotten_row_of_the_weights_table_is_asked_for():
 @each_of(
     ("change", "errors", "asked"),
     [
-        (1.09, None, False),
-        (1.13, None, True),
+        (1.18, None, False),
+        (1.30, None, True),
         (np.exp(0.15j), None, False),
-        (np.exp(0.2j), None, True),
+        (np.exp(0.25j), None, True),
         (1.03, ERRORS, False),
         (1.06, ERRORS, True),
         (np.exp(0.06j), ReadingErrors(amplitude=0.01), True),

@@ -18,7 +18,7 @@ def test_an_exact_job_gives_its_coefficients_and_the_least_squares_weights(seed,
     influence = estimate_influence(trials)
     np.testing.assert_allclose(influence.W, W, rtol=1e-9, atol=1e-9 * np.abs(W).max())
     np.testing.assert_allclose(influence.baseline, Y0, rtol=1e-9)
-    c = correct(influence)
+    c = correct(influence, method="least-squares")
     flat = W.reshape(-1, planes)
     expected = np.linalg.lstsq(flat, -Y0.ravel(), rcond=None)[0]
     np.testing.assert_allclose(c.weights, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
@@ -37,7 +37,7 @@ def test_unbalance_in_the_planes_is_found_and_undone(seed):
     U = complex_normal(rng, 2) * GRAM
     T = np.vstack((np.zeros(2), np.diag(complex_normal(rng, 2)))) * GRAM
     trials = job(np.einsum("scp,rp->rsc", W, T + U), T, speeds=(100.0, 200.0))
-    c = correct(estimate_influence(trials))
+    c = correct(estimate_influence(trials), method="least-squares")
     np.testing.assert_allclose(c.weights, -U, rtol=1e-6, atol=1e-9 * GRAM)
 
 
@@ -77,8 +77,8 @@ def test_the_order_of_the_runs_does_not_matter(seed, order):
     a = correct(estimate_influence(job(noisy, T, speeds=trials.speeds)))
     index = list(order)
     b = correct(estimate_influence(job(noisy[index], T[index], speeds=trials.speeds)))
-    np.testing.assert_allclose(b.weights, a.weights, rtol=1e-9)
-    np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-6, atol=1e-9 * np.abs(a.covariance).max())
+    np.testing.assert_allclose(b.weights, a.weights, rtol=1e-7)
+    np.testing.assert_allclose(b.covariance, a.covariance, rtol=1e-4, atol=1e-9 * np.abs(a.covariance).max())
 
 
 @unhurried
@@ -89,7 +89,10 @@ def test_trial_weights_removed_or_left_in_say_the_same(seed):
     removed = np.diag([1, 1j, -1]) * GRAM
     W, Y0 = complex_normal(rng, (2, 3, 3)) * 1e3, complex_normal(rng, (2, 3))
     results = [
-        correct(estimate_influence(job(Y0 + np.einsum("scp,rp->rsc", W, T), T, speeds=(100.0, 200.0))))
+        correct(
+            estimate_influence(job(Y0 + np.einsum("scp,rp->rsc", W, T), T, speeds=(100.0, 200.0))),
+            method="least-squares",
+        )
         for T in (left_in, np.vstack((np.zeros(3), removed)))
     ]
     np.testing.assert_allclose(results[0].weights, results[1].weights, rtol=1e-6)

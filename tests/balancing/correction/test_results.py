@@ -7,7 +7,7 @@ from dataclasses import replace
 import matplotlib
 import numpy as np
 import pytest
-from balancing_data import bruel_kjaer, feese_grazier, synthetic
+from balancing_data import bruel_kjaer, feese_grazier, job, synthetic
 from matplotlib.figure import Figure
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
@@ -29,7 +29,7 @@ KEYS = {
 }
 
 
-@pytest.fixture(params=[None, ERRORS], ids=["errors unknown", "errors stated"])
+@pytest.fixture(params=[None, ERRORS], ids=["errors assumed", "errors stated"])
 def correction(request):
     return correct(estimate_influence(bruel_kjaer(errors=request.param)))
 
@@ -37,7 +37,7 @@ def correction(request):
 def test_the_keys_of_the_interface(correction):
     d = correction.to_dict()
     assert set(d) >= KEYS
-    assert d["method"] == "least-squares"
+    assert d["method"] == "weighted"
     row = ["plane", "mass", "unit", "angle_deg", "mass_std", "angle_std_deg", "covariance"]
     assert list(d["corrections"][0]) == [*row, "action", "remove_at_deg"]
     row = [
@@ -104,11 +104,11 @@ def test_long_names_and_many_warnings_fit_too():
 
 
 def test_warnings_come_first():
-    weak = bruel_kjaer()
-    near = weak.readings[0].copy()
-    near[1] = near[0] * 1.05
-    c = correct(estimate_influence(replace(weak, readings=near[None])))
-    assert c.summary().startswith("Warning: the trial weight in plane 'A'")
+    apart = bruel_kjaer()
+    again = np.concatenate((apart.readings[0], 1.5 * apart.readings[0, :1]))
+    c = correct(estimate_influence(job(again, np.vstack((apart.weights, [[0, 0]])))), refuse=False)
+    assert "runs 'run 0' and 'run 3' have the same weights mounted" in c.warnings[0]
+    assert c.summary().index("have the same weights mounted") < c.summary().index("Corrections")
 
 
 def test_the_95_percent_of_the_text_is_that_of_the_numbers():

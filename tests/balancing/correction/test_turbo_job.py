@@ -22,7 +22,7 @@ def maker():
 
 @pytest.fixture(scope="module")
 def correction():
-    return correct(estimate_influence(read_job(JOB / "job.toml").trials))
+    return correct(estimate_influence(read_job(JOB / "job.toml").trials), method="least-squares")
 
 
 def test_the_tables_are_what_the_script_makes(maker, tmp_path):
@@ -67,3 +67,14 @@ def test_the_corrections_lie_within_their_errors_of_those_without_rounding(maker
     # and that says something: the errors are small beside the weights
     assert (correction.mass_std < 0.1 * np.abs(correction.weights)).all()
     assert correction.warnings == ()
+
+
+def test_the_default_says_that_there_is_unbalance_outside_the_planes(maker, correction):
+    found = correct(estimate_influence(read_job(JOB / "job.toml").trials))
+    assert found.method == "weighted"
+    [words] = found.warnings
+    assert "unbalance outside the planes" in words
+    after = np.abs(maker.simulate(found.weights))
+    assert np.abs(maker.simulate(np.zeros(3))).max() >= 50 * after.max()
+    d = (found.weights - correction.weights).view(float)
+    assert d @ np.linalg.solve(found.covariance, d) < 22.46  # χ² with 6, 99.9 %
