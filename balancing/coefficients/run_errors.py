@@ -38,8 +38,9 @@ ASSUMED = 0.02
 """Of a reading, from run to run, where nothing says more."""
 SIZES = np.geomspace(3e-4, 1.0, 12)
 """Whole size relative to the root mean square reading; refined where the likelihood is."""
-MIXTURES = np.array([(1.0, 0, 0), (0.6, 0, 0.4), (0, 0, 1.0), (0, 0.5, 0.5), (0.5, 0.5, 0)])
-"""Shares of p, w and f in the mean variance of the readings."""
+_P, _F, _PF, _WF, _PW = (1.0, 0, 0), (0, 0, 1.0), (0.6, 0, 0.4), (0, 0.5, 0.5), (0.5, 0.5, 0)
+MIXTURES = np.array([(_P, _P), (_P, _F), (_F, _F), (_PF, _PF), (_WF, _WF), (_PW, _PW)])
+"""Shares of p, w and f in the mean variance of the readings, of the kind own and of those in common."""
 SHARES = (0.04, 0.3, 0.6)
 """Of the kind own in the variance, or 1; no error between runs is common to all sensors to the last digit."""
 EXPLAINED = 0.95
@@ -278,33 +279,36 @@ def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
 
 
 class Grid(NamedTuple):
-    """Points: every size, every mixture of p, w and f (M, 3), every set of shares of the kinds (H, 3).
+    """Points: every size, every mixture of p, w and f (M, 2, 3), every set of shares of the kinds (H, 3).
 
-    A mixture gives squares of `RunErrors.sizes` relative to the square of the size.
+    A mixture gives squares of `RunErrors.sizes` relative to the square of the size, of the kind own and of
+    those in common. `weights` (H,) are the probabilities of the shares before the data.
     """
 
     sizes: FloatArray
     mixtures: FloatArray
     shares: FloatArray
+    weights: FloatArray
 
     @property
     def points(self) -> FloatArray:
         """Squares of `RunErrors.sizes`, sizes first, (G, 3, 3)."""
-        found = np.einsum("g,mb,hk->gmhbk", self.sizes**2, self.mixtures, self.shares)
+        found = np.einsum("g,mkb,hk->gmhbk", self.sizes**2, self.mixtures[:, [0, 1, 1]], self.shares)
         return np.asarray(found.reshape(-1, 3, 3))
 
 
 def _grid(sizes: FloatArray, runs: Runs, mixtures: FloatArray = MIXTURES) -> Grid:
     """Of all mixtures and shares that such runs tell apart."""
     _, S, C = runs.Y.shape
-    shares = [(1.0, 0.0, 0.0)]
+    kinds = [[(1.0, 0.0, 0.0)]]
     if S * C > 1:
-        shares += [(own, 0.0, 1 - own) for own in SHARES]
+        kinds += [[(own, 0.0, 1 - own) for own in SHARES]]
     if S > 1 and C > 1:
-        shares += [(own, (1 - own) * part, (1 - own) * (1 - part)) for own in SHARES for part in (0.5, 1.0)]
-    used = mixtures[(mixtures[:, 1] == 0) | bool(runs.mean[1] > 0)]
+        kinds += [[(own, (1 - own) * part, (1 - own) * (1 - part)) for own in SHARES] for part in (0.5, 1.0)]
+    used = mixtures[~mixtures[..., 1].any(axis=1) | bool(runs.mean[1] > 0)]
     each = used / np.where(runs.mean > 0, runs.mean, 1.0) * runs.mean[0]
-    return Grid(sizes, each, np.array(shares))
+    weights = np.concatenate([np.full(len(kind), 1 / len(kind)) for kind in kinds])
+    return Grid(sizes, each, np.concatenate(kinds), weights / weights.sum())
 
 
 class Spectrum(NamedTuple):
@@ -341,11 +345,11 @@ def _of_row(rows: Rows, k: int, runs: Runs, grid: Grid) -> Spectrum:
     """Σ = s² V + K = L U (s² + μ) Uᴴ Lᴴ, with V = L Lᴴ and the eigenvalues μ of L⁻¹ K L⁻ᴴ."""
     S, C = rows.e.shape[1:]
     n = S * C
-    own = np.einsum("mb,r,brsc->msc", grid.mixtures, rows.share[k], runs.size).reshape(-1, n)
+    own = np.einsum("mb,r,brsc->msc", grid.mixtures[:, 0], rows.share[k], runs.size).reshape(-1, n)
     root = np.sqrt(rows.share[k])[:, None, None]
     columns = [root * runs.Y, root * runs.effect, np.sqrt(rows.share[k].sum()) * runs.unbalance]
     each = [column.reshape(-1, n) for column in columns]
-    common = np.einsum("mb,bij->mij", grid.mixtures, [F.T @ F.conj() for F in each])
+    common = np.einsum("mb,bij->mij", grid.mixtures[:, 1], [F.T @ F.conj() for F in each])
     by_speed = common * np.kron(np.eye(S), np.ones((C, C)))
     # of both directions; the least is rounding
     V = 2 * np.einsum("hk,kmij->mhij", grid.shares, [own[:, :, None] * np.eye(n), by_speed, common])
@@ -384,16 +388,16 @@ def estimated(rows: Sequence[Rows], runs: Runs) -> RunErrors:
     """
     coarse = _grid(SIZES, runs)
     found = [spectrum(each, runs, coarse) for each in rows if each.dof > 0]
-    found = _agreeing(rows, found, SIZES, _posterior(found[:1], SIZES))
-    table = _posterior(found, SIZES).reshape(len(SIZES), -1)
+    found = _agreeing(rows, found, SIZES, _posterior(found[:1], coarse))
+    table = _posterior(found, coarse).reshape(len(SIZES), -1)
     seen = np.flatnonzero(table.sum(axis=1) > _LIKELY * table.sum(axis=1).max())
     low, high = SIZES[max(seen[0] - 1, 0)], SIZES[min(seen[-1] + 1, len(SIZES) - 1)]
     sizes = np.geomspace(low, high, FINE)
-    probability = _posterior(found, sizes)
+    fine = coarse._replace(sizes=sizes)
+    probability = _posterior(found, fine)
     cumulated = np.cumsum(probability.reshape(FINE, -1).sum(axis=1))
     limits = np.interp((0.025, 0.975), cumulated, sizes) * np.sqrt(runs.mean[0])
-    points = coarse._replace(sizes=sizes).points
-    return _of_grid(points, probability, runs, "estimated", (float(limits[0]), float(limits[1])))
+    return _of_grid(fine.points, probability, runs, "estimated", (float(limits[0]), float(limits[1])))
 
 
 def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origin: Origin) -> RunErrors:
@@ -403,8 +407,7 @@ def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origi
         return RunErrors(origin=origin)
     found = [spectrum(each, runs, grid) for each in rows if each.dof > 0]
     found = _agreeing(rows, found, grid.sizes, np.ones(len(grid.points)))
-    probability = _posterior(found, grid.sizes) if found else _normal(np.zeros(len(grid.points)))
-    return _of_grid(grid.points, probability, runs, origin, None)
+    return _of_grid(grid.points, _posterior(found, grid), runs, origin, None)
 
 
 def scatter(
@@ -416,7 +419,7 @@ def scatter(
     """
     n = sum(each.dof for each in rows)
     grid = _known(runs, relative, floor)
-    log, q = _likelihood([spectrum(each, runs, grid) for each in rows], grid.sizes)
+    log, q = _likelihood([spectrum(each, runs, grid) for each in rows], grid)
     weight = _normal(-log - n * np.log(np.maximum(q, 1e-300)))
     return float(np.sqrt(weight @ q / n)), _chance(q, n, weight)
 
@@ -482,18 +485,21 @@ def _known(runs: Runs, relative: float, floor: float) -> Grid:
     parts = np.array([relative**2, 0.0, floor**2]) * runs.mean
     whole = parts.sum()
     mixture = parts / whole if whole else np.array([1.0, 0.0, 0.0])
-    return _grid(np.sqrt([whole / (runs.mean[0] or 1.0)]), runs, mixture[None])
+    return _grid(np.sqrt([whole / (runs.mean[0] or 1.0)]), runs, np.stack((mixture, mixture))[None])
 
 
-def _likelihood(found: Sequence[Spectrum], sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _likelihood(found: Sequence[Spectrum], grid: Grid) -> tuple[FloatArray, FloatArray]:
     """Sum over all rows."""
-    log, q = zip(*(each.at(sizes) for each in found), strict=True)
-    return np.sum(log, axis=0), np.sum(q, axis=0)
+    log, q = np.zeros((2, len(grid.points)))
+    for each in found:
+        more = each.at(grid.sizes)
+        log, q = log + more[0], q + more[1]
+    return log, q
 
 
-def _posterior(found: Sequence[Spectrum], sizes: FloatArray) -> FloatArray:
-    log, q = _likelihood(found, sizes)
-    return _normal(-log - q)
+def _posterior(found: Sequence[Spectrum], grid: Grid) -> FloatArray:
+    log, q = _likelihood(found, grid)
+    return _normal(np.tile(np.log(grid.weights), len(log) // len(grid.weights)) - log - q)
 
 
 def _chance(q: FloatArray, n: int, probability: FloatArray) -> float:

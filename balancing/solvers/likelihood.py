@@ -118,23 +118,27 @@ def jacobian(problem: Problem, at: State) -> tuple[FloatArray, FloatArray]:
 
 def covariance(problem: Problem, at: State) -> FloatArray:
     """A⁻¹ V A⁻¹ at the minimum, with V = M for equal weights and Σ w⁴ Ŵᵀ Σ⁻¹ Ŵ for others, (2P, 2P)."""
-    root = _inverse_root(_gram(at.J, problem.weight))
-    share, vectors = np.linalg.eigh(symmetric(root.T @ _noise(problem, at) @ root))
-    X = root @ vectors
-    inverse = (X / np.maximum(1 - share, LEAST_INFORMATION)) @ X.T
+    inverse = _corrected_inverse(problem, at)
     rows = (problem.weight[:, None, None] * at.J).reshape(-1, len(inverse)) @ inverse
     return symmetric(rows.T @ rows)
 
 
 def derivatives(problem: Problem, at: State, d: FloatArray) -> FloatArray:
-    """Of the stretched D at the minimum by the data z of each reading, (N, 2P, 2P + 2), first order."""
-    root = _inverse_root(_gram(at.J, problem.weight))
+    """Of the stretched D at the minimum by the data z of each reading, (N, 2P, 2P + 2): −A⁻¹ Ŵᵀ Σ⁻¹ B."""
     l11, l21, l22 = at.L
     first = problem.weight[:, None] * at.J[:, 0] / l11[:, None]
     second = problem.weight[:, None] * at.J[:, 1] / l22[:, None]
     # Ŵᵀ Σ⁻¹ = Jᵀ L⁻¹, the columns of L⁻¹: (1/l11, −l21/(l11 l22)) and (0, 1/l22)
     rows = np.stack((first - second * (l21 / l11)[:, None], second), axis=-1)
-    return np.asarray(-(root @ root.T) @ rows @ constraint(d))
+    return np.asarray(-_corrected_inverse(problem, at) @ rows @ constraint(d))
+
+
+def _corrected_inverse(problem: Problem, at: State) -> FloatArray:
+    """A⁻¹: that of M less what the errors of Ŵ put into it."""
+    root = _inverse_root(_gram(at.J, problem.weight))
+    share, vectors = np.linalg.eigh(symmetric(root.T @ _noise(problem, at) @ root))
+    X = root @ vectors
+    return np.asarray((X / np.maximum(1 - share, LEAST_INFORMATION)) @ X.T)
 
 
 def _blocks(C: FloatArray) -> FloatArray:
