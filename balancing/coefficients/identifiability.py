@@ -118,7 +118,7 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
 _REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 
-def check_resolution(influence: Influence, planes: Sequence[str], *, refuse: bool) -> tuple[str, ...]:
+def check_resolution(influence: Influence, *, refuse: bool) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
 
     Errors that are assumed refuse nothing: the digits of the readings do, or without an end of them, for
@@ -127,9 +127,7 @@ def check_resolution(influence: Influence, planes: Sequence[str], *, refuse: boo
     Parameters
     ----------
     influence
-        Coefficients at the speeds and sensors in question, of full rank in these planes.
-    planes
-        Names.
+        Coefficients at the speeds and sensors and of the planes in question, of full rank.
     refuse
         Or warn.
 
@@ -142,43 +140,33 @@ def check_resolution(influence: Influence, planes: Sequence[str], *, refuse: boo
     UndeterminedError
         Naming the planes that act alike.
     """
-    if len(planes) < 2:
+    if len(influence.planes) < 2:
         return ()
-    chosen = [influence.planes.index(plane) for plane in planes]
-    W = influence.W[..., chosen].reshape(-1, len(chosen))
     assumed = influence.error_source == "assumed"
-    alike, within = _unresolved(influence, chosen, influence.digits if assumed else influence.covariance)
-    if not within and assumed:
-        refuse = False
-        alike, within = _unresolved(influence, chosen, influence.covariance)
-    if not within:
-        return ()
-    words = _alike(W, alike, planes) + within + _REMEDY
-    if refuse:
+    words = _unresolved(influence, influence.digits if assumed else influence.covariance)
+    if words and refuse:
         raise refusal(words, influence.warnings)
-    return (words,)
+    if not words and assumed:
+        words = _unresolved(influence, influence.covariance)
+    return (words,) if words else ()
 
 
-def _unresolved(
-    influence: Influence, chosen: list[int], covariance: FloatArray | None
-) -> tuple[list[int], str]:
-    """Planes that act alike within the errors of a covariance of (Y₀, W), and how; none and no words."""
-    W = influence.W[..., chosen].reshape(-1, len(chosen))
+def _unresolved(influence: Influence, covariance: FloatArray | None) -> str:
+    """Which planes act alike within the errors of a covariance of (Y₀, W); empty where none do."""
+    P = len(influence.planes)
+    W = influence.W.reshape(-1, P)
     if covariance is not None and covariance[..., 2:, 2:].any():
-        index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
-        own = covariance[..., index[:, None], index].reshape(-1, len(index), len(index))
-        found = resolution(W, own)
+        found = resolution(W, covariance[..., 2:, 2:].reshape(-1, 2 * P, 2 * P))
         if found.significant(len(W), influence.dof):
-            return [], ""
+            return ""
         ratio = np.sqrt(found.chi_square / found.n)
-        return _large(found.direction), (
-            f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
-        )
+        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        return _alike(W, _large(found.direction), influence.planes) + within + _REMEDY
     singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-    condition = singular[0] / singular[-1]
-    if covariance is None and influence.last_run is not None and condition > HOPELESS:
-        return acting_alike(W), f": no instrument supports a condition number of {condition:.2g}"
-    return [], ""
+    if covariance is not None or influence.last_run is None or singular[0] <= HOPELESS * singular[-1]:
+        return ""
+    within = f": no instrument supports a condition number of {singular[0] / singular[-1]:.2g}"
+    return _alike(W, acting_alike(W), influence.planes) + within + _REMEDY
 
 
 def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:

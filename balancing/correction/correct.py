@@ -15,7 +15,7 @@ from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.identifiability import check_planes, check_resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors
-from balancing.correction.choice import coefficients_of, plane_indices, rows_of
+from balancing.correction.choice import plane_indices, rows_of
 from balancing.correction.correction_warnings import (
     EMPTY,
     amplitude_words,
@@ -313,8 +313,8 @@ def correct(  # noqa: PLR0913
     start = starting_point(influence, baseline)
     chosen = plane_indices(influence, planes)
     used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
-    names = tuple(influence.planes[p] for p in chosen)
-    W = influence.W[used][..., chosen].reshape(-1, len(chosen))
+    part = influence.part(used, None, chosen)
+    names, W = part.planes, part.W.reshape(-1, len(chosen))
     Y = start.readings[used]
     if not Y.any():
         raise ValueError(
@@ -327,10 +327,9 @@ def correct(  # noqa: PLR0913
     unclear_regions: tuple[str, ...] = ()
     if not soft:
         check_planes(W, names)
-        coefficients = coefficients_of(influence, used, chosen)
-        every = range(len(influence.sensors))
-        unclear = check_resolution(influence.part(used, every), names, refuse=refuse)
-        if coefficients is not None and start.covariance is not None and not unclear:
+        unclear = check_resolution(part, refuse=refuse)
+        if part.covariance is not None and start.covariance is not None and not unclear:
+            coefficients = part.covariance[..., 2:, 2:].reshape(len(W), 2 * len(names), -1)
             small = optimism(W, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(W, names)
