@@ -29,6 +29,7 @@ from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.coefficients.influence import Influence
+    from balancing.coefficients.run_errors import RunErrors
     from balancing.data.trials import ReadingErrors
 
 
@@ -251,7 +252,7 @@ def trial_from_coefficients(  # noqa: PLR0913, PLR0915
     direction = -np.vdot(w, Y)
     angle = float(np.angle(direction)) % (2 * math.pi)
     expected = Y + w * amount * np.exp(1j * angle)
-    warnings += _seen(Y, expected, errors or influence.errors, plane)
+    warnings += _seen(Y, expected, errors or influence.errors, influence.run_errors, plane)
     if np.abs(expected).max() > size:
         worst = int(np.argmax(np.abs(expected).max(axis=0)))
         warnings.append(
@@ -279,13 +280,13 @@ def trial_from_coefficients(  # noqa: PLR0913, PLR0915
 
 
 def _seen(
-    before: ComplexArray, expected: ComplexArray, errors: ReadingErrors | None, plane: str
+    before: ComplexArray, expected: ComplexArray, errors: ReadingErrors | None, run: RunErrors, plane: str
 ) -> tuple[str, ...]:
     """Warn of a weight that changes too little: within the errors, or below the engineers' 30 % or 30°."""
     change = np.abs(expected - before)
     if errors is not None:
-        sigma = np.sqrt(np.trace(reading_covariance(before, errors), axis1=-2, axis2=-1) / 2)
-        if (change <= _SEEN * sigma).all():
+        single = np.trace(reading_covariance(before, errors), axis1=-2, axis2=-1) / 2
+        if (change**2 <= _SEEN**2 * (single + run.variance(before, 0 * before))).all():
             return (
                 f"the trial weight in plane {plane!r} changes no reading by more than the errors of two "
                 "readings (95 %): its effect would not be determined",

@@ -119,7 +119,7 @@ _REMEDY = "; their weights are not determined: leave one out, or add sensors or 
 
 
 def check_resolution(
-    influence: Influence, planes: Sequence[str], *, refuse: bool, counts: BoolArray | None = None
+    influence: Influence, *, refuse: bool, counts: BoolArray | None = None
 ) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
 
@@ -129,9 +129,7 @@ def check_resolution(
     Parameters
     ----------
     influence
-        Coefficients at the speeds and sensors in question, of full rank in these planes.
-    planes
-        Names.
+        Coefficients at the speeds and sensors and of the planes in question, of full rank.
     refuse
         Or warn.
     counts
@@ -146,45 +144,34 @@ def check_resolution(
     UndeterminedError
         Naming the planes that act alike.
     """
-    if len(planes) < 2:
+    if len(influence.planes) < 2:
         return ()
-    chosen = [influence.planes.index(plane) for plane in planes]
-    W = influence.W[..., chosen].reshape(-1, len(chosen))
     assumed = influence.error_source == "assumed"
-    counts = np.ones(len(W), dtype=bool) if counts is None else counts
-    first = influence.digits if assumed else influence.covariance
-    alike, within = _unresolved(influence, chosen, first, counts)
-    if not within and assumed:
-        refuse = False
-        alike, within = _unresolved(influence, chosen, influence.covariance, counts)
-    if not within:
-        return ()
-    words = _alike(W[counts], alike, planes) + within + _REMEDY
-    if refuse:
+    counts = np.ones(influence.W[..., 0].size, dtype=bool) if counts is None else counts
+    words = _unresolved(influence, influence.digits if assumed else influence.covariance, counts)
+    if words and refuse:
         raise refusal(words, influence.warnings)
-    return (words,)
+    if not words and assumed:
+        words = _unresolved(influence, influence.covariance, counts)
+    return (words,) if words else ()
 
 
-def _unresolved(
-    influence: Influence, chosen: list[int], covariance: FloatArray | None, counts: BoolArray
-) -> tuple[list[int], str]:
-    """Planes that act alike within the errors of a covariance of (Y₀, W), and how; none and no words."""
-    W = influence.W[..., chosen].reshape(-1, len(chosen))[counts]
+def _unresolved(influence: Influence, covariance: FloatArray | None, counts: BoolArray) -> str:
+    """Which planes act alike within the errors of a covariance of (Y₀, W); empty where none do."""
+    P = len(influence.planes)
+    W = influence.W.reshape(-1, P)[counts]
     if covariance is not None and covariance[..., 2:, 2:].any():
-        index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
-        own = covariance[..., index[:, None], index].reshape(-1, len(index), len(index))[counts]
-        found = resolution(W, own)
+        found = resolution(W, covariance[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts])
         if found.significant(len(W), influence.dof):
-            return [], ""
+            return ""
         ratio = np.sqrt(found.chi_square / found.n)
-        return _large(found.direction), (
-            f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
-        )
+        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        return _alike(W, _large(found.direction), influence.planes) + within + _REMEDY
     singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-    condition = singular[0] / singular[-1]
-    if covariance is None and influence.last_run is not None and condition > HOPELESS:
-        return acting_alike(W), f": no instrument supports a condition number of {condition:.2g}"
-    return [], ""
+    if covariance is not None or influence.last_run is None or singular[0] <= HOPELESS * singular[-1]:
+        return ""
+    within = f": no instrument supports a condition number of {singular[0] / singular[-1]:.2g}"
+    return _alike(W, acting_alike(W), influence.planes) + within + _REMEDY
 
 
 def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:

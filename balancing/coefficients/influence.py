@@ -38,7 +38,7 @@ from balancing.data.trials import ReadingErrors, Trials, check_names, check_spee
 
 if TYPE_CHECKING:
     import pandas as pd
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM
 from rotorid.regression import gain
 
@@ -137,22 +137,34 @@ class Influence:
         """Unit of a coefficient, such as "um_pp/g"."""
         return f"{self.labels.vibration_unit or '1'}/{self.labels.weight_unit or '1'}"
 
-    def part(self, speeds: Sequence[int], sensors: Sequence[int]) -> Influence:
-        """Those at some speeds and sensors, by their indices."""
+    def part(
+        self, speeds: Sequence[int], sensors: Sequence[int] | None = None, planes: Sequence[int] | None = None
+    ) -> Influence:
+        """Those of some speeds, sensors and planes, by their indices; None: of all."""
+        sensors, planes = (
+            list(range(len(names)) if given is None else given)
+            for given, names in ((sensors, self.sensors), (planes, self.planes))
+        )
+        chosen = [0, *(1 + p for p in planes)]
+        own = [2 * k + part for k in chosen for part in (0, 1)]
 
-        def cut(array: AnyArray | None) -> AnyArray | None:
-            return None if array is None else array[np.ix_(speeds, sensors)]
+        def cut(array: FloatArray | None) -> FloatArray | None:
+            return None if array is None else array[np.ix_(speeds, sensors, own, own)]
 
-        common = None if self.common is None else self.common[:, :, speeds][:, :, :, sensors]
+        common = self.common
+        if common is not None:
+            common = common[:, :, speeds][:, :, :, sensors][..., chosen]
         return replace(
             self,
             speeds=self.speeds[list(speeds)],
             sensors=tuple(self.sensors[c] for c in sensors),
-            W=self.W[np.ix_(speeds, sensors)],
-            baseline=cut(self.baseline),
+            planes=tuple(self.planes[p] for p in planes),
+            W=self.W[np.ix_(speeds, sensors, planes)],
+            baseline=None if self.baseline is None else self.baseline[np.ix_(speeds, sensors)],
             covariance=cut(self.covariance),
             common=common,
             digits=cut(self.digits),
+            last_weights=None if self.last_weights is None else self.last_weights[planes],
         )
 
     def to_dict(self) -> dict[str, Any]:

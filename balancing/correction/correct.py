@@ -15,7 +15,7 @@ from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.identifiability import UndeterminedError, check_planes, check_resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors
-from balancing.correction.choice import coefficients_of, plane_indices, rows_of
+from balancing.correction.choice import plane_indices, rows_of
 from balancing.correction.correction_warnings import (
     EMPTY,
     amplitude_words,
@@ -320,8 +320,8 @@ def correct(  # noqa: PLR0913
     start = starting_point(influence, baseline)
     chosen = plane_indices(influence, planes)
     used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
-    names = tuple(influence.planes[p] for p in chosen)
-    W = influence.W[used][..., chosen].reshape(-1, len(chosen))
+    part = influence.part(used, None, chosen)
+    names, W = part.planes, part.W.reshape(-1, len(chosen))
     Y = start.readings[used]
     if not Y.any():
         raise ValueError(
@@ -337,14 +337,11 @@ def correct(  # noqa: PLR0913
     unclear_regions: tuple[str, ...] = ()
     if not soft:
         check_planes(felt, names)
-        coefficients = coefficients_of(influence, used, chosen)
-        every = range(len(influence.sensors))
-        unclear = check_resolution(
-            influence.part(used, every), names, refuse=refuse, counts=None if rows is None else rows > 0
-        )
-        if coefficients is not None and rows is not None:
-            coefficients = coefficients[rows > 0]
-        if coefficients is not None and start.covariance is not None and not unclear:
+        counts = None if rows is None else rows > 0
+        unclear = check_resolution(part, refuse=refuse, counts=counts)
+        if part.covariance is not None and start.covariance is not None and not unclear:
+            coefficients = part.covariance[..., 2:, 2:].reshape(len(W), 2 * len(names), -1)
+            coefficients = coefficients if counts is None else coefficients[counts]
             small = optimism(felt, coefficients, names, method=method)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(felt, names)

@@ -54,14 +54,6 @@ def correction_jacobian(W: ComplexArray, D: ComplexArray, r: ComplexArray) -> Fl
     return J.reshape(N, 2 * P, 2 * P + 2)
 
 
-def correction_covariance(
-    W: ComplexArray, D: ComplexArray, r: ComplexArray, covariance: FloatArray
-) -> FloatArray:
-    """Covariance (2P, 2P) of the stretched D from that of each reading's (Y₀, W), (N, 2P + 2, 2P + 2)."""
-    J = correction_jacobian(W, D, r)
-    return symmetric(np.sum(J @ covariance @ np.swapaxes(J, 1, 2), axis=0))
-
-
 def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray:
     """Covariance (N, 2, 2) of Y₀ + W D at given D, from that of each reading's (Y₀, W)."""
     B = np.concatenate([_block(np.asarray(z)) for z in (1.0, *D)], axis=1)
@@ -79,8 +71,7 @@ def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, 
         As `balancing.Influence.common`, (2, M, S, C, P + 1), N = S C.
     """
     _, M, S, C, n = common.shape
-    columns = np.stack((common, 1j * common), axis=-1).view(np.float64).reshape(2, M, S, C, n, 2, 2)
-    F = np.swapaxes(columns, -1, -2).reshape(2, M, S * C, 2 * n, 2)
+    F = _block(common).reshape(2, M, S * C, 2 * n, 2)
     moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, J.shape[1], 2).sum(axis=3)
     run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, J.shape[1], 2)
     first, second = (np.einsum("mqu,mpu->qp", part, part) for part in (run, speed))

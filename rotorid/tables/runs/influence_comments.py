@@ -143,7 +143,8 @@ def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
 def _numbers(text: str, key: str) -> list[float]:
     values = [parse_number(word) for word in text.split()]
     if len(values) not in _COUNTS[key]:
-        raise NotANumber(f"{listing([str(n) for n in _COUNTS[key]])} numbers with spaces between them")
+        counts = listing([str(n) for n in _COUNTS[key]])
+        raise NotANumber("one number" if counts == "1" else f"{counts} numbers with spaces between them")
     if min(values) < 0:
         raise NotANumber("a number of 0 or more")
     if key in _DEGREES and not values[0]:
@@ -166,13 +167,15 @@ def _run_errors(
         if key in numbers:
             row = numbers[key][0]
             sizes[k, -len(row) :] = np.array(row) / (scale if key == "run_floor" else 100.0)
-    cases = np.array(numbers.get("run_case", [[1.0, 1.0, 1.0, 1.0]]))
+    cases = np.array(numbers.get("run_case", []))
+    if not (cases.any() and cases[:, 0].any() and cases[:, 1:].any()):
+        cases = np.ones((1, 4))
     interval = numbers.get("run_interval")
     return RunErrors(
         sizes,
         cast("Origin", words.get("run_source", "stated" if sizes.any() else "none")),
         None if interval is None else (interval[0][0] / scale, interval[0][1] / scale),
-        cases[:, 0] / (cases[:, 0].sum() or 1.0),
+        cases[:, 0] / cases[:, 0].sum(),
         cases[:, 1:],
         words.get("run_merged") == "yes",
     )

@@ -85,11 +85,11 @@ def test_each_distance_is_that_of_two_dimensions():
 
 
 def test_errors_from_repeats_are_compared_with_f():
-    """Estimated errors: 3 repeats of 3 runs, 72 degrees of freedom of each direction."""
+    """Estimated errors: 3 repeats of 3 runs, 72 degrees of freedom of each direction; less between runs."""
     found = simulated(75, repeats=(3,), errors=None)
-    assert found[0].dof == 2 * 3 * S * C
+    assert 30 < found[0].dof < 2 * 3 * S * C
     assert "estimated errors" in found[0].verdict
-    assert 2 <= alarms(found) <= 29
+    assert alarms(found) <= 29  # errors between runs are assumed, and there are none
 
 
 def test_unbalance_outside_the_planes_is_found():
@@ -228,7 +228,9 @@ def test_some_sensors_and_speeds_are_enough():
 
 
 def test_without_known_errors_there_is_no_verdict():
-    influence = estimate_influence(bruel_kjaer())
+    influence = replace(
+        estimate_influence(bruel_kjaer()), covariance=None, common=None, errors=None, error_source="unknown"
+    )
     correction = correct(influence)
     check = job([[0.5, 1.0]], np.zeros((1, 0)))
     found = compare_check(correction, check, influence)

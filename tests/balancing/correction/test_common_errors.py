@@ -5,9 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from balancing import ReadingErrors, Trials, combine, compare_check, correct, estimate_influence, refine
+from balancing import (
+    ReadingErrors,
+    Trials,
+    combine,
+    compare_check,
+    correct,
+    estimate_influence,
+    refine,
+    verdict_of_check,
+)
 from balancing.coefficients.influence import Influence, estimate_like
 from balancing.coefficients.run_errors import RunErrors, runs_of
+from balancing.iso21940 import tolerance
 from balancing.unbalance import unbalance_of_run
 
 ERRORS = ReadingErrors(0.004, 0.004, 0.002)
@@ -18,7 +28,8 @@ SENSORS, PLANES = ("a", "b", "c"), ("A", "B")
 DRAWS = 400
 TRUTH = np.random.default_rng(4)
 W = TRUTH.standard_normal((S, C, P)) + 1j * TRUTH.standard_normal((S, C, P))
-Y0 = W @ np.array([1.5, 1 - 2j])
+UNBALANCE = np.array([1.5, 1 - 2j])
+Y0 = W @ UNBALANCE
 TRIALS = np.vstack((np.zeros(P), 0.7 * np.eye(P)))
 CHECKS = np.array([[-0.8 + 0.3j, 0.4], [0.5j, -1.2]])
 KNOWN = Influence(
@@ -90,6 +101,19 @@ def test_chi_square_of_check_runs_is_that_of_their_errors():
     each = np.mean([np.abs(f.difference) ** 2 for f in found], axis=0)
     stated = np.trace(found[0].covariance, axis1=-2, axis2=-1)
     np.testing.assert_allclose(each / stated, 1, atol=0.25)
+
+
+def test_the_region_of_a_verdict_holds_the_truth():
+    whole = tolerance(100, 1, "G2.5", planes={"A": None, "B": None})
+    inside = []
+    for influence, check in jobs(6):
+        found = verdict_of_check(influence, check, run=1, tolerance=whole)
+        assert found.warnings == ()
+        for row, truth in zip(found.rows, UNBALANCE + CHECKS[1], strict=True):
+            away, edge = truth - row.value, row.region - row.value
+            inside.append(abs(edge[np.argmin(np.abs(np.angle(edge / away)))]) >= abs(away))
+    # two planes of 400 jobs, correlated: 0.95 ± 0.01
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
 
 def test_unbalance_of_a_run_has_the_stated_covariance():

@@ -1,5 +1,7 @@
 """Runs that contradict each other, and planes that only errors tell apart: refused or questioned, by name."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, polar
@@ -114,7 +116,8 @@ def test_planes_that_only_errors_tell_apart_are_refused(planes, errors):
     influences = [estimate_influence(simulated(rng, W, Y0, errors)) for _ in range(100)]
     refused = 0
     for influence in influences:
-        if any("within the errors" in w for w in correct(influence, refuse=False).warnings):
+        found = correct(influence, refuse=False, method="least-squares")
+        if any("within the errors" in w for w in found.warnings):
             with pytest.raises(UndeterminedError, match=r"act alike.* within the errors of the readings"):
                 correct(influence)
             refused += 1
@@ -124,6 +127,26 @@ def test_planes_that_only_errors_tell_apart_are_refused(planes, errors):
     W, Y0 = dependent(rng, planes, readings=8, apart=0.3)
     for _ in range(20):
         correct(estimate_influence(simulated(rng, W, Y0, errors)))
+
+
+def test_assumed_errors_warn_and_digits_refuse():
+    rng = np.random.default_rng(24)
+    W, Y0 = dependent(rng, 2, readings=8, apart=0.01)
+    T = np.vstack((np.zeros(2), np.eye(2)))
+    runs = job(Y0 + T @ W.T, T)
+    influence = estimate_influence(runs)
+    assert influence.error_source == "assumed"
+    warned = correct(influence, method="least-squares").warnings
+    assert any("act alike" in w and "within the errors" in w for w in warned)
+    # digits so coarse that they alone hide the difference
+    for step, refused in ((1e-6, False), (0.3, True)):
+        steps = np.stack((np.full(runs.mean.shape, step), np.zeros(runs.mean.shape)))
+        rounded = estimate_influence(replace(runs, steps=steps))
+        if refused:
+            with pytest.raises(UndeterminedError, match="act alike"):
+                correct(rounded, method="least-squares")
+        else:
+            assert any("act alike" in w for w in correct(rounded, method="least-squares").warnings)
 
 
 def test_the_statistic_is_chi_square():

@@ -8,6 +8,7 @@ import pytest
 from balancing_data import GRAM, complex_normal, job, synthetic
 
 from balancing import ReadingErrors, UndeterminedError, correct, estimate_influence
+from balancing.coefficients.influence import estimate_like
 from balancing.correction.refine import refine, trim
 from rotorid.tables import read_job
 
@@ -58,10 +59,11 @@ def test_least_squares_over_all_runs():
     refined = refine(trials, *checks)
     T = np.concatenate([each.weights for each in (trials, *checks)])
     Y = np.concatenate([each.mean for each in (trials, *checks)])
-    A = np.column_stack((np.ones(len(T)), T / GRAM))
-    expected = np.linalg.lstsq(A, Y.reshape(len(Y), -1), rcond=None)[0].reshape(3, 3, 4)
-    np.testing.assert_allclose(refined.baseline, expected[0], rtol=1e-9)
-    np.testing.assert_allclose(refined.W * GRAM, np.moveaxis(expected[1:], 0, -1), rtol=1e-9)
+    everything = replace(trials, runs=tuple("12345"), weights=T, readings=Y)
+    np.testing.assert_array_equal(refined.W, estimate_influence(everything).W)
+    off = np.concatenate((refined.baseline[..., None] - Y0[..., None], refined.W - W), axis=-1)
+    std = np.sqrt(np.einsum("scii->sci", refined.covariance)[..., ::2])
+    assert 0.5 < np.sqrt(np.mean(np.abs(off / std) ** 2) / 2) < 1.5
     assert refined.error_source == "residuals"  # over-determined runs tell their errors
 
 
@@ -78,27 +80,28 @@ def test_check_runs_make_coefficients_more_certain():
     ("factor", "words"),
     [
         (1.4, None),
-        (1.6, "by +60 % and +0°"),
-        (0.4, "by -60 % and +0°"),
+        (1.7, "+56 % and +0°"),
+        (0.4, "-58 % and +0°"),
         (np.exp(0.7j), None),
-        (np.exp(0.9j), "by +0 % and +52°"),
-        (1.3 * np.exp(-0.9j), "by +30 % and -52°"),
-        (20, "by more than 10 times and +0°"),
+        (np.exp(0.9j), "-3 % and +48°"),
+        (1.3 * np.exp(-0.9j), "+22 % and -47°"),
+        (20, "more than 10 times and +0°"),
     ],
 )
 def test_a_coefficient_that_moves_is_named(factor, words):
-    """With the weights 0, T and 2 T in three runs the last one alone decides: W = (Y₂ − Y₀) / 2 T."""
-    trials = job([[1.0, 1.0], [1.5, 1.5j]], [[0], [GRAM]])
+    """With the weights 0, T and 2 T in three runs the last one nearly decides: W = (Y₂ − Y₀) / 2 T."""
+    trials = job([[1.0, 1.0], [1.03 if factor == 20 else 1.5, 1.5j]], [[0], [GRAM]])
     old = estimate_influence(trials).W[0, :, 0]
     check = job([1 + 2 * GRAM * old * [factor, 1.0]], [[2 * GRAM]], runs=("check",))
     refined = refine(trials, check)
-    np.testing.assert_allclose(refined.W[0, :, 0], old * [factor, 1.0], rtol=1e-9)
+    np.testing.assert_allclose(refined.W[0, :, 0], old * [factor, 1.0], rtol=0.15)
     if words is None:
         assert moved(refined) == []
         assert not any("not repeatable" in w for w in refined.warnings)
         return
     named = "the check runs move the coefficient of plane 'A' on sensor 's0' at 954.93 rpm "
-    assert moved(refined) == [named + words]
+    (said,) = moved(refined)
+    assert (said.startswith(named), said.endswith(f"by {words}")) == (True, True)
     assert refined.warnings[-1].startswith("coefficients that move by more than 50 % or 45°")
 
 
@@ -120,12 +123,12 @@ def test_check_runs_of_some_sensors_and_speeds():
     refined = refine(trials, part_of(whole, [2, 0], [3, 1]))
     covered = np.zeros((3, 4), dtype=bool)
     covered[np.ix_([0, 2], [1, 3])] = True
-    np.testing.assert_allclose(refined.W[covered], full.W[covered], rtol=1e-9)
-    np.testing.assert_array_equal(refined.W[~covered], alone.W[~covered])
-    np.testing.assert_array_equal(refined.baseline[~covered], alone.baseline[~covered])
+    np.testing.assert_allclose(refined.W[covered], full.W[covered], rtol=0.02)
+    np.testing.assert_allclose(refined.W[~covered], alone.W[~covered], rtol=1e-9)
+    np.testing.assert_allclose(refined.baseline[~covered], alone.baseline[~covered], rtol=1e-9)
     assert (refined.sensors, refined.last_run) == (trials.sensors, "check")
     assert refined.covariance.shape == (3, 4, 6, 6)
-    own = estimate_influence(replace(trials, errors=refined.errors)).covariance
+    own = estimate_like(trials, refined).covariance
     np.testing.assert_array_equal(refined.covariance[~covered], own[~covered])
     assert any("sensor 's0' at 954.93 rpm, 's2' at 954.93 rpm, 's0' at 1909.86 rpm and 5 more: the" in w
                for w in refined.warnings)  # fmt: skip
@@ -139,8 +142,9 @@ def test_repeats_and_stated_errors_of_a_part():
     repeated = replace(check, readings=np.concatenate([check.readings * 1.001, check.readings * 0.999]))
     refined = refine(trials, repeated)
     np.testing.assert_allclose(refined.W, W, rtol=1e-6)
-    np.testing.assert_allclose(refined.covariance[1:], estimate_influence(trials).covariance[1:], rtol=1e-12)
-    assert (refined.errors, refined.dof) == (ERRORS, None)
+    own = estimate_like(trials, refined).covariance
+    np.testing.assert_allclose(refined.covariance[1:], own[1:], rtol=1e-12)
+    assert refined.errors == ERRORS
 
 
 def test_names_of_runs_that_are_the_same():
@@ -196,7 +200,7 @@ def test_what_does_not_fit():
 def test_the_trim_makes_what_is_mounted_the_correction():
     trials, W, Y0 = synthetic(np.random.default_rng(12))
     off = np.array([0.4, 0.2j]) * GRAM
-    result = correct(refine(trials, check_of(trials, W, Y0, [off])))
+    result = correct(refine(trials, check_of(trials, W, Y0, [off])), method="least-squares")
     left = trim(result)
     assert (left.run, left.planes) == ("check", ("A", "B"))
     np.testing.assert_array_equal(left.mounted, off)

@@ -4,13 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from balancing_data import GRAM, synthetic
+from balancing_data import GRAM, complex_normal, synthetic
 from tables_data import complaints, replaced, the_only, write_csv
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, correct, estimate_influence
 from balancing.coefficients.from_model import model_influence
-from rotorid.tables import influence_frame, job_from_files, read_influence, write_influence, write_table
+from balancing.coefficients.run_errors import marginal
+from balancing.data.trials import RunScatter
+from rotorid.tables import (
+    InputError,
+    influence_frame,
+    job_from_files,
+    read_influence,
+    write_influence,
+    write_table,
+)
+from rotorid.tables.runs.influence_comments import error_comments
+from rotorid.tables.runs.influence_errors import BASELINE
 
 ERRORS = ReadingErrors(amplitude=0.03, phase=np.radians(2.0), floor=1e-7)
 LABELS = Labels("um_pp", 2e6, "g", 1e3)
@@ -32,11 +43,10 @@ def test_covariance_and_errors_come_back(tmp_path, suffix, phase, weight):
     labels = replace(LABELS, phase=phase, weight_unit=weight[0], weight_scale=weight[1])
     influence = estimate_influence(trials(labels))
     again = round_trip(tmp_path / f"influence{suffix}", influence)
-    block = influence.covariance[..., 2:, 2:]
-    scale = np.abs(block).max(axis=(-2, -1), keepdims=True)
-    np.testing.assert_allclose(again.covariance[..., 2:, 2:] / scale, block / scale, atol=4e-16)
-    assert not again.covariance[..., :2, :].any()
-    assert not again.covariance[..., :2].any()
+    std = np.sqrt(np.einsum("scii->sci", influence.covariance))
+    scale = std[..., None] * std[..., None, :]
+    np.testing.assert_allclose(again.covariance / scale, influence.covariance / scale, atol=4e-15)
+    np.testing.assert_allclose(again.baseline, influence.baseline, rtol=1e-14)
     np.testing.assert_allclose(again.W, influence.W, rtol=1e-14)
     assert (again.dof, again.error_source, again.labels) == (None, "stated", labels)
     np.testing.assert_allclose(
@@ -118,18 +128,91 @@ def test_a_model_keeps_its_error(tmp_path):
     assert (again.errors, again.error_source, again.labels) == (None, "unknown", model.labels)
 
 
-def test_what_storing_loses_is_the_correlation_with_the_baseline(tmp_path):
-    made = trials()
-    influence = estimate_influence(made)
-    stored = correct(round_trip(tmp_path / "influence.csv", influence), baseline_of(made))
-    apart = influence.covariance.copy()
-    apart[..., :2, 2:] = apart[..., 2:, :2] = 0.0
-    cut, whole = correct(replace(influence, covariance=apart)), correct(influence)
-    np.testing.assert_allclose(stored.weights, whole.weights, rtol=1e-9)
-    np.testing.assert_allclose(
-        stored.covariance, cut.covariance, rtol=1e-9, atol=1e-12 * cut.covariance.max()
+@pytest.mark.parametrize("phase", ["lead", "lag"])
+def test_storing_keeps_everything_that_is_known_of_errors(tmp_path, phase):
+    made, W, Y0 = synthetic(
+        np.random.default_rng(6), labels=replace(LABELS, phase=phase), errors=ERRORS, sensors=2, speeds=2
     )
-    assert np.abs(np.diag(stored.covariance) / np.diag(whole.covariance) - 1).max() > 0.1
+    rng = np.random.default_rng(7)
+    T = np.vstack((made.weights, made.weights[:2]))
+    Y = (Y0 + np.einsum("scp,rp->rsc", W, T)) * (1 + 0.03 * complex_normal(rng, (5, 1, 1)))
+    Y *= 1 + 0.01 * complex_normal(rng, (5, 2, 2))
+    more = replace(made, runs=tuple("abcde"), weights=T, readings=Y, errors=None)
+    assumed = estimate_influence(replace(made, errors=None))
+    for influence in (estimate_influence(replace(more, errors=ERRORS)), estimate_influence(more), assumed):
+        path = tmp_path / "influence.csv"
+        again = round_trip(path, influence)
+        same = [(marginal(each.common), each.run_errors) for each in (again, influence)]
+        std = np.sqrt(np.einsum("scii->sci", influence.covariance))
+        for kind in (0, 1):
+            found, expected = (
+                each.common[kind].reshape(len(each.common[kind]), -1) for each in (again, influence)
+            )
+            if kind:  # of each speed
+                found, expected = (
+                    each.common[1, :, 1].reshape(each.common.shape[1], -1) for each in (again, influence)
+                )
+            first, second = (np.einsum("mi,mj->ij", z, z.conj()) for z in (found, expected))
+            size = np.sqrt(np.abs(np.diag(second))) + 1e-300
+            np.testing.assert_allclose(
+                first / np.outer(size, size), second / np.outer(size, size), atol=1e-12
+            )
+        np.testing.assert_allclose(same[0][0] / std[..., None] / std[..., None, :],
+                                   same[1][0] / std[..., None] / std[..., None, :], atol=1e-12)  # fmt: skip
+        old, new = influence.run_errors, again.run_errors
+        np.testing.assert_allclose(new.sizes, old.sizes, rtol=1e-14)
+        np.testing.assert_allclose(new.ratios, old.ratios, rtol=1e-14)
+        np.testing.assert_allclose(new.probability, old.probability, rtol=1e-12)
+        assert (new.origin, new.merged) == (old.origin, old.merged)
+        assert (new.interval is None) == (old.interval is None)
+        assert again.own_between == influence.own_between
+        assert (again.dof, again.reading_dof) == (influence.dof, influence.reading_dof)
+        assert again.error_source == influence.error_source
+        stored, whole = correct(again), correct(influence)
+        for name in ("weights", "covariance", "after_covariance"):
+            expected = getattr(whole, name)
+            np.testing.assert_allclose(
+                getattr(stored, name), expected, rtol=1e-7, atol=1e-9 * abs(expected).max()
+            )
+        assert stored.dof == pytest.approx(whole.dof, rel=1e-9)
+        # the same reading read again, from a table of one run
+        bare = replace(baseline_of(made), readings=influence.baseline[None], errors=None)
+        later = correct(again, bare)
+        np.testing.assert_allclose(later.covariance, whole.covariance, rtol=1e-7, atol=1e-20)
+        # another one has errors of its own
+        other = correct(again, replace(bare, readings=bare.readings * (1 + 1e-6)))
+        assert abs(np.trace(other.covariance) / np.trace(whole.covariance) - 1) > 0.005
+
+
+def test_what_a_person_may_delete(tmp_path):
+    influence = estimate_influence(trials())
+    influence = estimate_influence(replace(trials(), run_errors=RunScatter(0.02)))
+    frame = influence_frame(influence)
+    said = [
+        f"# {line}"
+        for line in error_comments(influence, influence.labels)
+        if not line.startswith("errors.run")
+    ]
+    cut = frame[[name for name in frame if not name.startswith("common_")]]
+    for name, left in {
+        "columns": cut,
+        "rows": frame[frame.plane != BASELINE],
+        "both": cut[cut.plane != BASELINE],
+        "all": frame[list(frame)[:5]][frame.plane != BASELINE],
+    }.items():
+        path = tmp_path / f"{name}.csv"
+        write_table(path, left)
+        path.write_text("\n".join(said) + "\n" + path.read_text())
+        again = read_influence(path)
+        np.testing.assert_allclose(again.W, influence.W, rtol=1e-14)
+        assert (again.baseline is None) == (name in ("rows", "both", "all"))
+        assert (again.covariance is None) == (name == "all")
+        assert correct(again, baseline_of(trials())).weights.shape == (2,)
+    frame["std_re_um_pp_per_g"] *= 0.1
+    frame["std_im_um_pp_per_g"] *= 1.0
+    write_table(tmp_path / "less.csv", frame.assign(common_run_1_re=5.0))
+    with pytest.raises(InputError, match="no more in common than the standard deviations"):
+        read_influence(tmp_path / "less.csv")
 
 
 def test_job_with_sensors_in_another_order(tmp_path):
@@ -149,7 +232,7 @@ def test_job_with_sensors_in_another_order(tmp_path):
 
 
 def test_without_errors_nothing_is_added(tmp_path):
-    influence = estimate_influence(trials(errors=None))
+    influence = replace(estimate_influence(trials()), covariance=None, baseline=None, errors=None)
     assert list(influence_frame(influence).columns) == [
         "speed_rad_s",
         "sensor",
@@ -190,7 +273,7 @@ def table(tmp_path):
         np.random.default_rng(1), sensors=1, speeds=1, weights=np.vstack((np.zeros(2), np.eye(2))) * GRAM
     )
     made = replace(made, labels=LABELS, errors=ReadingErrors(0.03, 0.02))
-    frame = influence_frame(estimate_influence(made))
+    frame = influence_frame(replace(estimate_influence(made), baseline=None))
     lines = [list(frame.columns), *frame.to_numpy(dtype=object).tolist()]
 
     def read(changed=lines, comments=()):
@@ -256,7 +339,9 @@ BAD_COMMENTS = [
     ("errors.phase = 2", "did you mean 'phase_deg'?"),
     ("errors.phase_deg = two", "a number"),
     ("errors.floor = -1", "a number of 0 or more"),
-    ("errors.degrees_of_freedom = 2.5", "a whole number from 1"),
+    ("errors.degrees_of_freedom = 0", "a number above 0"),
+    ("errors.run_percent = 1 2", "1 or 3 numbers"),
+    ("errors.run_source = guess", "one of 'stated'"),
     ("errors.source = guessed", "one of 'stated', 'repeats'"),
     ("errors.source = repeats", "an error of a reading above 0 with it"),
 ]
@@ -280,6 +365,11 @@ def test_written_by_hand(table):
     lines, read = table
     said = read(lines, ["errors.amplitude_percent = 3", "Errors: phase_deg: 2", "errors.floor = 4"])
     assert (said.errors, said.error_source) == (ReadingErrors(0.03, np.radians(2.0), 2e-6), "stated")
+    said = read(
+        lines, ["errors.amplitude_percent = 3", "errors.run_percent = 2", "errors.degrees_of_freedom = 9"]
+    )
+    np.testing.assert_array_equal(said.run_errors.sizes, [[0, 0, 0.02], [0, 0, 0], [0, 0, 0]])
+    assert (said.run_errors.origin, said.dof, said.reading_dof) == ("stated", 9, None)
 
 
 def test_plane_names_that_look_like_units(tmp_path):
