@@ -46,6 +46,7 @@ SHARES = (0.04, 0.3, 0.6)
 EXPLAINED = 0.95
 """Level of the test by which the corrected reading takes part."""
 FINE = 20
+_TOGETHER = 64
 _LIKELY, _UNLIKELY, _POSSIBLE = 1e-5, 1e-3, 0.05
 
 
@@ -170,14 +171,14 @@ def runs_of(Y: ComplexArray, weights: ComplexArray, W: ComplexArray) -> Runs:
 
 
 class Rows(NamedTuple):
-    """Residuals e (K, S, C) and what is known of them.
+    """Residuals e (K, S, C), combinations of the runs, and what is known of them.
 
-    `share` (K, R): of each run's variance in them; `known` (K, S, C): variance in one direction by the errors
-    of the readings; `free` (S, C, P): unknowns of the last row, absent (P = 0) or the coefficients of D.
+    `m` (K, R): e = m Y; `known` (R, S, C): variance of the runs' readings in one direction by their errors;
+    `free` (S, C, P): unknowns of a single row, absent (P = 0) or the coefficients of D.
     """
 
     e: ComplexArray
-    share: FloatArray
+    m: ComplexArray
     known: FloatArray
     free: ComplexArray
 
@@ -201,14 +202,10 @@ def spare_rows(A: ComplexArray, Y: ComplexArray, known: FloatArray) -> Rows:
     size = np.sqrt(np.mean(np.abs(Y) ** 2 / np.mean(np.abs(Y) ** 2, axis=0).clip(1e-300), axis=(1, 2)))
     size = np.maximum(size, 0.1 * size.max())
     basis = np.linalg.svd(A / size[:, None])[0][:, n:] if n < R else np.zeros((R, 0))
+    # in an order of their own, whatever that of the runs
+    basis = basis @ np.linalg.eigh(basis.conj().T @ (size[:, None] ** 2 * basis))[1]
     m = basis.conj().T / size
-    share = np.abs(m) ** 2
-    return Rows(
-        np.einsum("kr,rsc->ksc", m, Y),
-        share,
-        np.einsum("kr,rsc->ksc", share, known),
-        np.zeros((*Y.shape[1:], 0), dtype=complex),
-    )
+    return Rows(np.einsum("kr,rsc->ksc", m, Y), m, known, np.zeros((*Y.shape[1:], 0), dtype=complex))
 
 
 def corrected_row(
@@ -230,10 +227,8 @@ def corrected_row(
     size = np.sqrt(np.mean(np.abs(Y) ** 2, axis=0)).ravel()
     size = np.maximum(size, 0.1 * size.max())
     D = -gain(W / size[:, None]) @ (Y0 / size)
-    m = np.concatenate(([1.0], D)) @ gain(A)
-    share = np.abs(m[None]) ** 2
-    e = np.einsum("r,rsc->sc", m, Y)[None]
-    return (Rows(e, share, np.einsum("kr,rsc->ksc", share, known), theta[..., 1:]),)
+    m = (np.concatenate(([1.0], D)) @ gain(A))[None]
+    return (Rows(np.einsum("kr,rsc->ksc", m, Y), m, known, theta[..., 1:]),)
 
 
 class RunColumns(NamedTuple):
@@ -332,8 +327,10 @@ class Spectrum(NamedTuple):
 
 
 def spectrum(rows: Rows, runs: Runs, grid: Grid) -> Spectrum:
-    """Of all rows, at every mixture and share of a grid."""
-    found = [_of_row(rows, k, runs, grid) for k in range(len(rows.e))]
+    """Of all rows, at every mixture and share of a grid; rows of many readings as if they were independent."""
+    step = max(1, _TOGETHER // rows.e[0].size)
+    blocks = [slice(k, k + step) for k in range(0, len(rows.e), step)]
+    found = [_of_block(rows.e[part], rows.m[part], rows, runs, grid) for part in blocks]
     return Spectrum(
         np.sum([each.log for each in found], axis=0),
         np.concatenate([each.least for each in found], axis=1),
@@ -341,39 +338,52 @@ def spectrum(rows: Rows, runs: Runs, grid: Grid) -> Spectrum:
     )
 
 
-def _of_row(rows: Rows, k: int, runs: Runs, grid: Grid) -> Spectrum:
+def _of_block(e: ComplexArray, m: ComplexArray, rows: Rows, runs: Runs, grid: Grid) -> Spectrum:
     """Σ = s² V + K = L U (s² + μ) Uᴴ Lᴴ, with V = L Lᴴ and the eigenvalues μ of L⁻¹ K L⁻ᴴ."""
-    S, C = rows.e.shape[1:]
-    n = S * C
-    own = np.einsum("mb,r,brsc->msc", grid.mixtures[:, 0], rows.share[k], runs.size).reshape(-1, n)
-    root = np.sqrt(rows.share[k])[:, None, None]
-    columns = [root * runs.Y, root * runs.effect, np.sqrt(rows.share[k].sum()) * runs.unbalance]
-    each = [column.reshape(-1, n) for column in columns]
-    common = np.einsum("mb,bij->mij", grid.mixtures[:, 1], [F.T @ F.conj() for F in each])
-    by_speed = common * np.kron(np.eye(S), np.ones((C, C)))
+    K, S, C = e.shape
+    n = K * S * C
+    pairs = np.einsum("kr,lr->rkl", m, m.conj())
+
+    def alone(variance: FloatArray) -> ComplexArray:  # (…, R, S·C): of the kind own
+        each = np.einsum("rkl,...rn->...knl", pairs, variance.reshape(*variance.shape[:-2], -1))
+        full = each[..., None] * np.eye(S * C)[:, None, :]  # (…, K, N, K, N)
+        return np.asarray(full.reshape(*variance.shape[:-3], n, n))
+
+    size = np.einsum("mb,brsc->mrsc", grid.mixtures[:, 0], runs.size)
+    along = runs.Y.reshape(-1, S * C), runs.effect.reshape(-1, S * C)
+    each = [np.einsum("rkl,ri,rj->kilj", pairs, part, part.conj()) for part in along]
+    each.append(np.einsum("rkl,ij->kilj", pairs, _outer(runs.unbalance.reshape(-1, S * C))))
+    common = np.einsum("mb,bkilj->mkilj", grid.mixtures[:, 1], each)
+    same = np.kron(np.eye(S), np.ones((C, C)))[:, None, :]
+    parts = [alone(size), (common * same).reshape(-1, n, n), common.reshape(-1, n, n)]
     # of both directions; the least is rounding
-    V = 2 * np.einsum("hk,kmij->mhij", grid.shares, [own[:, :, None] * np.eye(n), by_speed, common])
-    V = V.reshape(-1, n, n) + 1e-9 * np.trace(V, axis1=2, axis2=3).mean() / n * np.eye(n)
-    known = 2 * rows.known[k].ravel()
-    e, V, K = _without(rows.free if k == len(rows.e) - 1 else rows.free[..., :0], rows.e[k], V, known)
+    V = 2 * np.einsum("hk,kmij->mhij", grid.shares, parts).reshape(-1, n, n)
+    V = V + 1e-9 * np.trace(V, axis1=1, axis2=2).real.mean() / n * np.eye(n)
+    known = 2 * alone(rows.known)
+    left, V, known = _without(rows.free, e, V, known)
     L = np.linalg.cholesky(V)
     inverse = np.linalg.inv(L)
-    least, U = np.linalg.eigh(inverse @ K @ inverse.conj().swapaxes(1, 2))
-    parts = np.abs(U.conj().swapaxes(1, 2) @ (inverse @ e)[..., None])[..., 0] ** 2
+    least, U = np.linalg.eigh(inverse @ known @ inverse.conj().swapaxes(1, 2))
+    square = np.abs(U.conj().swapaxes(1, 2) @ (inverse @ left)[..., None])[..., 0] ** 2
     log = 2 * np.log(np.einsum("gii->gi", L).real).sum(axis=1)
-    return Spectrum(log, np.maximum(least, 0.0), parts)
+    return Spectrum(log, np.maximum(least, 0.0), square)
+
+
+def _outer(columns: ComplexArray) -> ComplexArray:
+    """Σ c cᴴ over columns (M, n), (n, n)."""
+    return np.asarray(columns.T @ columns.conj())
 
 
 def _without(
-    free: ComplexArray, e: ComplexArray, V: ComplexArray, known: FloatArray
+    free: ComplexArray, e: ComplexArray, V: ComplexArray, known: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Residuals and their covariances, (…, n, n) and a diagonal, without what the free unknowns do."""
-    n, P = e.size, free.shape[-1]
+    """Residuals and their covariances, (…, n, n) both, without what the free unknowns do."""
+    P = free.shape[-1]
     if not P:
-        return e.ravel(), V, np.diag(known).astype(complex)
-    basis = np.linalg.qr(free.reshape(n, P), mode="complete")[0][:, P:]
+        return e.ravel(), V, known
+    basis = np.linalg.qr(free.reshape(e.size, P), mode="complete")[0][:, P:]
     left = basis.conj().T
-    return left @ e.ravel(), left @ V @ basis, left @ (known[:, None] * basis)
+    return left @ e.ravel(), left @ V @ basis, left @ known @ basis
 
 
 def estimated(rows: Sequence[Rows], runs: Runs) -> RunErrors:
@@ -457,7 +467,7 @@ def seen_in(
     whole, by_speed = F.swapaxes(1, 2) @ F.conj()
     by_speed = by_speed * np.kron(np.eye(len(residual)), np.ones((residual.shape[1],) * 2))
     parts = 2 * np.stack((np.diag(own.ravel()).astype(complex), by_speed, whole))
-    e, parts, _ = _without(W, residual, parts, own.ravel())
+    e, parts, _ = _without(W, residual, parts, parts[0])
     V = np.einsum("gk,kij->gij", np.column_stack((factor, ratios[:, 1:])), parts)
     V += 1e-12 * np.trace(V, axis1=1, axis2=2).max() * np.eye(len(e))
     q = (e.conj() @ np.linalg.solve(V, e[:, None])[..., 0].T).real
