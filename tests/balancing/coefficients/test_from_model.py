@@ -78,9 +78,8 @@ def test_one_run_and_the_model_balance_the_rotor(rotor):
 
 def test_the_error_of_the_model_goes_into_that_of_the_weights(rotor):
     baseline = run(rotor, {7: 3e-3, 18: -2e-3j}, ReadingErrors(1e-4, 1e-4))
-    found = correct(
-        model_influence(rotor, PLANES, SENSORS, SPEEDS, relative_error=0.02), baseline, method="least-squares"
-    )
+    model = model_influence(rotor, PLANES, SENSORS, SPEEDS, relative_error=0.02)
+    found = correct(model, baseline, method="least-squares")
     rng = np.random.default_rng(0)
     true = model_influence(rotor, PLANES, SENSORS, SPEEDS).W.reshape(-1, 2)
     noise = rng.standard_normal((2, 4000, *true.shape))
