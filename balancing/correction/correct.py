@@ -27,7 +27,7 @@ from balancing.correction.correction_warnings import (
     weight_words,
 )
 from balancing.correction.other_readings import OtherReading
-from balancing.correction.region_coverage import optimism
+from balancing.correction.region_coverage import optimism, uncertain
 from balancing.correction.stack_errors import stack_errors
 from balancing.data.conventions import Labels
 from balancing.data.errors import Source
@@ -330,7 +330,7 @@ def correct(  # noqa: PLR0913
         coefficients = coefficients_of(influence, used, chosen)
         unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
         if coefficients is not None and start.covariance is not None and not unclear:
-            small = optimism(W, coefficients, names, method=method)
+            small = "" if method == "weighted" else optimism(W, coefficients, names)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(W, names)
     errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
@@ -354,6 +354,9 @@ def correct(  # noqa: PLR0913
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
     covariance, dof = (None, None) if errors is None else errors.weights(fitted)
+    if method == "weighted" and covariance is not None and influence.run_errors.origin != "estimated":
+        small = "" if unclear else uncertain(D, covariance)
+        unclear_regions = (small,) if small else ()
     result = Correction(
         speeds=influence.speeds[used],
         sensors=influence.sensors,

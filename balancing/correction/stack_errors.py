@@ -9,7 +9,7 @@ import numpy as np
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors, seen_in
-from balancing.data.errors import reading_covariance, symmetric
+from balancing.data.errors import reading_covariance
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.methods import Fitted
