@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,14 +19,20 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, fdtri
 
 from balancing import Correction, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
-from balancing.data.errors import ASSUMED
+from balancing.coefficients.run_errors import ASSUMED
+from balancing.correction.region_coverage import clearness, relative_error
 from balancing.data.trials import RunScatter
 from rotorid.regression import stretch
 
 ComplexArray = NDArray[np.complex128]
 
-SOURCES = ("stated", "stated, spare runs", "readings stated, spare", "repeats, spare runs", "spare runs")
+Errors = Callable[[np.random.Generator], tuple[float, float]]
+
+SOURCES = ("stated", "stated, spare runs", "repeats, spare runs", "spare runs", "readings stated, spare")
+"""Where the errors come from; in the last the spare runs alone tell of errors between runs."""
 KINDS = ("independent", "half of each", "common at a speed", "common to a run", "further unbalance")
+PHASE = np.deg2rad(2.0) / 0.02
+"""Phase error over amplitude error, as they are assumed."""
 TIMES = (0.5, 1.0, 1.5, 2.5)
 
 
@@ -38,13 +45,12 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Whether the region holds the truth, and the warnings; None and why for a job refused."""
+    """Whether the region holds the truth, None for a job refused; its warnings or why it was refused."""
 
     inside: bool | None
-    warnings: tuple[str, ...]
+    words: tuple[str, ...]
     redundant: int
-    source: str
-    kind: str
+    clear: tuple[float, float] = (np.inf, np.inf)
 
 
 def normal(rng: np.random.Generator, *shape: int) -> ComplexArray:
@@ -64,8 +70,17 @@ def between_runs(rng: np.random.Generator, kind: str, Y: ComplexArray, effect: C
     return np.asarray(factor * Y)
 
 
-def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: float, told: float) -> Job:
-    """An ordinary job; errors of the readings and between runs, `told` times as large as is stated of them."""
+def draw(
+    rng: np.random.Generator,
+    source: str,
+    kind: str,
+    errors: tuple[float, float],
+    told: float = 1.0,
+    trial: float = 0.3,
+) -> Job:
+    """An ordinary job with errors of a reading and between runs, `told` times as large as stated."""
+    reading, run = errors
+    tangential = reading * (PHASE if source == "assumed" else 1.0)
     P, S, C = int(rng.integers(1, 5)), int(rng.integers(1, 6)), int(rng.integers(2, 9))
     C = max(C, P // S + 1)
     W = normal(rng, S, C, P)
@@ -76,7 +91,7 @@ def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: 
     T = np.zeros((len(planes), P), dtype=complex)
     for weights, plane in zip(T, planes, strict=True):
         if plane >= 0:
-            size = np.exp(rng.uniform(np.log(0.3), np.log(1.5))) * abs(D[plane])
+            size = np.exp(rng.uniform(np.log(trial), np.log(1.5))) * abs(D[plane])
             weights[plane] = size * np.exp(2j * np.pi * rng.random())
     Y = np.einsum("scp,rp->rsc", W, T - D)
     effect = W * np.sqrt(np.mean(np.abs(D) ** 2))
@@ -90,7 +105,7 @@ def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: 
         speeds=100.0 * np.arange(1, S + 1),
         sensors=tuple(f"S{c + 1}" for c in range(C)),
         planes=tuple("ABCD"[:P]),
-        readings=Y * (1 + reading * a) * np.exp(1j * reading * b),
+        readings=Y * (1 + reading * a) * np.exp(1j * tangential * b),
         weights=T,
         errors=ReadingErrors(reading / told, reading / told) if stated else None,
         run_errors=scatter if between else None,
@@ -98,13 +113,20 @@ def draw(rng: np.random.Generator, source: str, kind: str, reading: float, run: 
     return Job(trials, D, 2 * (S * C * (spare + 1) - P))
 
 
-def outcome(job: Job, source: str, kind: str) -> Outcome:
+def outcome(job: Job, method: str | None = None) -> Outcome:
     """Balance a job and see."""
     try:
-        found = correct(estimate_influence(job.trials))
+        influence = estimate_influence(job.trials)
+        found = correct(influence, method=method)
     except UndeterminedError as error:
-        return Outcome(None, (str(error),), job.redundant, source, kind)
-    return Outcome(holds(found, job.D), found.warnings, job.redundant, source, kind)
+        return Outcome(None, (str(error),), job.redundant)
+    assert influence.covariance is not None
+    assert found.covariance is not None
+    P = len(job.D)
+    W, n = influence.W.reshape(-1, P), 2 * P + 2
+    clear = clearness(W, influence.covariance.reshape(-1, n, n)[:, 2:, 2:]) / np.sqrt(len(W))
+    worst = relative_error(found.weights, found.covariance)
+    return Outcome(holds(found, job.D), found.warnings, job.redundant, (clear, worst))
 
 
 def holds(found: Correction, D: ComplexArray) -> bool:
@@ -113,3 +135,93 @@ def holds(found: Correction, D: ComplexArray) -> bool:
     d, n = stretch(found.weights - D), 2 * len(D)
     bound = chdtri(n, 0.05) if found.dof is None else n * fdtri(n, found.dof, 0.95)
     return bool(d @ np.linalg.solve(found.covariance, d) < bound)
+
+
+def ordinary(rng: np.random.Generator) -> tuple[float, float]:
+    """Errors of a reading and between runs."""
+    reading = float(np.exp(rng.uniform(np.log(0.005), np.log(0.05))))
+    return reading, 0.0 if rng.random() < 0.2 else float(rng.uniform(0.0, 0.05))
+
+
+def simulate(
+    jobs: int, source: str, kind: str, errors: Errors = ordinary, told: float = 1.0, seed: int = 1
+) -> list[Outcome]:
+    """So many jobs of a class."""
+    rng = np.random.default_rng([seed, SOURCES.index(source) if source in SOURCES else 9, KINDS.index(kind)])
+    return [outcome(draw(rng, source, kind, errors(rng), told)) for _ in range(jobs)]
+
+
+def every_kind(
+    jobs: int, source: str, errors: Errors = ordinary, told: float = 1.0, kinds: Sequence[str] = KINDS
+) -> list[Outcome]:
+    """Jobs of all kinds of errors between runs."""
+    return [one for kind in kinds for one in simulate(-(-jobs // len(kinds)), source, kind, errors, told)]
+
+
+def line(name: str, found: Iterable[Outcome]) -> str:
+    """Coverage of the regions of jobs without and with a warning, and how many there are."""
+    found = list(found)
+    answered = [one for one in found if one.inside is not None]
+    silent, warned = [[one.inside for one in answered if bool(one.words) == said] for said in (False, True)]
+    return (
+        f"{name:<44}{_percent(silent):>6} of {len(silent):5d}{_percent(warned):>9} of {len(warned):4d}"
+        f"{len(found) - len(answered):9d}"
+    )
+
+
+def told_of(found: Iterable[Outcome], least: int = 0) -> str:
+    """Share of answers with a warning, of jobs with so many redundant readings."""
+    said = [bool(one.words) for one in found if one.inside is not None and one.redundant >= least]
+    return f"{_percent(said)} % of {len(said)}"
+
+
+def _percent(values: Sequence[bool | None]) -> str:
+    return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if values else "–"
+
+
+def main(jobs: int = 2000) -> None:
+    """Print the tables."""
+    head = f"{'':<44}{'silent':>15}{'warned':>17}{'refused':>9}"
+    print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
+    each = -(-jobs // (len(SOURCES) * len(KINDS)))
+    cells = {(source, kind): simulate(each, source, kind) for source in SOURCES for kind in KINDS}
+    for (source, kind), found in cells.items():
+        print(line(f"{source}: {kind}", found))
+    for place, names in enumerate((SOURCES, KINDS)):
+        for name in names:
+            print(line(f"all: {name}", [one for key in cells if key[place] == name for one in cells[key]]))
+    print(line("all", [one for found in cells.values() for one in found]))
+    good = [one for key, found in cells.items() if key[0] != SOURCES[-1] for one in found]
+    print(f"warned, without the jobs '{SOURCES[-1]}': {told_of(good)}")
+
+    print(f"\nb. Errors assumed, the true ones so many times as large\n{head}")
+    for times in TIMES:
+        print(line(f"{times:g} times", every_kind(jobs // 4, "assumed", lambda _, t=times: assumed(t))))
+
+    print("\nc. Warned, of jobs with 8 or more redundant readings whose errors are twice as large as taken")
+    for names, words in ((KINDS[:1], "independent"), (KINDS[1:], "in common")):
+        for source in (*SOURCES[:2], SOURCES[-1]):
+            found = every_kind(jobs // 8, source, told=2.0, kinds=names)
+            print(f"{source + ': ' + words:<44}{told_of(found, 8)}")
+        found = every_kind(jobs // 8, "assumed", lambda _: assumed(2.0), kinds=names)
+        print(f"{'assumed: ' + words:<44}{told_of(found, 8)}")
+
+    print("\nd. Stated errors, trial weights 0.05–1.5 of the correction: regions that hold the truth, by")
+    by = (("weighted", "relative error of the weights"), ("least-squares", "ρ/√N of the weakest combination"))
+    edges = ((0.0, 0.1, 0.2, 0.4, 1.0, np.inf), (0.0, 0.5, 1.0, 2.0, 4.0, np.inf))
+    for place, (method, words) in zip((1, 0), by, strict=True):
+        rng = np.random.default_rng(7)
+        kinds = rng.choice(KINDS, jobs)
+        drawn = [outcome(draw(rng, SOURCES[0], kind, ordinary(rng), trial=0.05), method) for kind in kinds]
+        for low, high in pairwise(edges[1 - place]):
+            at = [one.inside for one in drawn if one.inside is not None and low <= one.clear[place] < high]
+            print(f"{f'{method}: {words} {low:g} … {high:g}':<60}{_percent(at):>6} of {len(at)}")
+
+
+def assumed(times: float) -> tuple[float, float]:
+    """Errors so many times as large as those that are assumed."""
+    return ASSUMED * times, ASSUMED * times
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:]))

@@ -21,6 +21,7 @@ from balancing.coefficients.run_errors import (
     RunColumns,
     RunErrors,
     Runs,
+    assumed,
     corrected_row,
     estimated,
     given,
@@ -341,7 +342,7 @@ def _between_runs(
         return estimated(rows, runs)
     if model.source == "stated":
         return RunErrors()
-    return given(rows, runs, ASSUMED_RUN, 0.0, "assumed")
+    return assumed(runs)
 
 
 def _as_readings(run: RunErrors, trials: Trials, model: ErrorModel) -> tuple[ErrorModel, RunErrors]:

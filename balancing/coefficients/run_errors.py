@@ -4,17 +4,18 @@ Mounting, thermal state, drift and what is not linear change a whole run, howeve
 Y of a run has, besides its own error, one of the variance p²|Y|² + w²|W T|² + f² in each direction, in
 proportion to the reading, to what the mounted weights do, and to neither; of three kinds: its own at each
 sensor; common to the sensors at a speed; common to the run. What is common changes all readings in proportion
-(p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is common (`sample_data/rk4`): errors
-taken as independent then cover single planes, but not their sum.
+(p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is
+common (`sample_data/rk4`): errors taken as independent then cover single planes, but not their sum.
 
 Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
 the corrected reading, Y₀ + W D, free of D. For a complex normal error of covariance Σ
 
     log L = −log det Σ − eᴴ Σ⁻¹ e,
 
-taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of the kinds. The
-grid keeps what the data leave open: few spare runs, or errors common to all sensors, which count once. A
-covariance of n numbers, with the eigenvalues λ relative to the one stated, is passed on with degrees of freedom ν:
+taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of kinds (own
+alone, common at a speed, to a run, to both: each as likely). The grid keeps what the data leave open: few spare
+runs, or errors common to all sensors, which count once. A covariance of n numbers, with the eigenvalues λ
+relative to the one stated, is passed on with degrees of freedom ν:
 
     log s² = E[mean log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of Σ λ χ²(1), over s².
 
@@ -35,7 +36,7 @@ from rotorid.regression import gain
 Origin = Literal["stated", "estimated", "assumed", "none"]
 
 ASSUMED = 0.02
-"""Of a reading, from run to run, where nothing says more."""
+"""Of a reading, from run to run, where nothing says more: in proportion, and as further unbalances, each."""
 SIZES = np.geomspace(3e-4, 1.0, 12)
 """Whole size relative to the root mean square reading; refined where the likelihood is."""
 _P, _F, _PF, _WF, _PW = (1.0, 0, 0), (0, 0, 1.0), (0.6, 0, 0.4), (0, 0.5, 0.5), (0.5, 0.5, 0)
@@ -248,7 +249,7 @@ def run_columns(run: RunErrors, runs: Runs) -> RunColumns:
 
 
 def unbalances(W: ComplexArray) -> ComplexArray:
-    """What further unbalances do, one in each plane, of equal effect and together of mean square 1, (P, S, C)."""
+    """What unbalances do, one in each plane, of equal effect and together of mean square 1, (P, S, C)."""
     columns = np.moveaxis(W, -1, 0)
     size = np.sqrt(np.mean(np.abs(columns) ** 2, axis=(1, 2), keepdims=True) * len(columns))
     return np.asarray(columns / np.where(size > 0, size, 1.0))
@@ -418,6 +419,17 @@ def given(rows: Sequence[Rows], runs: Runs, relative: float, floor: float, origi
     found = [spectrum(each, runs, grid) for each in rows if each.dof > 0]
     found = _agreeing(rows, found, grid.sizes, np.ones(len(grid.points)))
     return _of_grid(grid.points, _posterior(found, grid), runs, origin, None)
+
+
+def assumed(runs: Runs) -> RunErrors:
+    """Where no run tells of them: of both kinds that corrections are most sensitive to.
+
+    Data do not choose here: errors common to a run leave no trace in the corrected reading.
+    """
+    sizes = np.zeros((3, 3))
+    sizes[0, 2] = ASSUMED
+    sizes[2, 2] = ASSUMED * np.sqrt(runs.mean[0])
+    return RunErrors(sizes, "assumed")
 
 
 def scatter(

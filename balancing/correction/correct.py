@@ -27,7 +27,7 @@ from balancing.correction.correction_warnings import (
     weight_words,
 )
 from balancing.correction.other_readings import OtherReading
-from balancing.correction.region_coverage import optimism
+from balancing.correction.region_coverage import optimism, uncertain
 from balancing.correction.stack_errors import stack_errors
 from balancing.data.conventions import Labels
 from balancing.data.errors import Source
@@ -339,10 +339,10 @@ def correct(  # noqa: PLR0913
         check_planes(felt, names)
         counts = None if rows is None else rows > 0
         unclear = check_resolution(part, refuse=refuse, counts=counts)
-        if part.covariance is not None and start.covariance is not None and not unclear:
+        told = part.covariance is not None and start.covariance is not None and not unclear
+        if told and part.covariance is not None and method != "weighted":
             coefficients = part.covariance[..., 2:, 2:].reshape(len(W), 2 * len(names), -1)
-            coefficients = coefficients if counts is None else coefficients[counts]
-            small = optimism(felt, coefficients, names, method=method)
+            small = optimism(felt, coefficients if counts is None else coefficients[counts], names)
             unclear_regions = (small,) if small else ()
     planes_told = conditioning(felt, names)
     errors = stack_errors(influence, start, used, chosen)
@@ -372,6 +372,9 @@ def correct(  # noqa: PLR0913
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
     after = Y + influence.W[used][..., chosen] @ D
     covariance, dof = (None, None) if errors is None else errors.weights(fitted)
+    if method == "weighted" and covariance is not None and influence.run_errors.origin != "estimated":
+        small = "" if unclear else uncertain(D, covariance)
+        unclear_regions = (small,) if small else ()
     result = Correction(
         speeds=influence.speeds[used],
         sensors=influence.sensors,

@@ -1,18 +1,15 @@
 """Where the 95 % region of the weights is too small, in words.
 
-First-order regions hold where the coefficients are far larger than their errors, for every combination of the
-planes. The weakest combination decides (`balancing.coefficients.resolution`): its χ² over n degrees of
-freedom gives
+First-order regions hold where errors of the weights are small against the weights: D goes as 1/W, and what a
+large error does to it is no ellipse. The fit by errors ("weighted") therefore goes by the relative error of
+the weights, that of the worst combination of planes over the root mean square weight. Regions of errors that
+spare runs tell are wide enough (by F), and are left alone.
 
-- the ratio ρ = √(χ²/n), effect in units of the errors, and
-- the clearness t = (χ² − n) / √(2 n + 4 (χ² − n)), effect in units of what ρ² itself is uncertain by.
+Least squares is shifted as well, towards zero by about 1/ρ² where ρ is the effect of the weakest combination
+of the planes in units of its errors (√(χ²/n), `balancing.coefficients.resolution`); its standard deviation
+falls with the number of readings N, so that it is optimistic below a ρ that grows as √N.
 
-Errors in W shift least squares towards zero by about 1/ρ², and its standard deviation falls with the number
-of readings N, so that least squares is optimistic below a ρ that grows as √N. The fit by errors ("weighted")
-is not shifted; its region is too small where the weak combination is hardly seen at all, at small t.
-
-The shares below are those of `examples/coverage_balance.py` (two planes, twelve readings); similar ones were
-found for 4 to 60 readings and one to four planes.
+The shares below are those of table d of `examples/coverage_balance.py`.
 """
 
 from __future__ import annotations
@@ -26,18 +23,40 @@ from balancing.coefficients.identifiability import acting_alike
 from balancing.coefficients.resolution import resolution
 from rotorid.base.arrays import ComplexArray, FloatArray
 
-WEIGHTED_LEVELS = ((3.0, "25 to 90 %"),)
-"""Clearness t of the weakest combination below which regions of the fit by errors hold so many truths.
-
-Above it, all in all, 94 %; from 3 to 6, 91 to 92 %.
-"""
+WEIGHTED_LEVELS = ((1.0, "50 to 70 %"), (0.4, "70 to 85 %"))
+"""Relative error of the weights above which regions of the fit by errors hold so many truths."""
 
 LEAST_SQUARES_LEVELS = ((1.0, "5 to 75 %"), (2.0, "80 to 90 %"))
-"""The same for least squares, by ρ/√N."""
+"""ρ/√N below which regions of least squares do."""
 
 
-def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str], *, method: str = "weighted") -> str:
-    """Warn of a 95 % region of the weights that is too small; empty where it is honest.
+def uncertain(D: ArrayLike, covariance: ArrayLike) -> str:
+    """Warn of a 95 % region of the weighted fit that is too small; empty where it is honest.
+
+    Parameters
+    ----------
+    D
+        Weights, shape (P,).
+    covariance
+        Of (Re D₁, Im D₁, …), shape (2P, 2P).
+    """
+    error = relative_error(D, covariance)
+    share = next((words for limit, words in WEIGHTED_LEVELS if error > limit), "")
+    return share and (
+        f"the stated 95 % region of the weights is optimistic: errors of the weights reach {error:.0%} of "
+        f"their size, and regions like this one contained the truth in {share} of simulated jobs; use "
+        "larger trial weights, add runs, sensors or speeds, or leave a plane out"
+    )
+
+
+def relative_error(D: ArrayLike, covariance: ArrayLike) -> float:
+    """Standard deviation of the worst combination of planes over the root mean square weight."""
+    size = float(np.mean(np.abs(np.asarray(D)) ** 2))
+    return float(np.sqrt(np.linalg.eigvalsh(np.asarray(covariance))[-1] / size)) if size else np.inf
+
+
+def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str]) -> str:
+    """Warn of a 95 % region of least squares that is too small; empty where it is honest.
 
     Parameters
     ----------
@@ -47,18 +66,16 @@ def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str], *, meth
         Of (Re W₁, Im W₁, …) of each reading, shape (N, 2P, 2P).
     planes
         Names, P.
-    method
-        "weighted", or anything else for a solution that does not look at the errors of W.
     """
     w, C = np.asarray(W, dtype=complex), np.asarray(covariance, dtype=np.float64)
-    share = _share(w, C, method)
+    share = _share(w, C)
     if not share or not C.any():
         return ""
     own = [(w[:, [p]], C[:, 2 * p : 2 * p + 2, 2 * p : 2 * p + 2]) for p in range(len(planes))]
-    weak = [p for p, (column, variance) in enumerate(own) if _share(column, variance, method)]
+    weak = [p for p, (column, variance) in enumerate(own) if _share(column, variance)]
     if weak:
         p = min(weak, key=lambda q: clearness(*own[q]))
-        ratio = clearness(*own[p])[0]
+        ratio = clearness(*own[p])
         cause = f"the effect of plane {planes[p]!r} is only {ratio:.2g} times the errors of the readings"
         remedy = f"repeat the trial run of plane {planes[p]!r} with a larger weight"
     else:
@@ -66,18 +83,18 @@ def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str], *, meth
         named = " and ".join(repr(planes[q]) for q in acting_alike(w))
         cause = (
             f"planes {named} act so much alike (condition number {singular[0] / singular[-1]:.2g}) that the "
-            f"readings tell them apart by only {clearness(w, C)[0]:.2g} times their errors"
+            f"readings tell them apart by only {clearness(w, C):.2g} times their errors"
         )
         remedy = "use larger trial weights, add sensors or speeds, or leave a plane out"
-    better = "" if method == "weighted" else "use the weighted method, which is more honest here, or "
     return (
         f"the stated 95 % region of the weights is optimistic: {cause}, and regions like this one contained "
-        f"the truth in {share} of simulated jobs; {better}{remedy}"
+        f"the truth in {share} of simulated jobs; use the weighted method, which is more honest here, or "
+        f"{remedy}"
     )
 
 
-def clearness(W: ArrayLike, covariance: ArrayLike) -> tuple[float, float]:
-    """ρ and t of the weakest combination of the planes; infinite where nothing has errors.
+def clearness(W: ArrayLike, covariance: ArrayLike) -> float:
+    """ρ of the weakest combination of the planes; infinite where nothing has errors.
 
     Parameters
     ----------
@@ -88,18 +105,11 @@ def clearness(W: ArrayLike, covariance: ArrayLike) -> tuple[float, float]:
     """
     w, C = np.asarray(W, dtype=complex), np.asarray(covariance, dtype=np.float64)
     if not C.any():
-        return np.inf, np.inf
+        return np.inf
     found = resolution(w, C)
-    if not np.isfinite(found.chi_square):
-        return np.inf, np.inf
-    excess = found.chi_square - found.n
-    ratio = float(np.sqrt(found.chi_square / found.n))
-    return ratio, float(excess / np.sqrt(2 * found.n + 4 * max(excess, 0.0)))
+    return float(np.sqrt(found.chi_square / found.n)) if np.isfinite(found.chi_square) else np.inf
 
 
-def _share(W: ComplexArray, covariance: FloatArray, method: str) -> str:
-    ratio, clear = clearness(W, covariance)
-    levels, value = (
-        (WEIGHTED_LEVELS, clear) if method == "weighted" else (LEAST_SQUARES_LEVELS, ratio / np.sqrt(len(W)))
-    )
-    return next((words for limit, words in levels if value < limit), "")
+def _share(W: ComplexArray, covariance: FloatArray) -> str:
+    ratio = clearness(W, covariance) / np.sqrt(len(W))
+    return next((words for limit, words in LEAST_SQUARES_LEVELS if ratio < limit), "")
