@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,6 +125,7 @@ def check_resolution(
     planes: Sequence[str],
     *,
     refuse: bool,
+    remedies: Callable[[], Sequence[str]] = tuple,
 ) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
 
@@ -140,6 +141,8 @@ def check_resolution(
         Names.
     refuse
         Or warn.
+    remedies
+        What to do instead, in sentences.
 
     Returns
     -------
@@ -170,13 +173,31 @@ def check_resolution(
         return ()
     words = _alike(W, alike, planes) + within + _REMEDY
     if refuse:
-        raise refusal(words, influence.warnings)
+        raise refusal(words, influence.warnings, influence.contradictions, remedies())
     return (words,)
 
 
-def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:
-    """The error, with the warnings that would be lost with the result, and that may tell the real cause."""
-    return UndeterminedError("\n".join((words, *(f"Warning: {w}" for w in warnings))))
+def refusal(
+    words: str, warnings: Sequence[str], contradictions: Sequence[str] = (), remedies: Sequence[str] = ()
+) -> UndeterminedError:
+    """The error: its cause, what follows, what to do instead, and the warnings that would be lost with it.
+
+    Parameters
+    ----------
+    words
+        What is not determined, and why.
+    warnings
+        All that was found.
+    contradictions
+        Those of them that are the likely cause.
+    remedies
+        Sentences.
+    """
+    rest = [w for w in warnings if w not in contradictions]
+    follows = f"so {words}" if contradictions else words
+    return UndeterminedError(
+        "\n".join((*contradictions, follows, *remedies, *(f"Warning: {w}" for w in rest)))
+    )
 
 
 def acting_alike(W: ComplexArray) -> list[int]:

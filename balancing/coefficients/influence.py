@@ -79,6 +79,10 @@ class Influence:
         What the user should know.
     notes
         What the user may want to know.
+    contradictions
+        Those of the warnings that say that runs disagree.
+    trials
+        The runs; None: stored coefficients.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
     """
@@ -101,6 +105,8 @@ class Influence:
     reading_dof: float | None = None
     own_between: float = 0.0
     notes: tuple[str, ...] = ()
+    contradictions: tuple[str, ...] = ()
+    trials: Trials | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -125,6 +131,15 @@ class Influence:
             raise ValueError(f"{name} of the influence coefficients must be finite; found NaN or infinity")
         array.flags.writeable = False
         object.__setattr__(self, name, array)
+
+    @property
+    def known_covariance(self) -> FloatArray | None:
+        """Of the covariance what follows from stated or measured errors; None where nothing does."""
+        if self.covariance is None or self.error_source == "assumed":
+            return None
+        if self.run_errors.origin != "assumed" or self.common is None:
+            return self.covariance
+        return symmetric((self.covariance - marginal(self.common)) * (1 - self.own_between))
 
     @property
     def unit(self) -> str:
@@ -208,13 +223,15 @@ def estimate_influence(trials: Trials) -> Influence:
     theta[..., 0][np.abs(theta[..., 0]) < EQUAL * np.abs(Y).max(axis=-1)] = 0.0
     runs = runs_of(trials.mean, trials.weights, theta[..., 1:])
     covariance, common, dof, own_between = joint_covariance(G, reading, run_columns(run, runs), run, model)
+    sure = covariance if run.origin != "assumed" else _channel_covariance(G, reading)
     try:
-        check_effects(trials, theta[..., 1:], covariance if known(model) else _digits(trials, G))
+        told = sure if known(model) else _digits(trials, G)
+        check_effects(trials, theta[..., 1:], told, contradicted=bool(repeated))
     except UndeterminedError as error:
-        raise refusal(str(error), trials.warnings + repeated) from error
-    warnings = trials.warnings + repeated + model.warnings
+        raise refusal(str(error), trials.warnings + repeated, repeated) from error
+    disagree: tuple[str, ...] = ()
     if model.source == "stated" and R > P + 1:
-        warnings += check_consistency(trials, A, reading, runs)
+        disagree = check_consistency(trials, A, reading, runs)
     return Influence(
         speeds=trials.speeds,
         sensors=trials.sensors,
@@ -226,7 +243,7 @@ def estimate_influence(trials: Trials) -> Influence:
         errors=model.errors,
         error_source=model.source,
         labels=trials.labels,
-        warnings=warnings,
+        warnings=trials.warnings + repeated + model.warnings + disagree,
         last_run=trials.runs[-1],
         last_weights=trials.weights[-1],
         common=common,
@@ -234,6 +251,8 @@ def estimate_influence(trials: Trials) -> Influence:
         reading_dof=model.dof,
         own_between=own_between,
         notes=weak_trials(trials, theta[..., 1:]) + unseen(run),
+        contradictions=repeated + disagree,
+        trials=trials,
     )
 
 

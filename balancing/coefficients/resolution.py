@@ -56,7 +56,7 @@ def resolution(W: ComplexArray, covariance: FloatArray) -> Resolution:
     N, P = W.shape
     norms = np.linalg.norm(W, axis=0)
     scaled = W / norms
-    S = _hermitian(covariance) / np.outer(norms, norms)
+    S = hermitian(covariance) / np.outer(norms, norms)
     best: tuple[float, ComplexArray, FloatArray] | None = None
     v = np.linalg.svd(scaled)[2][-1].conj()
     for _ in range(_STEPS):
@@ -78,8 +78,8 @@ def resolution(W: ComplexArray, covariance: FloatArray) -> Resolution:
     return Resolution(total, 2 * (N - P + 1), float(each.max()), v)
 
 
-def _hermitian(covariance: FloatArray) -> ComplexArray:
-    """S[p, q] = E[dW_p conj(dW_q)] / 2 from real covariances; half: the variance in one direction."""
+def hermitian(covariance: FloatArray) -> ComplexArray:
+    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
     N, n, _ = covariance.shape
     C = covariance.reshape(N, n // 2, 2, n // 2, 2)
     real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]

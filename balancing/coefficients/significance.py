@@ -15,9 +15,12 @@ ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)
 """A good trial weight changes a reading by 30 % of its amplitude or by 30°."""
 
 _UNCHANGED = 1e-9
+_MEND = "mend the table, or measure these runs again until they agree"
 
 
-def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None) -> None:
+def check_effects(
+    trials: Trials, W: ComplexArray, covariance: FloatArray | None, *, contradicted: bool = False
+) -> None:
     """Refuse a trial weight that changed nothing.
 
     Parameters
@@ -28,6 +31,8 @@ def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None
         Coefficients (S, C, P).
     covariance
         Of (Y₀, W₁, …) of each channel, shape (S, C, 2P + 2, 2P + 2), or None.
+    contradicted
+        Whether runs that should agree do not: no larger trial weight helps then.
 
     Raises
     ------
@@ -51,7 +56,7 @@ def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None
         if covariance is not None and not _significant(W[..., p], covariance[..., own, own]):
             raise UndeterminedError(
                 f"{words} changed the readings by no more than their errors explain: its effect is not "
-                "determined; repeat the run with a larger trial weight"
+                f"determined; {_MEND if contradicted else 'repeat the run with a larger trial weight'}"
             )
 
 

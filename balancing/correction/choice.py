@@ -33,14 +33,12 @@ def rows_of(given: ArrayLike | None, shape: tuple[int, ...], used: list[int]) ->
     return None if (chosen == chosen[0]).all() else chosen / chosen.max()
 
 
-def coefficients_of(influence: Influence, used: list[int], chosen: list[int]) -> FloatArray | None:
-    """Covariance of the chosen coefficients of each reading, (N, 2P, 2P)."""
-    if influence.covariance is None:
+def coefficients_of(covariance: FloatArray | None, used: list[int], chosen: list[int]) -> FloatArray | None:
+    """Covariance of the chosen coefficients of each reading, (N, 2P, 2P), from that of all, of (Y₀, W)."""
+    if covariance is None:
         return None
     index = np.array([[2 + 2 * p, 3 + 2 * p] for p in chosen]).ravel()
-    return np.asarray(
-        influence.covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index))
-    )
+    return np.asarray(covariance[used][..., index[:, None], index].reshape(-1, len(index), len(index)))
 
 
 def plane_indices(influence: Influence, planes: Sequence[str] | None) -> list[int]:

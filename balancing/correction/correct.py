@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.convention_test import ConventionTest
-from balancing.coefficients.identifiability import check_planes, check_resolution
+from balancing.coefficients.identifiability import UndeterminedError, check_planes, check_resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.choice import coefficients_of, plane_indices, rows_of
@@ -26,6 +26,7 @@ from balancing.correction.correction_warnings import (
     reading_names,
     weight_words,
 )
+from balancing.correction.counsel import Counsel, Stakes, coarse, judged, remedies
 from balancing.correction.other_readings import OtherReading
 from balancing.correction.region_coverage import optimism
 from balancing.correction.stack_errors import stack_errors
@@ -34,7 +35,7 @@ from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.solvers.conditioning import conditioning
-from balancing.solvers.methods import Stack, fit_weights
+from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
 
@@ -97,6 +98,8 @@ class Correction:
         What the runs say about the relation of phases to angles; None: they were not asked.
     others
         What the same numbers give if a convention that is assumed is otherwise.
+    counsel
+        Whether to mount the weights, and what to do instead.
     """
 
     speeds: FloatArray
@@ -128,6 +131,7 @@ class Correction:
     remove: tuple[str, ...] = ()
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
+    counsel: Counsel = field(default_factory=Counsel)
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -304,9 +308,10 @@ def correct(  # noqa: PLR0913
     Raises
     ------
     UndeterminedError
-        Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
-        at 95 % (`balancing.coefficients.resolution`); for coefficients from runs with unknown errors above a
-        condition number of 1000, which no instrument supports.
+        Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
+        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.resolution`); else, for
+        coefficients from runs, above a condition number of 1000, which no instrument supports. Errors that
+        are assumed refuse nothing: `Correction.counsel` tells what they mean.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
@@ -320,26 +325,20 @@ def correct(  # noqa: PLR0913
         raise ValueError(
             "the vibration to be corrected is zero at every sensor and speed: there is nothing to balance"
         )
+    rows = rows_of(row_weights, influence.W.shape[:2], used)
+    kept = None if limits is None else limits.pick(used, chosen)
+    stakes = Stakes(influence, start, used, chosen, rows, kept)
     soft = strength is not None or keep is not None
     if method is None:
         method = "weighted" if start.covariance is not None and not soft else "least-squares"
-    unclear: tuple[str, ...] = ()
-    unclear_regions: tuple[str, ...] = ()
-    if not soft:
-        check_planes(W, names)
-        coefficients = coefficients_of(influence, used, chosen)
-        unclear = check_resolution(influence, W, coefficients, names, refuse=refuse)
-        if coefficients is not None and start.covariance is not None and not unclear:
-            small = optimism(W, coefficients, names, method=method)
-            unclear_regions = (small,) if small else ()
+    unclear, unclear_regions = ((), ()) if soft else _resolved(stakes, method, refuse=refuse)
     planes_told = conditioning(W, names)
     errors = stack_errors(influence, start, used, chosen, fresh=baseline is not None)
-    kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
         Y.ravel(),
         None if errors is None else errors.channels,
-        rows_of(row_weights, influence.W.shape[:2], used),
+        rows,
         kept if kept is not None and kept.any else None,
         names,
         reading_names(influence.sensors, influence.speeds[used]),
@@ -348,7 +347,7 @@ def correct(  # noqa: PLR0913
         None if errors is None else errors.common,
         None if errors is None else errors.explain,
     )
-    fitted = fit_weights(stack, method, strength=strength, keep=keep)
+    fitted, method = _fitted(stack, method, strength, keep, assumed=influence.error_source == "assumed")
     D = fitted.weights
     if stack.limits is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
@@ -383,10 +382,41 @@ def correct(  # noqa: PLR0913
         active=binding(stack, fitted),
         remove=tuple(name for name in names if name in remove),
     )
-    warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
-    warnings += cautions(result, W, alike=not unclear)
-    warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
-    return _with_words(result, warnings, influence.notes + notes(result))
+    result = replace(result, counsel=judged(result, stakes))
+    warnings, words = influence.warnings + start.warnings, influence.notes
+    if result.counsel.word == "mount":
+        warnings += unclear + unclear_regions + fitted.warnings + cautions(result, W, alike=not unclear)
+        warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
+        words += notes(result) + coarse(influence)
+    else:  # the counsel says what these would
+        warnings = tuple(w for w in warnings if w not in influence.contradictions)
+        warnings += fitted.warnings + cautions(result, W, alike=False, rising=False)
+    return _with_words(result, warnings, words)
+
+
+def _resolved(stakes: Stakes, method: str, *, refuse: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Refuse planes that act alike; what is unclear about the planes, and about regions of the weights."""
+    influence, names, W = stakes.influence, stakes.names, stakes.W
+    check_planes(W, names)
+    known = coefficients_of(influence.known_covariance, stakes.used, stakes.chosen)
+    unclear = check_resolution(influence, W, known, names, refuse=refuse, remedies=partial(remedies, stakes))
+    coefficients = coefficients_of(influence.covariance, stakes.used, stakes.chosen)
+    if coefficients is None or stakes.start.covariance is None or unclear:
+        return unclear, ()
+    small = optimism(W, coefficients, names, method=method)
+    return (), (small,) if small else ()
+
+
+def _fitted(
+    stack: Stack, method: str, strength: float | str | None, keep: float | None, *, assumed: bool
+) -> tuple[Fitted, str]:
+    """Weights, and the method that found them."""
+    try:
+        return fit_weights(stack, method, strength=strength, keep=keep), method
+    except UndeterminedError:
+        if method != "weighted" or not assumed:
+            raise
+        return fit_weights(stack, "least-squares"), "least-squares"  # what is assumed refuses nothing
 
 
 def region_radius(dof: float | None) -> float:
@@ -397,8 +427,6 @@ def region_radius(dof: float | None) -> float:
 
 
 def _with_words(result: Correction, warnings: tuple[str, ...], notes: tuple[str, ...]) -> Correction:
-    from dataclasses import replace
-
     for name in ("weights", "before", "after", "covariance", "after_covariance"):
         array = getattr(result, name)
         if array is not None:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from balancing.coefficients.resolution import hermitian
 from balancing.data.errors import symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -64,6 +65,20 @@ def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray
     """Covariance (N, 2, 2) of Y₀ + W D at given D, from that of each reading's (Y₀, W)."""
     B = np.concatenate([_block(np.asarray(z)) for z in (1.0, *D)], axis=1)
     return symmetric(B @ covariance @ B.T)
+
+
+def error_form(covariance: FloatArray, row_weights: FloatArray | None = None) -> ComplexArray:
+    """F (P + 1, P + 1): zᴴ F z is the mean square error of (Y₀, W) z, summed over the readings.
+
+    Parameters
+    ----------
+    covariance
+        Of (Y₀, W) of each reading, (N, 2P + 2, 2P + 2).
+    row_weights
+        Of the readings, (N,); default 1.
+    """
+    rows = np.ones(len(covariance)) if row_weights is None else np.asarray(row_weights) ** 2
+    return np.asarray(2 * np.einsum("n,npq->qp", rows, hermitian(covariance)))
 
 
 def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, FloatArray]:
