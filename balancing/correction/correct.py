@@ -35,6 +35,7 @@ from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.solvers.conditioning import conditioning
+from balancing.solvers.error_propagation import region_radius as region_radius
 from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
@@ -382,7 +383,9 @@ def correct(  # noqa: PLR0913
         active=binding(stack, fitted),
         remove=tuple(name for name in names if name in remove),
     )
-    result = replace(result, counsel=judged(result, stakes))
+    std, factor = result.mass_std, result.coverage_factor
+    widths = None if std is None or factor is None else factor * std
+    result = replace(result, counsel=judged(stakes, D, widths, soft=soft, remove=remove))
     warnings, words = influence.warnings + start.warnings, influence.notes
     if result.counsel.word == "mount":
         warnings += unclear + unclear_regions + fitted.warnings + cautions(result, W, alike=not unclear)
@@ -417,13 +420,6 @@ def _fitted(
         if method != "weighted" or not assumed:
             raise
         return fit_weights(stack, "least-squares"), "least-squares"  # what is assumed refuses nothing
-
-
-def region_radius(dof: float | None) -> float:
-    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
-    from scipy.special import chdtri, fdtri
-
-    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
 
 
 def _with_words(result: Correction, warnings: tuple[str, ...], notes: tuple[str, ...]) -> Correction:

@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -31,18 +31,16 @@ from balancing.coefficients.baseline import Start
 from balancing.coefficients.identifiability import acting_alike
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.resolution import resolution
+from balancing.coefficients.significance import CLEAR
 from balancing.correction.choice import coefficients_of
 from balancing.correction.correction_warnings import weight_words
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
-from balancing.solvers.error_propagation import error_form
+from balancing.solvers.error_propagation import error_form, region_radius
 from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import figures, listing
 from rotorid.base.units import rpm_text
-
-if TYPE_CHECKING:
-    from balancing.correction.correct import Correction
 
 Word = Literal["mount", "do not mount", "measure again"]
 
@@ -52,8 +50,6 @@ FIGHTING, HARDLY = 3.0, 0.1
 """Weights so many times larger than those of fewer planes, which leave hardly more (of the rms before)."""
 WORTH = 1.25
 """Of the rms before: what something else may leave at most (95 %) to be proposed."""
-CLEAR = 5.0
-"""Effect of a good trial weight in units of its error."""
 WEAK = 3.0
 """Below this, a trial weight is too small."""
 COARSE = 0.1
@@ -177,9 +173,7 @@ class Stakes:
 
     def most(self, choice: Choice) -> float:
         """Root mean square that these weights leave at most with 95 %."""
-        from balancing.correction.correct import region_radius
-
-        return choice.rms + region_radius(self.start.model.dof) * choice.error / np.sqrt(2)
+        return float(choice.rms + region_radius(self.start.model.dof) * choice.error / np.sqrt(2))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -213,13 +207,12 @@ class Stakes:
         """Some of the planes, by least squares or with given weights."""
         R, F = self.forms
         columns = [p + 1 for p in planes]
-        if weights is None:
-            weights = -np.linalg.lstsq(R[:, columns], R[:, 0], rcond=None)[0]
+        found = -np.linalg.lstsq(R[:, columns], R[:, 0], rcond=None)[0] if weights is None else weights
         z = np.zeros(R.shape[1], dtype=complex)
-        z[[0, *columns]] = [1.0, *weights]
-        error = float(np.sqrt(max(np.vdot(z, F @ z).real, 0.0)))
+        z[[0, *columns]] = [1.0, *found]
+        error = float(np.sqrt(max(float(np.vdot(z, F @ z).real), 0.0)))
         return Choice(
-            tuple(self.names[p] for p in planes), np.asarray(weights), float(np.linalg.norm(R @ z)), error
+            tuple(self.names[p] for p in planes), np.asarray(found), float(np.linalg.norm(R @ z)), error
         )
 
     def fewer(self) -> tuple[Choice, ...]:
@@ -238,7 +231,7 @@ class Stakes:
         """Effect of each plane in units of its errors, (P,)."""
         R, F = self.forms
         error = np.sqrt(np.diag(F).real[1:])
-        size = np.linalg.norm(R[:, 1:], axis=0)
+        size = np.sqrt(np.sum(np.abs(R[:, 1:]) ** 2, axis=0))
         return np.asarray(np.where(error > 0, size / np.where(error > 0, error, 1.0), np.inf))
 
     def trial_weight(self, p: int) -> float | None:
@@ -249,25 +242,43 @@ class Stakes:
         return float(np.abs(trials.weights[:, trials.planes.index(name)]).max()) or None
 
 
-def judged(result: Correction, stakes: Stakes) -> Counsel:
-    """Whether to mount a correction, and what to do instead."""
+def judged(
+    stakes: Stakes,
+    weights: ComplexArray,
+    widths: FloatArray | None,
+    *,
+    soft: bool = False,
+    remove: Sequence[str] = (),
+) -> Counsel:
+    """Whether to mount a correction, and what to do instead.
+
+    Parameters
+    ----------
+    stakes
+        The job.
+    weights, widths
+        Of all its planes, (P,), and half the 95 % intervals of their sizes; None: unknown.
+    soft
+        Whether they are those of a ridge or truncated.
+    remove
+        Planes where material is taken away.
+    """
     before = stakes.before
-    whole = stakes.choice(range(len(result.planes)), result.weights)
+    whole = stakes.choice(range(len(weights)), weights)
     fewer = stakes.fewer()
     calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
     fighting = any(_effect(whole, stakes) >= FIGHTING * _effect(c, stakes) for c in calm)
-    if not result.weights.any() or (stakes.sound(whole) and not fighting):
+    if not weights.any() or (stakes.sound(whole) and not fighting):
         return Counsel("mount", before=before, expected=whole.expected, choices=fewer)
-    word: Word = "do not mount"
-    causes: Sequence[str] = stakes.influence.contradictions
-    instead: tuple[str, ...] = ("Instead: mend the table, or measure these runs again until they agree.",)
-    if causes:
-        word = "measure again"
-    else:
-        causes = _causes(result, stakes)
-        instead = remedies(stakes, fewer, soft=result.method in ("ridge", "truncated"))
-    cause = "; ".join((*causes, _outlook(whole, stakes)))
-    return Counsel(word, cause, instead, before, whole.expected, fewer)
+    contradictions = stakes.influence.contradictions
+    instead: tuple[str, ...]
+    if contradictions:
+        instead = ("Instead: mend the table, or measure these runs again until they agree.",)
+        cause = "; ".join((*contradictions, _outlook(whole, stakes)))
+        return Counsel("measure again", cause, instead, before, whole.expected, fewer)
+    cause = "; ".join((*_causes(stakes, weights, widths, remove), _outlook(whole, stakes)))
+    instead = remedies(stakes, fewer, soft=soft)
+    return Counsel("do not mount", cause, instead, before, whole.expected, fewer)
 
 
 def remedies(stakes: Stakes, fewer: Sequence[Choice] | None = None, *, soft: bool = False) -> tuple[str, ...]:
@@ -329,32 +340,29 @@ def _weak(stakes: Stakes) -> list[int]:
     return [int(p) for p in np.flatnonzero(stakes.clearness() < WEAK)]
 
 
-def _causes(result: Correction, stakes: Stakes) -> list[str]:
+def _causes(
+    stakes: Stakes, weights: ComplexArray, widths: FloatArray | None, remove: Sequence[str]
+) -> list[str]:
     """What makes the weights uncertain: digits, trial weights, planes that act alike, or little to gain."""
-    weak = _weak(stakes)
-    found = [*coarse(stakes.influence), *(_uncertain(result, p, stakes) for p in weak)]
-    if not weak and len(result.planes) > 1:
+    labels, names, weak = stakes.start.labels, stakes.names, _weak(stakes)
+    found = list(coarse(stakes.influence))
+    for p in weak:
+        trial = stakes.trial_weight(p)
+        of = "" if trial is None else f" of its trial weight ({weight_words(labels, trial)})"
+        width = "" if widths is None else f" ± {weight_words(labels, float(f'{widths[p]:.2g}'))} (95 %)"
+        found.append(
+            f"the weight in plane {names[p]!r} is {weight_words(labels, abs(weights[p]))}{width}, for the "
+            f"effect{of} is only {stakes.clearness()[p]:.2g} times its error"
+        )
+    if not weak and len(names) > 1:
         alike = acting_alike(stakes.W)
-        planes = listing((repr(result.planes[p]) for p in alike), "and")
-        each = " against ".join(_placed(result, p) for p in alike)
-        found.append(f"planes {planes} act alike, and their weights fight each other ({each})")
+        mass, angle = labels.weight(weights)
+        at = [f"{(angle[p] + 180 * (names[p] in remove)) % 360:.0f}°" for p in alike]
+        each = [f"{figures(mass[p], 3)} {labels.weight_unit}".rstrip() for p in alike]
+        against = " against ".join(f"{m} at {a}" for m, a in zip(each, at, strict=True))
+        planes = listing((repr(names[p]) for p in alike), "and")
+        found.append(f"planes {planes} act alike, and their weights fight each other ({against})")
     return found or ["the weights promise little"]
-
-
-def _placed(result: Correction, p: int) -> str:
-    mass, angle = result.labels.weight(result.weights[p])
-    at = (float(angle) + 180.0 * (result.planes[p] in result.remove)) % 360
-    return f"{figures(float(mass), 3)} {result.labels.weight_unit} at {at:.0f}°"
-
-
-def _uncertain(result: Correction, p: int, stakes: Stakes) -> str:
-    labels, scale = result.labels, result.labels.weight_scale
-    words = f"the weight in plane {result.planes[p]!r} is {weight_words(labels, abs(result.weights[p]))}"
-    std, factor, trial = result.mass_std, result.coverage_factor, stakes.trial_weight(p)
-    if std is not None and factor is not None:
-        words += f" ± {figures(factor * std[p] * scale, 2)} {labels.weight_unit} (95 %)"
-    of = "" if trial is None else f" of its trial weight ({weight_words(labels, trial)})"
-    return f"{words}, for the effect{of} is only {stakes.clearness()[p]:.2g} times its error"
 
 
 def _outlook(whole: Choice, stakes: Stakes) -> str:
@@ -402,7 +410,7 @@ def _trial(p: int, stakes: Stakes) -> str:
     if stakes.limits is not None and needed > stakes.limits.max_weight[p]:
         most = weight_words(labels, float(stakes.limits.max_weight[p]))
         return f"leave plane {name!r} out: a clear trial weight would be larger than its largest, {most}"
-    size = f"{needed * labels.weight_scale:.2g} {labels.weight_unit}".rstrip()
+    size = weight_words(labels, float(f"{needed:.2g}"))
     return f"repeat the trial run of plane {name!r} with {'at least' if ratio < 2 else 'about'} {size}"
 
 

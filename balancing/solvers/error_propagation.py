@@ -100,6 +100,13 @@ def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, 
     return first, second
 
 
+def region_radius(dof: float | None) -> float:
+    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
+    from scipy.special import chdtri, fdtri
+
+    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+
 def _block(z: ComplexArray) -> FloatArray:
     """Stretch every number of an array (…) into its 2 × 2 block, (…, 2, 2)."""
     out = np.empty((*z.shape, 2, 2))
