@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -119,7 +119,11 @@ _REMEDY = "; their weights are not determined: leave one out, or add sensors or 
 
 
 def check_resolution(
-    influence: Influence, *, refuse: bool, counts: BoolArray | None = None
+    influence: Influence,
+    *,
+    refuse: bool,
+    counts: BoolArray | None = None,
+    remedies: Callable[[], Sequence[str]] = tuple,
 ) -> tuple[str, ...]:
     """Refuse planes that the coefficients tell apart only by their errors.
 
@@ -134,6 +138,8 @@ def check_resolution(
         Or warn.
     counts
         Readings, speed by speed, that count, (N,); default all.
+    remedies
+        What to do instead, in sentences.
 
     Returns
     -------
@@ -148,9 +154,9 @@ def check_resolution(
         return ()
     assumed = influence.error_source == "assumed"
     counts = np.ones(influence.W[..., 0].size, dtype=bool) if counts is None else counts
-    words = _unresolved(influence, influence.digits if assumed else influence.covariance, counts)
+    words = _unresolved(influence, influence.digits if assumed else influence.known_covariance, counts)
     if words and refuse:
-        raise refusal(words, influence.warnings)
+        raise refusal(words, influence.warnings, influence.contradictions, remedies())
     if not words and assumed:
         words = _unresolved(influence, influence.covariance, counts)
     return (words,) if words else ()
@@ -174,9 +180,27 @@ def _unresolved(influence: Influence, covariance: FloatArray | None, counts: Boo
     return _alike(W, acting_alike(W), influence.planes) + within + _REMEDY
 
 
-def refusal(words: str, warnings: Sequence[str]) -> UndeterminedError:
-    """The error, with the warnings that would be lost with the result, and that may tell the real cause."""
-    return UndeterminedError("\n".join((words, *(f"Warning: {w}" for w in warnings))))
+def refusal(
+    words: str, warnings: Sequence[str], contradictions: Sequence[str] = (), remedies: Sequence[str] = ()
+) -> UndeterminedError:
+    """The error: its cause, what follows, what to do instead, and the warnings that would be lost with it.
+
+    Parameters
+    ----------
+    words
+        What is not determined, and why.
+    warnings
+        All that was found.
+    contradictions
+        Those of them that are the likely cause.
+    remedies
+        Sentences.
+    """
+    rest = [w for w in warnings if w not in contradictions]
+    follows = f"so {words}" if contradictions else words
+    return UndeterminedError(
+        "\n".join((*contradictions, follows, *remedies, *(f"Warning: {w}" for w in rest)))
+    )
 
 
 def acting_alike(W: ComplexArray) -> list[int]:

@@ -84,6 +84,12 @@ class Influence:
         What the user may want to know.
     digits
         The covariance that the digits of the readings alone would give; None: they have no end.
+
+
+    contradictions
+        Those of the warnings that say that runs disagree.
+    trials
+        The runs; None: stored coefficients.
     last_run, last_weights
         Name of the last run, and the weights mounted in it, shape (P,); None for stored coefficients.
     """
@@ -107,6 +113,9 @@ class Influence:
     own_between: float = 0.0
     notes: tuple[str, ...] = ()
     digits: FloatArray | None = None
+
+    contradictions: tuple[str, ...] = ()
+    trials: Trials | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensors", check_names(self.sensors, "sensors"))
@@ -132,6 +141,15 @@ class Influence:
             raise ValueError(f"{name} of the influence coefficients must be finite; found NaN or infinity")
         array.flags.writeable = False
         object.__setattr__(self, name, array)
+
+    @property
+    def known_covariance(self) -> FloatArray | None:
+        """Of the covariance what follows from stated or measured errors; None where nothing does."""
+        if self.covariance is None or self.error_source == "assumed":
+            return None
+        if self.run_errors.origin != "assumed" or self.common is None:
+            return self.covariance
+        return symmetric((self.covariance - marginal(self.common)) * (1 - self.own_between))
 
     @property
     def unit(self) -> str:
@@ -239,13 +257,19 @@ def estimate_influence(trials: Trials) -> Influence:
         reading = mean_covariance(trials, model.errors)
     found, runs = _with_errors(trials, A, theta, reading, model, run)
     try:
-        check_effects(trials, found.W, found.covariance if known(model) else found.digits)
+        told = found.known_covariance if known(model) else found.digits
+        check_effects(trials, found.W, told, contradicted=bool(repeated))
     except UndeterminedError as error:
-        raise refusal(str(error), trials.warnings + repeated) from error
-    warnings = trials.warnings + repeated + model.warnings
+        raise refusal(str(error), trials.warnings + repeated, repeated) from error
+    disagree: tuple[str, ...] = ()
     if model.source == "stated" and R > P + 1:
-        warnings += check_consistency(trials, A, reading, runs)
-    return replace(found, warnings=warnings, notes=weak_trials(trials, found.W) + unseen(run))
+        disagree = check_consistency(trials, A, reading, runs)
+    return replace(
+        found,
+        warnings=trials.warnings + repeated + model.warnings + disagree,
+        contradictions=repeated + disagree,
+        notes=weak_trials(trials, found.W) + unseen(run),
+    )
 
 
 def estimate_like(trials: Trials, other: Influence) -> Influence:
@@ -301,6 +325,7 @@ def _with_errors(
         reading_dof=model.dof,
         own_between=own_between,
         digits=_digits(trials, G),
+        trials=trials,
     )
     return found, runs
 

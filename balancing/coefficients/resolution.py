@@ -79,7 +79,7 @@ def resolution(W: ComplexArray, covariance: FloatArray) -> Resolution:
 
 
 def hermitian(covariance: FloatArray) -> ComplexArray:
-    """S[p, q] = E[dW_p conj(dW_q)] / 2 from real covariances; half: the variance in one direction."""
+    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
     N, n, _ = covariance.shape
     C = covariance.reshape(N, n // 2, 2, n // 2, 2)
     real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]

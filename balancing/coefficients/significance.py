@@ -14,10 +14,16 @@ LEVEL = 0.95
 ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)
 """A good trial weight changes a reading by 30 % of its amplitude or by 30°."""
 
+CLEAR = 5.0
+"""Effect of a good trial weight in units of its errors."""
+
 _UNCHANGED = 1e-9
+_MEND = "mend the table, or measure these runs again until they agree"
 
 
-def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None) -> None:
+def check_effects(
+    trials: Trials, W: ComplexArray, covariance: FloatArray | None, *, contradicted: bool = False
+) -> None:
     """Refuse a trial weight that changed nothing.
 
     Parameters
@@ -28,6 +34,8 @@ def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None
         Coefficients (S, C, P).
     covariance
         Of (Y₀, W₁, …) of each channel, shape (S, C, 2P + 2, 2P + 2), or None.
+    contradicted
+        Whether runs that should agree do not: no larger trial weight helps then.
 
     Raises
     ------
@@ -49,10 +57,21 @@ def check_effects(trials: Trials, W: ComplexArray, covariance: FloatArray | None
             )
         own = slice(2 + 2 * p, 4 + 2 * p)
         if covariance is not None and not _significant(W[..., p], covariance[..., own, own]):
+            size = float(
+                np.abs(trials.weights[run, p]) * CLEAR / clearness(W[..., p], covariance[..., own, own])
+            )
+            larger = f"{float(f'{size * trials.labels.weight_scale:.2g}'):g} {trials.labels.weight_unit}"
+            remedy = f"repeat the run with a larger trial weight, at least {larger}".rstrip()
             raise UndeterminedError(
                 f"{words} changed the readings by no more than their errors explain: its effect is not "
-                "determined; repeat the run with a larger trial weight"
+                f"determined; {_MEND if contradicted else remedy}"
             )
+
+
+def clearness(w: ComplexArray, covariance: FloatArray) -> float:
+    """Effect of a plane, root mean square over the readings, in units of its errors, (…, 2, 2)."""
+    error = float(np.trace(covariance, axis1=-2, axis2=-1).sum())
+    return float(np.sqrt(np.sum(np.abs(w) ** 2) / error)) if error > 0 else np.inf
 
 
 def _significant(w: ComplexArray, covariance: FloatArray) -> bool:

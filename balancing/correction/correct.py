@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ from balancing.correction.correction_warnings import (
     reading_names,
     weight_words,
 )
+from balancing.correction.counsel import Counsel, Stakes, coarse, judged, remedies
 from balancing.correction.other_readings import OtherReading
 from balancing.correction.region_coverage import optimism, uncertain
 from balancing.correction.stack_errors import stack_errors
@@ -34,7 +35,8 @@ from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.solvers.conditioning import conditioning
-from balancing.solvers.methods import Stack, fit_weights
+from balancing.solvers.error_propagation import region_radius as region_radius
+from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import coverage_factor
 
@@ -102,6 +104,8 @@ class Correction:
         What the runs say about the relation of phases to angles; None: they were not asked.
     others
         What the same numbers give if a convention that is assumed is otherwise.
+    counsel
+        Whether to mount the weights, and what to do instead.
     """
 
     speeds: FloatArray
@@ -135,6 +139,7 @@ class Correction:
     remove: tuple[str, ...] = ()
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
+    counsel: Counsel = field(default_factory=Counsel)
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -311,9 +316,10 @@ def correct(  # noqa: PLR0913
     Raises
     ------
     UndeterminedError
-        Where the readings do not tell the planes apart; says which act alike. With known errors by a χ² test
-        at 95 % (`balancing.coefficients.resolution`). Assumed errors only warn: the digits of the readings
-        refuse, or, without an end of them, a condition number above 1000, which no instrument supports.
+        Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
+        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.resolution`). Errors that are
+        assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do, or,
+        without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """
@@ -329,24 +335,15 @@ def correct(  # noqa: PLR0913
         )
     rows = rows_of(row_weights, influence.W.shape[:2], used)
     felt = W if rows is None else W[rows > 0]  # what weights of 0 leave says how well planes are told apart
+    kept = None if limits is None else limits.pick(used, chosen)
+    stakes = Stakes(influence, start, used, chosen, rows, kept)
     soft = strength is not None or keep is not None
     asked = method
     if method is None:
         method = "weighted" if start.covariance is not None and not soft else "least-squares"
-    unclear: tuple[str, ...] = ()
-    unclear_regions: tuple[str, ...] = ()
-    if not soft:
-        check_planes(felt, names)
-        counts = None if rows is None else rows > 0
-        unclear = check_resolution(part, refuse=refuse, counts=counts)
-        told = part.covariance is not None and start.covariance is not None and not unclear
-        if told and part.covariance is not None and method != "weighted":
-            coefficients = part.covariance[..., 2:, 2:].reshape(len(W), 2 * len(names), -1)
-            small = optimism(felt, coefficients if counts is None else coefficients[counts], names)
-            unclear_regions = (small,) if small else ()
+    unclear, unclear_regions = ((), ()) if soft else _resolved(stakes, part, felt, method, refuse=refuse)
     planes_told = conditioning(felt, names)
     errors = stack_errors(influence, start, used, chosen)
-    kept = None if limits is None else limits.pick(used, chosen)
     stack = Stack(
         W,
         Y.ravel(),
@@ -360,13 +357,9 @@ def correct(  # noqa: PLR0913
         None if errors is None else errors.common,
         None if errors is None else errors.explain,
     )
-    try:
-        fitted = fit_weights(stack, method, strength=strength, keep=keep)
-    except UndeterminedError as error:
-        if asked is not None or start.model.source != "assumed":
-            raise
-        method, unclear = "least-squares", (*unclear, f"{error}; least squares is used")
-        fitted = fit_weights(stack, method)
+    fitted, method = _fitted(
+        stack, method, strength, keep, assumed=asked is None and start.model.source == "assumed"
+    )
     D = fitted.weights
     if stack.limits is not None:
         D = np.where(np.abs(D) < EMPTY * np.linalg.norm(Y) / np.linalg.norm(W, axis=0), 0.0, D)
@@ -406,22 +399,47 @@ def correct(  # noqa: PLR0913
         active=binding(stack, fitted),
         remove=tuple(name for name in names if name in remove),
     )
-    warnings = influence.warnings + start.warnings + unclear + unclear_regions + fitted.warnings
-    warnings += cautions(result, felt, alike=not unclear)
-    warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
-    return _with_words(result, warnings, influence.notes + notes(result))
+    std, factor = result.mass_std, result.coverage_factor
+    widths = None if std is None or factor is None else factor * std
+    result = replace(result, counsel=judged(stakes, D, widths, soft=soft, remove=remove))
+    warnings, words = influence.warnings + start.warnings, influence.notes
+    if result.counsel.word == "mount":
+        warnings += unclear + unclear_regions + fitted.warnings + cautions(result, felt, alike=not unclear)
+        warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
+        words += notes(result) + coarse(influence)
+    else:  # the counsel says what these would
+        warnings = tuple(w for w in warnings if w not in influence.contradictions)
+        warnings += fitted.warnings + cautions(result, felt, alike=False, rising=False)
+    return _with_words(result, warnings, words)
 
 
-def region_radius(dof: float | None) -> float:
-    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
-    from scipy.special import chdtri, fdtri
+def _resolved(
+    stakes: Stakes, part: Influence, felt: ComplexArray, method: str, *, refuse: bool
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Refuse planes that act alike; what is unclear about the planes, and about regions of the weights."""
+    names, counts = stakes.names, None if stakes.row_weights is None else stakes.row_weights > 0
+    check_planes(felt, names)
+    unclear = check_resolution(part, refuse=refuse, counts=counts, remedies=partial(remedies, stakes))
+    if part.covariance is None or stakes.start.covariance is None or unclear or method == "weighted":
+        return unclear, ()
+    coefficients = part.covariance[..., 2:, 2:].reshape(-1, 2 * len(names), 2 * len(names))
+    small = optimism(felt, coefficients if counts is None else coefficients[counts], names)
+    return (), (small,) if small else ()
 
-    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+def _fitted(
+    stack: Stack, method: str, strength: float | str | None, keep: float | None, *, assumed: bool
+) -> tuple[Fitted, str]:
+    """Weights, and the method that found them."""
+    try:
+        return fit_weights(stack, method, strength=strength, keep=keep), method
+    except UndeterminedError:
+        if method != "weighted" or not assumed:
+            raise
+        return fit_weights(stack, "least-squares"), "least-squares"  # what is assumed refuses nothing
 
 
 def _with_words(result: Correction, warnings: tuple[str, ...], notes: tuple[str, ...]) -> Correction:
-    from dataclasses import replace
-
     for name in ("weights", "before", "after", "covariance", "after_covariance"):
         array = getattr(result, name)
         if array is not None:

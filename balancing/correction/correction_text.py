@@ -57,6 +57,7 @@ def correction_dict(c: Correction) -> dict[str, Any]:
     mass_std, angle_std = c.mass_std, c.angle_std
     unit = c.labels.weight_unit
     return {
+        "judgement": c.counsel.to_dict(c.labels),
         "method": c.method,
         "conventions": c.labels.conventions(),
         "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
@@ -114,6 +115,7 @@ def summary(c: Correction) -> str:
     """`Correction.summary`."""
     contradicted = 0 if c.convention_test is None else len(contradiction(c.convention_test, c.labels))
     blocks = [
+        "\n".join(wrap(line, "  ") for line in c.counsel.lines()),
         *(wrap(f"Warning: {w}", "  ") for w in c.warnings[:contradicted]),
         wrap(" ".join(assumptions(c.labels, c.convention_test, c.others))),
         *(wrap(f"Warning: {w}", "  ") for w in c.warnings[contradicted:]),

@@ -77,8 +77,8 @@ def _at_end(weight: complex, start: float, width: float) -> bool:
     return bool((np.abs(away) < 1e-6).any())
 
 
-def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, ...]:
-    """Planes that act nearly alike, weights within their errors, a poor fit, readings that rise."""
+def cautions(result: Correction, W: ComplexArray, *, alike: bool, rising: bool = True) -> tuple[str, ...]:
+    """Planes that act nearly alike, planes without weights, a poor fit, readings that rise."""
     out = []
     if alike and result.condition_number > ILL_CONDITIONED:
         planes = acting_alike(W)
@@ -102,7 +102,7 @@ def cautions(result: Correction, W: ComplexArray, *, alike: bool) -> tuple[str, 
             "not linear) is likely, and the errors of the weights allow for it; if the readings have larger "
             f"errors than stated instead, those of the weights are up to {ratio:.2g} times larger"
         )
-    if np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
+    if rising and np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
         out += _rises(result)
     return tuple(out)
 

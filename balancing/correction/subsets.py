@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.data.conventions import Labels
 from balancing.solvers.conditioning import check_stack, scaled_columns
+from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import figures, table
 from rotorid.regression import RCOND, gain
@@ -27,6 +28,7 @@ MOST = 20_000
 """More choices of planes than this are not tried."""
 
 _BATCH = 2**20
+_SHOWN = ("rms_after", "rms_expected", "max_after", "largest_weight", "condition_number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +43,11 @@ class Subsets:
         Shape (M, k).
     rms, largest
         Of the predicted readings, shape (M,).
+    expected
+        Root mean square in a check run, (M,): with the errors of coefficients and of the vibration before.
     objective
-        What they are ranked by: rms or largest of the readings times their row weights, shape (M,).
+        What they are ranked by: rms or largest of the readings times their row weights, and their errors (in
+        quadrature), shape (M,).
     condition_number
         Of each choice, shape (M,).
     criterion
@@ -63,6 +68,7 @@ class Subsets:
     weights: ComplexArray
     rms: FloatArray
     largest: FloatArray
+    expected: FloatArray
     objective: FloatArray
     condition_number: FloatArray
     criterion: Criterion
@@ -88,6 +94,7 @@ class Subsets:
                 {
                     "planes": list(names),
                     "rms_after": float(self.rms[m] * scale),
+                    "rms_expected": float(self.expected[m] * scale),
                     "max_after": float(self.largest[m] * scale),
                     "largest_weight": float(mass[m].max()),
                     "condition_number": float(self.condition_number[m]),
@@ -106,7 +113,7 @@ class Subsets:
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per choice: planes ("A, C"), rms_after, max_after, largest_weight, condition_number."""
+        """One row per choice: planes ("A, C"), rms_after, rms_expected, max_after, largest_weight, …"""
         import pandas as pd
 
         rows = [{k: v for k, v in row.items() if k != "weights"} for row in self.to_dict()["rows"]]
@@ -120,11 +127,18 @@ class Subsets:
             by = "weighted rms" if self.criterion == "rms" else "largest weighted amplitude"
         units = self.labels.weight_unit, self.labels.vibration_unit
         rows = [
-            ["planes", "rms", "largest", f"largest weight{f', {units[0]}' if units[0] else ''}", "condition"]
+            [
+                "planes",
+                "rms",
+                "expected",
+                "largest",
+                f"largest weight{f', {units[0]}' if units[0] else ''}",
+                "condition",
+            ]
         ]
-        rows.append(["(none)", figures(found["rms_before"], 3), figures(found["max_before"], 3), "", ""])
+        rows.append(["(none)", figures(found["rms_before"], 3), "", figures(found["max_before"], 3), "", ""])
         for row in found["rows"]:
-            numbers = row["rms_after"], row["max_after"], row["largest_weight"], row["condition_number"]
+            numbers = [row[key] for key in _SHOWN]
             rows.append([", ".join(row["planes"]), *(figures(n, 3) for n in numbers)])
         k = self.weights.shape[1]
         head = (
@@ -138,7 +152,7 @@ class Subsets:
         return "\n".join(lines)
 
 
-def best_subsets(
+def best_subsets(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     planes: Sequence[str],
@@ -146,6 +160,7 @@ def best_subsets(
     *,
     criterion: Criterion = "rms",
     row_weights: ArrayLike | None = None,
+    covariance: FloatArray | None = None,
     show: int = 10,
     labels: Labels | None = None,
 ) -> Subsets:
@@ -164,6 +179,9 @@ def best_subsets(
         still be among the best).
     row_weights
         How much each reading counts, (N,), ≥ 0; default all alike.
+    covariance
+        Of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2): weights that fight each other count by
+        the errors they bring. None: no errors.
     show
         How many of the best to return.
     labels
@@ -193,19 +211,25 @@ def best_subsets(
         raise UndeterminedError(
             f"the planes of every choice of {k} act alike: choose fewer, or add readings or speeds"
         )
-    rms = np.sqrt((misfit + outside) / N)
-    order = np.flatnonzero(solid)[np.argsort(rms[solid], kind="stable")]
+    F = np.zeros((P + 1, P + 1), dtype=complex) if covariance is None else error_form(covariance, w) / N
+    least = (misfit + outside) / N
+    rank = least if criterion == "max" else least + _errors(F, chosen, D)
+    order = np.flatnonzero(solid)[np.argsort(rank[solid], kind="stable")]
     if criterion == "max":
-        order, D = _by_maximum(K, y, w, chosen, order, rms, D, show)
+        order, D = _by_maximum(K, y, w, chosen, order, np.sqrt(least), D, show, F)
     order = order[:show]
     after = y + np.einsum("nmk,mk->mn", K[:, chosen[order]], D[order])
     weighted = np.abs(after) * w
+    size = weighted.max(axis=1) if criterion == "max" else np.sqrt(np.mean(weighted**2, axis=1))
+    plain = F if covariance is None else error_form(covariance) / N
+    square = np.mean(np.abs(after) ** 2, axis=1)
     return Subsets(
         planes=tuple(tuple(planes[p] for p in chosen[m]) for m in order),
         weights=D[order],
-        rms=np.sqrt(np.mean(np.abs(after) ** 2, axis=1)),
+        rms=np.sqrt(square),
         largest=np.abs(after).max(axis=1),
-        objective=weighted.max(axis=1) if criterion == "max" else np.sqrt(np.mean(weighted**2, axis=1)),
+        expected=np.sqrt(square + _errors(plain, chosen[order], D[order])),
+        objective=np.sqrt(size**2 + _errors(F, chosen[order], D[order])),
         condition_number=condition[order],
         criterion=criterion,
         rms_before=float(np.sqrt(np.mean(np.abs(y) ** 2))),
@@ -264,7 +288,15 @@ def _least_squares(
     return D, misfit, condition
 
 
-def _by_maximum(
+def _errors(F: ComplexArray, chosen: IntArray, D: ComplexArray) -> FloatArray:
+    """Mean square errors (M,) that the weights (M, k) bring, zᴴ F z with z = (1, D)."""
+    z = np.zeros((len(D), len(F)), dtype=complex)
+    z[:, 0] = 1.0
+    np.put_along_axis(z, chosen + 1, D, axis=1)
+    return np.asarray(np.maximum(np.einsum("mp,pq,mq->m", z.conj(), F, z).real, 0.0))
+
+
+def _by_maximum(  # noqa: PLR0913
     K: ComplexArray,
     y: ComplexArray,
     w: FloatArray,
@@ -273,8 +305,9 @@ def _by_maximum(
     bound: FloatArray,
     D: ComplexArray,
     show: int,
+    F: ComplexArray,
 ) -> tuple[IntArray, ComplexArray]:
-    """The best choices by the largest weighted reading, and the weights (M, k) with theirs replaced."""
+    """The best choices by the largest weighted reading and the errors; weights (M, k), theirs replaced."""
     from balancing.solvers.cone import minmax_cone
 
     D = D.copy()
@@ -284,5 +317,6 @@ def _by_maximum(
             break
         found = minmax_cone(K[:, chosen[m]], y, row_weights=w)
         D[m] = found.weights
-        best = sorted([*best, (found.objective, int(m))])[:show]
+        errors = float(_errors(F, chosen[[m]], D[[m]])[0])
+        best = sorted([*best, (float(np.hypot(found.objective, np.sqrt(errors))), int(m))])[:show]
     return np.array([m for _, m in best], dtype=np.int64), D

@@ -287,7 +287,8 @@ def _step(problem: Problem, at: State) -> tuple[FloatArray, float, bool]:
     J, r = jacobian(problem, at)
     scale = np.linalg.norm(J, axis=0)
     H = hessian(problem, at) / np.outer(scale, scale)
-    convex = bool(np.linalg.eigvalsh(H)[0] > 0)
+    curvatures = np.linalg.eigvalsh(H)
+    convex = bool(curvatures[0] > len(H) * np.finfo(float).eps * curvatures[-1])
     if convex:
         step = -np.linalg.solve(H, g / scale) / scale
     else:

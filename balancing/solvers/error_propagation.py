@@ -19,6 +19,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from balancing.coefficients.resolution import hermitian
 from balancing.data.errors import symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -58,6 +59,20 @@ def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray
     """Covariance (N, 2, 2) of Y₀ + W D at given D, from that of each reading's (Y₀, W)."""
     B = np.concatenate([_block(np.asarray(z)) for z in (1.0, *D)], axis=1)
     return symmetric(B @ covariance @ B.T)
+
+
+def error_form(covariance: FloatArray, row_weights: FloatArray | None = None) -> ComplexArray:
+    """F (P + 1, P + 1): zᴴ F z is the mean square error of (Y₀, W) z, summed over the readings.
+
+    Parameters
+    ----------
+    covariance
+        Of (Y₀, W) of each reading, (N, 2P + 2, 2P + 2).
+    row_weights
+        Of the readings, (N,); default 1.
+    """
+    rows = np.ones(len(covariance)) if row_weights is None else np.asarray(row_weights) ** 2
+    return np.asarray(2 * np.einsum("n,npq->qp", rows, hermitian(covariance)))
 
 
 def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, FloatArray]:
@@ -114,6 +129,13 @@ def real_columns(common: ComplexArray) -> FloatArray:
     """Columns (M, S, n) of complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
     M, S, n = common.shape
     return np.asarray(np.transpose(_block(common), (1, 2, 3, 0, 4)).reshape(S, 2 * n, 2 * M))
+
+
+def region_radius(dof: float | None) -> float:
+    """Radius of the 95 % region of a vector in a plane, in standard deviations (2.448 for stated errors)."""
+    from scipy.special import chdtri, fdtri
+
+    return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
 
 
 def _block(z: ComplexArray) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.resolution import HOPELESS
+from balancing.coefficients.run_errors import marginal
 from balancing.data.errors import symmetric
 from balancing.data.limits import Limits
 from balancing.solvers.cone import AT_LIMIT
@@ -301,8 +302,17 @@ def _regularised(stack: Stack, method: str, strength: float | str | None, keep: 
     if method != "least-squares" or (stack.limits is not None and stack.limits.any):
         raise ValueError("ridge and truncation go with least squares without limits only")
     if strength is not None:
+        total = stack.channels
+        if total is not None and stack.common is not None:
+            total = total + marginal(stack.common).reshape(total.shape)
         found = ridge(
-            stack.W, stack.Y, strength, stack.row_weights, channels=stack.channels, planes=stack.planes
+            stack.W,
+            stack.Y,
+            strength,
+            stack.row_weights,
+            channels=stack.channels,
+            total=total,
+            planes=stack.planes,
         )
     else:
         assert keep is not None

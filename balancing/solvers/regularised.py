@@ -30,11 +30,14 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.data.errors import symmetric
 from balancing.solvers.conditioning import check_stack, scaled_columns
+from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND
 
 ROBUST = 0.3
 """γ of the robust cross-validation."""
+BIAS, DETERMINED = 0.05, 5.0
+"""Share that a ridge chosen by itself may take from combinations with an effect so many times their error."""
 STRENGTHS = np.geomspace(1e-4, 1.0, 241)
 """From which strength="auto" chooses, 4 % apart."""
 
@@ -105,6 +108,7 @@ def ridge(
     row_weights: ArrayLike | None = None,
     *,
     channels: FloatArray | None = None,
+    total: FloatArray | None = None,
     planes: Sequence[str] | None = None,
 ) -> Regularised:
     """Minimise Σ wᵢ² |Yᵢ + (W D)ᵢ|² + (strength · σ₁)² Σ |s_p D_p|².
@@ -117,11 +121,13 @@ def ridge(
         Relative to the largest singular value σ₁ of the row-weighted W with columns scaled to length 1 by
         1/s_p: combinations of planes whose singular value is well above strength · σ₁ stay as they are, those
         below vanish. 0.01 hardly changes planes with a condition number of 10; 0.1 is much. "auto": by
-        generalised cross-validation (`cross_validated`).
+        generalised cross-validation (`cross_validated`), and not more than is `harmless`.
     row_weights
         How much each reading counts, (N,), ≥ 0; default all alike.
     channels
         Covariance of (Re Y, Im Y, Re W₁, …) of each reading, (N, 2P + 2, 2P + 2); None: unknown.
+    total
+        The same with what the readings have in common, which "auto" looks at; None: nothing.
     planes
         Names for messages.
 
@@ -141,7 +147,11 @@ def ridge(
     """
     problem = _problem(W, Y, row_weights, planes)
     if strength == "auto":
-        chosen, note = cross_validated(W, Y, row_weights), ", chosen by generalised cross-validation"
+        most = harmless(W, channels if total is None else total, row_weights)
+        chosen = min(cross_validated(W, Y, row_weights), most)
+        note = ", chosen by generalised cross-validation"
+        if chosen == most:
+            note += f" and kept so small that what is determined loses at most {100 * BIAS:g} %"
     elif isinstance(strength, str) or not (np.isfinite(strength) and strength > 0):
         raise ValueError(
             f"the strength of a ridge is a number above 0, such as 0.05, or 'auto'; got {strength!r}"
@@ -152,6 +162,28 @@ def ridge(
     f = 1 / (mu + chosen**2 * mu[0])
     words = f"ridge of strength {chosen:.2g}{note}"
     return _solution(problem, f, -np.outer(f, f), words, channels, strength=chosen)
+
+
+def harmless(W: ArrayLike, channels: FloatArray | None, row_weights: ArrayLike | None = None) -> float:
+    """Largest strength of a ridge that takes no more than `BIAS` from combinations that are determined.
+
+    Determined is a combination v of the planes whose effect |B v| is `DETERMINED` times its error: cross-
+    validation looks at the readings alone, and shrinks what explains little of them.
+
+    Parameters
+    ----------
+    W, channels, row_weights
+        As in `ridge`. Infinite without errors.
+    """
+    if channels is None:
+        return np.inf
+    K, _, w = check_stack(W, np.ones(np.shape(W)[0]), row_weights)
+    B, S = scaled_columns(w[:, None] * K)
+    s, Vh = np.linalg.svd(B, full_matrices=False)[1:]
+    errors = error_form(channels, w)[1:, 1:] / np.outer(S, S)
+    squares = np.einsum("kp,pq,kq->k", Vh, errors, Vh.conj()).real
+    clear = s[s**2 > DETERMINED**2 * squares]
+    return float(clear.min() / s[0] * np.sqrt(BIAS / (1 - BIAS))) if clear.size else np.inf
 
 
 def truncated(

@@ -86,6 +86,8 @@ def compare_planes(
     row_weights: FloatArray | None,
 ) -> Subsets:
     """Compare all choices of k of these planes, without limits."""
+    import numpy as np
+
     from balancing.coefficients.baseline import match_speeds, starting_point
     from balancing.correction.subsets import best_subsets
 
@@ -95,6 +97,10 @@ def compare_planes(
     start = starting_point(influence, chosen.baseline)
     at = range(len(influence.speeds)) if speeds is None else match_speeds(speeds, influence.speeds)
     columns = [influence.planes.index(p) for p in planes]
+    index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in columns)])
+    covariance = start.covariance
+    if covariance is not None:
+        covariance = covariance[list(at)][..., index[:, None], index].reshape(-1, len(index), len(index))
     return best_subsets(
         influence.W[list(at)][..., columns].reshape(-1, len(columns)),
         start.readings[list(at)].ravel(),
@@ -102,6 +108,7 @@ def compare_planes(
         k,
         criterion="max" if method == "minmax" else "rms",
         row_weights=None if row_weights is None else row_weights[list(at)].ravel(),
+        covariance=covariance,
         labels=start.labels,
     )
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from balancing_data import complex_normal
 
-from balancing import Labels, UndeterminedError
+from balancing import Labels, ReadingErrors, UndeterminedError
 from balancing.correction.subsets import best_subsets
+from balancing.data.errors import reading_covariance
 from balancing.solvers.cone import minmax_cone
+from balancing.solvers.error_propagation import prediction_covariance
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)
@@ -114,7 +116,14 @@ def test_tables_speak_the_units_of_the_job():
     W, Y, _ = case()
     found = best_subsets(W, Y * 1e-6, NAMES[:5], 2, labels=LABELS, show=3)
     frame = found.to_frame()
-    assert list(frame.columns) == ["planes", "rms_after", "max_after", "largest_weight", "condition_number"]
+    assert list(frame.columns) == [
+        "planes",
+        "rms_after",
+        "rms_expected",
+        "max_after",
+        "largest_weight",
+        "condition_number",
+    ]
     assert frame["planes"][0] == ", ".join(found.planes[0])
     np.testing.assert_allclose(frame["max_after"], found.largest * 2e6, rtol=1e-12)
     np.testing.assert_allclose(frame["largest_weight"], np.abs(found.weights).max(axis=1) * 1e3, rtol=1e-12)
@@ -127,7 +136,16 @@ def test_tables_speak_the_units_of_the_job():
     )
     lines = found.summary().splitlines()
     assert lines[0] == "The best of 10 choices of 2 planes, by rms after correction (um_pp)"
-    assert lines[1].split() == ["planes", "rms", "largest", "largest", "weight,", "g", "condition"]
+    assert lines[1].split() == [
+        "planes",
+        "rms",
+        "expected",
+        "largest",
+        "largest",
+        "weight,",
+        "g",
+        "condition",
+    ]
     assert lines[2].split()[0] == "(none)"
     assert lines[3].startswith("  " + ", ".join(found.planes[0]))
     assert max(map(len, lines)) <= 80
@@ -155,3 +173,35 @@ def test_nan_and_names_are_refused():
         best_subsets([[1, 2], [np.nan, 1]], [1, 1], "AB", 1)
     with pytest.raises(ValueError, match="different names"):
         best_subsets([[1, 2], [2, 1]], [1, 1], "AA", 1)
+
+
+def fighting(rng, N=10):
+    """A and B act alike and explain a little more, fighting each other, than A and C, which do not."""
+    W = complex_normal(rng, (N, 3))
+    W[:, 1] = W[:, 0] + 0.02 * complex_normal(rng, N)
+    extra = 0.2 * complex_normal(rng, N)
+    Y = -W[:, 0] + (W[:, 1] - W[:, 0]) * 10 + extra - 0.9 * np.vdot(W[:, 2], extra) / N * W[:, 2]
+    covariance = np.zeros((N, 4, 2, 4, 2))
+    for p, z in enumerate((Y, *W.T)):
+        covariance[:, p, :, p] = reading_covariance(z, ReadingErrors(0.02, 0.02))
+    return W, Y, covariance.reshape(N, 8, 8)
+
+
+@pytest.mark.parametrize("criterion", ["rms", "max"])
+def test_a_fighting_pair_counts_by_the_errors_it_brings(criterion):
+    W, Y, covariance = fighting(np.random.default_rng(3))
+    plain = best_subsets(W, Y, "ABC", 2, criterion=criterion)
+    found = best_subsets(W, Y, "ABC", 2, criterion=criterion, covariance=covariance)
+    assert plain.planes[0] == ("A", "B")
+    assert found.planes[0] != ("A", "B")
+    np.testing.assert_array_equal(plain.expected, plain.rms)
+    last = found.planes.index(("A", "B"))
+    assert found.expected[last] > 1.2 * found.expected[0]
+    assert np.abs(found.weights[last]).max() > 5 * np.abs(found.weights[0]).max()
+    assert (np.diff(found.objective) >= 0).all()
+    for m, planes in enumerate(found.planes):
+        columns = ["ABC".index(p) for p in planes]
+        index = [0, 1, *(k for c in columns for k in (2 + 2 * c, 3 + 2 * c))]
+        own = covariance[:, index][:, :, index]
+        errors = np.trace(prediction_covariance(found.weights[m], own), axis1=1, axis2=2)
+        np.testing.assert_allclose(found.expected[m] ** 2, found.rms[m] ** 2 + errors.mean(), rtol=1e-10)

@@ -6,7 +6,7 @@ from balancing_data import complex_normal
 
 from balancing import ReadingErrors, UndeterminedError
 from balancing.data.errors import reading_covariance
-from balancing.solvers.regularised import STRENGTHS, cross_validated, ridge, truncated
+from balancing.solvers.regularised import BIAS, STRENGTHS, cross_validated, harmless, ridge, truncated
 from rotorid.regression import stretch, unstretch
 
 SHAPES = [(7, 3), (4, 4), (3, 4), (5, 1)]
@@ -234,3 +234,39 @@ def test_other_refusals():
         ridge([[1, 0], [2, 0]], [1, 1], 0.1, planes=["A", "B"])
     with pytest.raises(ValueError, match="found NaN"):
         truncated([[1.0], [2.0]], [np.nan, 1], 1)
+
+
+def with_errors(W, Y, errors):
+    """Covariance of (Y, W) of each reading, every number of which has errors of its own."""
+    N, P = W.shape
+    out = np.zeros((N, P + 1, 2, P + 1, 2))
+    for p, z in enumerate((Y, *W.T)):
+        out[:, p, :, p] = reading_covariance(z, errors)
+    return out.reshape(N, 2 * P + 2, 2 * P + 2)
+
+
+def test_the_automatic_ridge_leaves_what_is_determined():
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        W = complex_normal(rng, (8, 2))
+        W[:, 1] = W[:, 0] + 0.3 * complex_normal(rng, 8)  # alike, yet 20 times the errors apart
+        Y = -W @ [1.3, 0.7] + 0.3 * complex_normal(rng, 8)
+        s = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+        lost = []
+        for channels in (None, with_errors(W, Y, ReadingErrors(0.01, 0.01))):
+            strength = ridge(W, Y, "auto", channels=channels).strength
+            lost.append(1 - s[1] ** 2 / (s[1] ** 2 + (strength * s[0]) ** 2))
+        assert lost[0] > 0.2  # by cross-validation alone
+        assert lost[1] <= BIAS * (1 + 1e-9)
+
+
+def test_the_automatic_ridge_still_shrinks_what_only_errors_tell_apart():
+    rng = np.random.default_rng(0)
+    W, Y = alike(rng), complex_normal(rng, 12)
+    channels = with_errors(W, Y, ReadingErrors(0.02, 0.02))
+    s = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
+    assert harmless(W, channels) == pytest.approx(s[1] / s[0] * np.sqrt(BIAS / (1 - BIAS)))
+    assert harmless(W, None) == harmless(W, 1e6 * channels) == np.inf
+    assert ridge(W, Y, "auto", channels=1e6 * channels).strength == cross_validated(W, Y)
+    # what the readings have in common counts too
+    assert ridge(W, Y, "auto", channels=channels, total=1e6 * channels).strength == cross_validated(W, Y)
