@@ -12,10 +12,10 @@ the corrected reading, Y₀ + W D, free of D. For a complex normal error of cova
 
     log L = −log det Σ − eᴴ Σ⁻¹ e,
 
-taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of kinds (own
-alone, common at a speed, to a run, to both: each as likely). The grid keeps what the data leave open: few spare
-runs, or errors common to all sensors, which count once. A covariance of n numbers, with the eigenvalues λ
-relative to the one stated, is passed on with degrees of freedom ν:
+taken on a grid of sizes (logarithmic, each as likely), mixtures of p, w and f, and shares of the kinds (own
+alone, common at a speed, to a run, to both: each as likely). The grid keeps what the data leave open: few
+spare runs, or errors common to all sensors, which count once. A covariance of n numbers, with the eigenvalues
+λ relative to the one stated, is passed on with degrees of freedom ν:
 
     log s² = E[mean log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of Σ λ χ²(1), over s².
 
