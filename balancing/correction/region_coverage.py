@@ -23,10 +23,10 @@ from balancing.coefficients.identifiability import acting_alike
 from balancing.coefficients.resolution import resolution
 from rotorid.base.arrays import ComplexArray, FloatArray
 
-WEIGHTED_LEVELS = ((1.0, "50 to 70 %"), (0.3, "70 to 90 %"))
+WEIGHTED_LEVELS = ((1.0, "40 to 60 %"), (0.3, "65 to 90 %"))
 """Relative error of the weights above which regions of the fit by errors hold so many truths."""
 
-LEAST_SQUARES_LEVELS = ((1.0, "5 to 75 %"), (2.0, "80 to 90 %"))
+LEAST_SQUARES_LEVELS = ((1.0, "40 to 65 %"), (2.0, "80 to 90 %"))
 """ρ/√N below which regions of least squares do."""
 
 
