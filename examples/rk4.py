@@ -90,8 +90,10 @@ def difference(influence: balancing.Influence, one: balancing.Trials) -> balanci
     """The coefficients with what a run differs from the bare rotor by as the vibration to correct."""
     known = (influence.baseline, influence.covariance, influence.common, influence.errors)
     bare, covariance, common, errors = known
-    assert bare is not None and covariance is not None
-    assert common is not None and errors is not None
+    assert bare is not None
+    assert covariance is not None
+    assert common is not None
+    assert errors is not None
     columns = run_columns(influence.run_errors, runs_of(one.mean, one.weights, influence.W))
     flip = np.array([-1.0, -1.0, *np.ones(covariance.shape[-1] - 2)])  # −Y₀, and the new run's own
     more = np.zeros((2, columns.common.shape[2], *common.shape[2:]), dtype=complex)
