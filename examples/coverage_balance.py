@@ -1,6 +1,6 @@
 """Are the 95 % regions of the correction weights honest? Drawn jobs whose truth is known.
 
-Run `python examples/coverage_balance.py [jobs]`, jobs of each table (2000). An ordinary job: 1–4 planes, 2–8
+Run `python examples/coverage_balance.py [jobs]`, jobs of each table (2500). An ordinary job: 1–4 planes, 2–8
 sensors, 1–5 speeds, more readings than planes; coefficients normal, with different sensitivities of sensors
 (30 %) and speeds (50 %); a trial weight for each plane, 0.3–1.5 of its correction; 0.5–5 % of error in each
 reading, and errors between runs: none in a fifth of the jobs, else up to 5 %. Spare runs are one to four, the
@@ -179,7 +179,7 @@ def _percent(values: Sequence[bool | None]) -> str:
     return f"{100 * np.mean(np.array(values, dtype=float)):.1f}" if values else "–"
 
 
-def main(jobs: int = 2000) -> None:
+def main(jobs: int = 2500) -> None:
     """Print the tables."""
     head = f"{'':<44}{'silent':>15}{'warned':>17}{'refused':>9}"
     print(f"a. Joint 95 % regions that hold the truth, per cent; errors stated or estimated\n{head}")
@@ -208,7 +208,7 @@ def main(jobs: int = 2000) -> None:
 
     print("\nd. Stated errors, trial weights 0.05–1.5 of the correction: regions that hold the truth, by")
     by = (("weighted", "relative error of the weights"), ("least-squares", "ρ/√N of the weakest combination"))
-    edges = ((0.0, 0.1, 0.2, 0.4, 1.0, np.inf), (0.0, 0.5, 1.0, 2.0, 4.0, np.inf))
+    edges = ((0.0, 0.1, 0.2, 0.3, 0.5, 1.0, np.inf), (0.0, 0.5, 1.0, 2.0, 4.0, np.inf))
     for place, (method, words) in zip((1, 0), by, strict=True):
         rng = np.random.default_rng(7)
         kinds = rng.choice(KINDS, jobs)

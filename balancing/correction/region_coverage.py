@@ -23,10 +23,10 @@ from balancing.coefficients.identifiability import acting_alike
 from balancing.coefficients.resolution import resolution
 from rotorid.base.arrays import ComplexArray, FloatArray
 
-WEIGHTED_LEVELS = ((1.0, "50 to 70 %"), (0.4, "70 to 85 %"))
+WEIGHTED_LEVELS = ((1.0, "40 to 60 %"), (0.3, "65 to 90 %"))
 """Relative error of the weights above which regions of the fit by errors hold so many truths."""
 
-LEAST_SQUARES_LEVELS = ((1.0, "5 to 75 %"), (2.0, "80 to 90 %"))
+LEAST_SQUARES_LEVELS = ((1.0, "40 to 65 %"), (2.0, "80 to 90 %"))
 """ρ/√N below which regions of least squares do."""
 
 
@@ -43,8 +43,8 @@ def uncertain(D: ArrayLike, covariance: ArrayLike) -> str:
     error = relative_error(D, covariance)
     share = next((words for limit, words in WEIGHTED_LEVELS if error > limit), "")
     return share and (
-        f"the stated 95 % region of the weights is optimistic: errors of the weights reach {error:.0%} of "
-        f"their size, and regions like this one contained the truth in {share} of simulated jobs; use "
+        f"the stated 95 % region of the weights is optimistic: errors of the weights reach {100 * error:.0f} "
+        f"% of their size, and regions like this one contained the truth in {share} of simulated jobs; use "
         "larger trial weights, add runs, sensors or speeds, or leave a plane out"
     )
 

@@ -4,9 +4,10 @@ Trial runs put the errors of their readings into W. Least squares then finds wei
 its region is optimistic. This fit minimises the residuals in units of their own errors, which depend on D
 through those of W: the maximum likelihood of normal errors (`balancing.solvers.likelihood`).
 
-Which covariance is honest was found by simulating jobs whose truth is known (`examples/coverage_balance.py`;
-two planes, twelve readings with 3 % and 2°). Shares of 95 % regions with the true weights, for trial weights
-that change the vibration by 30–100 % / 10–30 % / 3–10 %, at condition numbers up to 10:
+Which covariance is honest was found by simulating jobs whose truth is known (two planes, twelve readings with
+3 % and 2°, no errors between runs; other jobs: `examples/coverage_balance.py`). Shares of 95 % regions with
+the true weights, for trial weights that change the vibration by 30–100 % / 10–30 % / 3–10 %, at condition
+numbers up to 10:
 
 - least squares, first-order errors: 84 % / 62 % / 15 %;
 - this fit, (Σ Wᵀ Σ⁻¹ W)⁻¹ with W as measured: 94 % / 87 % / 49 %;
@@ -144,10 +145,10 @@ def effective_variance(
 
     Unbalance outside the planes leaves residuals that no error of the readings explains. Large weights
     would excuse them by the errors of W: weights of the plain fit are up to a third too large. Where
-    chi_square is beyond what errors explain (95 %), every reading of Y therefore gets a further error,
-    alike for all, such that χ² equals its degrees of freedom. The fit is close to least squares then, and
-    as good. If the cause is errors of the trial runs that are larger than stated, the covariance is too
-    small: times `inflation`² it holds the truth for either cause.
+    chi_square is beyond what errors explain (95 %), every reading of Y therefore gets a further error, alike
+    for all, such that χ² equals its degrees of freedom. The fit is close to least squares then, and as good.
+    If the cause is errors of the trial runs that are larger than stated, the covariance is too small: times
+    `inflation`² it holds the truth for either cause.
     """
     w, y, C, weight = _checked(W, Y, channels, row_weights)
     used = weight > 0
