@@ -53,10 +53,12 @@ def drawn(rng, T, names="trial"):
     """Runs with the weights T (R, P), their readings with all kinds of errors."""
     R = len(T)
     exact = Y0 + np.einsum("scp,rp->rsc", W, T)
-    along = runs_of(exact, T, W).along
+    found = runs_of(exact, T, W)
     Y = exact * (1 + 0.004 * complex_normal(rng, R, S, C)) + 0.002 * complex_normal(rng, R, S, C)
     for k, shape in enumerate(((R, S, C), (R, S, 1), (R, 1, 1))):
-        for size, way in zip(RUN.sizes[:, k], along, strict=True):
+        further = np.ones((1, S, C)) if k == 0 else found.unbalance
+        p, w, f = RUN.sizes[:, k]
+        for size, way in ((p, found.Y), (w, found.effect), *((f, part) for part in further)):
             Y = Y + size * way * complex_normal(rng, *shape)
     runs = tuple(f"{names} {r}" for r in range(R))
     return Trials(runs, SPEEDS, SENSORS, PLANES, Y, T.astype(complex), errors=ERRORS)
@@ -105,15 +107,16 @@ def test_chi_square_of_check_runs_is_that_of_their_errors():
 
 def test_the_region_of_a_verdict_holds_the_truth():
     whole = tolerance(100, 1, "G2.5", planes={"A": None, "B": None})
-    inside = []
+    inside, warned = [], 0
     for influence, check in jobs(6):
         found = verdict_of_check(influence, check, run=1, tolerance=whole)
-        assert found.warnings == ()
+        warned += bool(found.warnings)
         for row, truth in zip(found.rows, UNBALANCE + CHECKS[1], strict=True):
             away, edge = truth - row.value, row.region - row.value
             inside.append(abs(edge[np.argmin(np.abs(np.angle(edge / away)))]) >= abs(away))
     # two planes of 400 jobs, correlated: 0.95 ± 0.01
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
+    assert warned < 0.1 * DRAWS
 
 
 def test_unbalance_of_a_run_has_the_stated_covariance():
@@ -162,8 +165,8 @@ def test_check_runs_of_some_sensors_share_the_errors_of_the_trial_runs():
     assert found.common.shape[1] == whole.common.shape[1]
     np.testing.assert_allclose(found.W[..., 2, :], alone.W[..., 2, :], rtol=1e-9)
     # the unread sensor has columns of the trial runs only
-    R = len(trials.runs)
-    assert found.common[:, : 3 * R, :, 2].any()
-    assert not found.common[:, 3 * R :, :, 2].any()
+    own = alone.common.shape[1]
+    assert found.common[:, :own, :, 2].any()
+    assert not found.common[:, own:, :, 2].any()
     correction = correct(found)
     assert np.isfinite(correction.covariance).all()

@@ -75,7 +75,7 @@ def test_where_weights_fight_what_is_proposed_is_better():
 def test_weak_trial_weights_are_told_from_good_ones():
     rng = np.random.default_rng(3)
     found = {"mount": [], "do not mount": []}
-    for i in range(60):
+    for i in range(72):
         trials, W, Y0 = simulated(rng, trial=(0.01, 0.03, 0.1, 0.3)[i % 4])
         try:
             c = correct(estimate_influence(trials), method="least-squares")

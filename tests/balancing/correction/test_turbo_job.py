@@ -64,8 +64,8 @@ def test_the_corrections_lie_within_their_errors_of_those_without_rounding(maker
     ideal = np.linalg.lstsq(W.reshape(-1, 3), -maker.simulate(np.zeros(3)).ravel(), rcond=None)[0]
     d = (correction.weights - ideal).view(float)
     assert d @ np.linalg.solve(correction.covariance, d) < 22.46  # χ² with 6, 99.9 %
-    # and that says something: the errors are small beside the weights
-    assert (correction.mass_std < 0.1 * np.abs(correction.weights)).all()
+    # and that says something: the errors are small beside the weights (rounding is stated, and counted again)
+    assert (correction.mass_std < 0.14 * np.abs(correction.weights)).all()
     assert correction.warnings == ()
 
 

@@ -20,7 +20,7 @@ TRIES = 15 if FULL else 6
 @pytest.fixture
 def quick(monkeypatch):
     """No covariances."""
-    monkeypatch.setattr(methods, "sampled_covariance", lambda solver, W, Y, channels: None)
+    monkeypatch.setattr(methods, "sampled_covariance", lambda solver, W, Y, channels, common: None)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -68,6 +68,7 @@ def test_steps_that_do_not_settle_are_told(quick, monkeypatch):
 
 def test_planes_that_must_stay_empty(quick):
     stack, _ = problem(15)
+    stack = methods.replace(stack, explained=lambda D: True)  # with three planes and with one
     arcs = (((0.0, 2 * np.pi),), (), ())
     limits = Limits(np.array([np.inf, 0.0, np.inf]), np.full((1, 7), np.inf), arcs)
     found = fit_weights(methods.replace(stack, limits=limits), "weighted")
