@@ -216,7 +216,7 @@ def best_subsets(  # noqa: PLR0913
     rank = least if criterion == "max" else least + _errors(F, chosen, D)
     order = np.flatnonzero(solid)[np.argsort(rank[solid], kind="stable")]
     if criterion == "max":
-        order, D = _by_maximum(K, y, w, chosen, order, np.sqrt(least), D, show, F)
+        order, D = _by_maximum((K, y, w), chosen, order, np.sqrt(least), D, show, F)
     order = order[:show]
     after = y + np.einsum("nmk,mk->mn", K[:, chosen[order]], D[order])
     weighted = np.abs(after) * w
@@ -296,10 +296,8 @@ def _errors(F: ComplexArray, chosen: IntArray, D: ComplexArray) -> FloatArray:
     return np.asarray(np.maximum(np.einsum("mp,pq,mq->m", z.conj(), F, z).real, 0.0))
 
 
-def _by_maximum(  # noqa: PLR0913
-    K: ComplexArray,
-    y: ComplexArray,
-    w: FloatArray,
+def _by_maximum(
+    readings: tuple[ComplexArray, ComplexArray, FloatArray],
     chosen: IntArray,
     order: IntArray,
     bound: FloatArray,
@@ -310,6 +308,7 @@ def _by_maximum(  # noqa: PLR0913
     """The best choices by the largest weighted reading and the errors; weights (M, k), theirs replaced."""
     from balancing.solvers.cone import minmax_cone
 
+    K, y, w = readings
     D = D.copy()
     best: list[tuple[float, int]] = []
     for m in order:

@@ -79,7 +79,7 @@ def _two_planes() -> list[Row]:
 def _one_plane() -> list[Row]:
     """One plane, one sensor, a trial weight of 2 g at 0°."""
     trials = _trials([["3.4@116"], ["1.8@42"]], [[0.0], [2.0]])
-    (found,) = correct(estimate_influence(trials)).weights.tolist()
+    (found,) = correct(estimate_influence(trials), method="least-squares").weights.tolist()
     return _weight(f"{NOTE}, one plane", "correction, g", found, "2.012", "329.2")
 
 
@@ -173,7 +173,7 @@ def _job(folder: str) -> list[complex]:
     """Corrections of a sample job in grams; angles as the job counts them, with the rotation."""
     job = read_job(sample_data() / folder / "job.toml")
     assert job.trials is not None
-    found = correct(estimate_influence(job.trials)).to_dict()["corrections"]
+    found = correct(estimate_influence(job.trials), method="least-squares").to_dict()["corrections"]
     return [cmath.rect(entry["mass"], math.radians(entry["angle_deg"])) for entry in found]
 
 

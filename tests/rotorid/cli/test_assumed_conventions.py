@@ -235,7 +235,7 @@ def test_stored_coefficients(cli, tmp_path):
     files = shop(tmp_path, OFF_AXIS, "lag")
     stored = tmp_path / "stored.csv"
     assert cli("balance", *files, *said("lag", "with"), "--save-influence", stored).code == 0
-    assert "assumed" not in stored.read_text(encoding="utf-8")
+    assert "# assumed" not in stored.read_text(encoding="utf-8")
     document = cli("balance", files[0], "--influence", stored, "--json")
     assert document.code == 2  # three runs that differ, and no weights
     day, _ = shop(tmp_path, [{}], "lag")

@@ -85,11 +85,12 @@ def test_balance_reports_every_key_of_the_interface(cli):
 
 def test_stated_errors_on_the_command_line_give_intervals(cli):
     without = cli("balance", BK / "runs.csv", BK / "weights.csv", "--json").json
-    assert without["corrections"][0]["mass_std"] is None
+    assert without["errors"]["source"] == "assumed"
     with_errors = cli(
         "balance", BK / "runs.csv", BK / "weights.csv", "--amplitude-error", 2, "--phase-error", 1, "--json"
     ).json
-    assert 0.01 < with_errors["corrections"][0]["mass_std"] < 0.5
+    assert with_errors["errors"]["source"] == "stated"
+    assert 0.01 < with_errors["corrections"][0]["mass_std"] < without["corrections"][0]["mass_std"] < 0.5
     assert with_errors["corrections"][0]["mass"] == pytest.approx(without["corrections"][0]["mass"])
 
 

@@ -129,7 +129,7 @@ def test_names_of_files_cannot_steer_the_terminal(cli):
 def test_speeds_of_balance_are_in_the_unit_of_the_job(cli):
     job = sample_data() / "turbo_job" / "job.toml"
     found = [
-        cli("balance", job, "--speeds", text, "--json").json
+        cli("balance", job, "--planes", "left,right", "--speeds", text, "--json").json
         for text in ("1220,1360", "1220rpm,1360rpm", "1220,1360rpm", f"{1220 / 60!r}Hz, {1360 / 60!r} Hz")
     ]
     assert {r["speed_rpm"] for r in found[0]["residuals"]} == {1220, 1360}

@@ -186,22 +186,25 @@ def test_a_job_as_its_files_have_it():
         alpha = (Y[trial, row["sensor"]] - Y[runs[0]["run"], row["sensor"]]) / T
         assert row["influence"] == pytest.approx(abs(alpha), rel=1e-9)
         assert row["influence"] * np.exp(1j * np.radians(row["phase_deg"])) == pytest.approx(alpha, rel=1e-9)
-        assert row["influence_95_percent"] is None
+        assert row["influence_95_percent"] > 0  # of assumed errors
 
 
 def test_errors_of_coefficients_follow_from_the_readings():
     _, sheet, _, job = sheet_of(
         DATA / "bk_two_plane" / "job.toml", amplitude_error_percent=3.0, phase_error_deg=0.5
     )
-    Y, T = job.trials.mean[:, 0], job.trials.weights
+    Y, T, steps = job.trials.mean[:, 0], job.trials.weights, job.trials.steps[:, 0, :, 0]
     for i, row in enumerate(sheet.document["sheet"]["influence"]["rows"]):
         c, p = divmod(i, 2)
         alpha = (Y[p + 1, c] - Y[0, c]) / T[p + 1, p]
         variance = np.zeros(2)
-        for reading in (Y[0, c], Y[p + 1, c]):
-            # along a reading it is off by 3 % of itself, across by 0.5°: seen along and across alpha
+        for run in (0, p + 1):
+            # along a reading it is off by 3 % of itself, across by 0.5°, and by half its last digit, both:
+            # seen along and across alpha
+            reading, (step, turn) = Y[run, c], steps[:, run, c] / np.sqrt(12)
             share = reading / T[p + 1, p] / (alpha / abs(alpha))
-            e, f = 0.03 * share, 1j * np.radians(0.5) * share
+            e = np.hypot(0.03, step / abs(reading)) * share
+            f = 1j * np.hypot(np.radians(0.5), turn) * share
             variance += [e.real**2 + f.real**2, e.imag**2 + f.imag**2]
         along, across = 1.959964 * np.sqrt(variance) / abs(alpha)
         assert row["influence_95_percent"] == pytest.approx(100 * along, rel=1e-6)

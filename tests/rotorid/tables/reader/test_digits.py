@@ -156,7 +156,7 @@ def test_check_runs_keep_theirs(trials, monkeypatch):
 
     def fit(trials):
         seen.append(trials)
-        return estimate_influence(trials)
+        return estimate_influence(replace(trials, steps=None))  # these hide every effect
 
     monkeypatch.setattr("balancing.correction.refine.estimate_influence", fit)
     check = replace(
@@ -165,16 +165,16 @@ def test_check_runs_keep_theirs(trials, monkeypatch):
         sensors=("B",),
         readings=np.concatenate([trials.readings[:, :1, :, 1:], 1.01 * trials.readings[:, :1, :, 1:]]),
         weights=np.array([[1e-3, 1e-3]]),
-        steps=np.full((2, 2, 1, 1, 1), 7.0),
+        steps=np.full((2, 2, 1, 1, 1), 7e-12),
     )
     for first, expected in (
-        (trials, STEPS[:, 0, :, 0, 1]),
+        (replace(trials, steps=1e-6 * STEPS), 1e-6 * STEPS[:, 0, :, 0, 1]),
         (replace(trials, steps=None), 0 * STEPS[:, 0, :, 0, 1]),
     ):
         refine(first, check)
         joint = next(t for t in reversed(seen) if "check" in t.runs)
         np.testing.assert_allclose(joint.steps[:, 0, :3, 0, 0], expected, rtol=1e-12)
-        np.testing.assert_array_equal(joint.steps[:, :, 3, 0, 0], 7.0)
+        np.testing.assert_array_equal(joint.steps[:, :, 3, 0, 0], 7e-12)
         assert np.isnan(joint.steps[:, 1, :3]).all()
     refine(replace(trials, steps=None), replace(check, steps=None))
     assert seen[-1].steps is None

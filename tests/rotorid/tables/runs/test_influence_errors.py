@@ -153,7 +153,8 @@ def test_storing_keeps_everything_that_is_known_of_errors(tmp_path, phase):
                     each.common[1, :, 1].reshape(each.common.shape[1], -1) for each in (again, influence)
                 )
             first, second = (np.einsum("mi,mj->ij", z, z.conj()) for z in (found, expected))
-            size = np.sqrt(np.abs(np.diag(second))) + 1e-300
+            size = np.sqrt(np.abs(np.diag(second)))
+            size = np.where(size > 0, size, 1.0)
             np.testing.assert_allclose(
                 first / np.outer(size, size), second / np.outer(size, size), atol=1e-12
             )
@@ -174,7 +175,7 @@ def test_storing_keeps_everything_that_is_known_of_errors(tmp_path, phase):
             np.testing.assert_allclose(
                 getattr(stored, name), expected, rtol=1e-7, atol=1e-9 * abs(expected).max()
             )
-        assert stored.dof == pytest.approx(whole.dof, rel=1e-9)
+        assert stored.dof == (None if whole.dof is None else pytest.approx(whole.dof, rel=1e-9))
         # the same reading read again, from a table of one run
         bare = replace(baseline_of(made), readings=influence.baseline[None], errors=None)
         later = correct(again, bare)
