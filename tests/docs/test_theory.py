@@ -82,8 +82,8 @@ def minus_in_the_lower_left(a):
     return stretch(np.conj(a))
 
 
-def heavy_spot_for_light_spot(*arguments):
-    found = correct(*arguments)
+def heavy_spot_for_light_spot(*arguments, **options):
+    found = correct(*arguments, **options)
     return replace(found, weights=-found.weights)
 
 

@@ -164,7 +164,7 @@ def test_check_runs_keep_theirs(trials, monkeypatch):
         runs=("check",),
         sensors=("B",),
         readings=np.concatenate([trials.readings[:, :1, :, 1:], 1.01 * trials.readings[:, :1, :, 1:]]),
-        weights=np.array([[1e-3, 1e-3]]),
+        weights=np.zeros((1, 2)),
         steps=np.full((2, 2, 1, 1, 1), 7e-12),
     )
     for first, expected in (
