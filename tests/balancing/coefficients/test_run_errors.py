@@ -32,17 +32,19 @@ def machine(rng, S=2, C=3, P=2, R=5):
     return np.einsum("scp,rp->rsc", W, T - D), T, W, np.column_stack((np.ones(R), T))
 
 
-def dense(rows, k, runs, point):
-    """Covariance of row k by its definition: every run adds its share of each kind."""
-    S, C = rows.e.shape[1:]
+def dense(rows, runs, point):
+    """Joint covariance of all rows by its definition: every run adds its share of each kind."""
+    K, S, C = rows.e.shape
     speed = np.repeat(np.arange(S), C)
-    out = np.diag(rows.known[k].ravel()).astype(complex)
-    for r, share in enumerate(rows.share[k]):
+    same = speed[:, None] == speed
+    out = np.zeros((K * S * C, K * S * C), dtype=complex)
+    for r, m in enumerate(rows.m.T):
+        each = np.diag(rows.known[r].ravel()).astype(complex)
         for b, along in enumerate(([runs.Y[r]], [runs.effect[r]], runs.unbalance)):
             whole = sum(np.outer(v.ravel(), v.ravel().conj()) for v in along)
             own = np.diag(runs.size[b, r].ravel())
-            same = speed[:, None] == speed
-            out += share * (point[b, 0] * own + point[b, 1] * whole * same + point[b, 2] * whole)
+            each += point[b, 0] * own + point[b, 1] * whole * same + point[b, 2] * whole
+        out += np.kron(np.outer(m, m.conj()), each)
     return 2 * out
 
 
@@ -60,16 +62,15 @@ def test_likelihood_is_that_of_the_dense_covariance(known):
         log, q = spectrum(rows, runs, grid).at(grid.sizes)
         expected = np.zeros((len(log), 2))
         for g, point in enumerate(grid.points):
-            for k, e in enumerate(rows.e.reshape(len(rows.e), -1)):
-                V = dense(rows, k, runs, point)
-                inverse = np.linalg.inv(V)
-                X = rows.free.reshape(e.size, -1)
-                extra = 0.0
-                if X.shape[1]:
-                    G = X.conj().T @ inverse @ X
-                    extra = np.linalg.slogdet(G)[1]
-                    inverse = inverse - inverse @ X @ np.linalg.solve(G, X.conj().T @ inverse)
-                expected[g] += np.linalg.slogdet(V)[1] + extra, (e.conj() @ inverse @ e).real
+            e, V = rows.e.ravel(), dense(rows, runs, point)
+            inverse = np.linalg.inv(V)
+            X = rows.free.reshape(-1, rows.free.shape[-1]) if rows.free.size else np.zeros((e.size, 0))
+            extra = 0.0
+            if X.shape[1]:
+                G = X.conj().T @ inverse @ X
+                extra = np.linalg.slogdet(G)[1]
+                inverse = inverse - inverse @ X @ np.linalg.solve(G, X.conj().T @ inverse)
+            expected[g] = np.linalg.slogdet(V)[1] + extra, (e.conj() @ inverse @ e).real
         # restricted likelihood: its determinant is known up to a constant, that of the free unknowns
         np.testing.assert_allclose(log - log[0], expected[:, 0] - expected[0, 0], atol=1e-5)
         np.testing.assert_allclose(q, expected[:, 1], rtol=1e-5)
