@@ -46,7 +46,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("fit-*", "integration_change.*", "the difference of two integrations", absolute=1e-12),
     Tolerance("*", "*correlation.*", "of parameters that do not hang together", absolute=1e-12),
     Tolerance("campbell-rotor23", "*log_decrement*", "the rotor has no damping", absolute=1e-12),
-    Tolerance("bk-weighted", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
+    Tolerance("bk*", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
     Tolerance("*", "certified: at most # better is possible.", _CERTIFICATE, absolute=1e-7),
@@ -58,6 +58,12 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("turbo-max-mass", "corrections.*std*", _CONSTRAINED, relative=5e-4),
     Tolerance("turbo-max-mass", "corrections.covariance", _CONSTRAINED, relative=5e-4),
     Tolerance("*weighted*", "*", _WEIGHTED, relative=1e-6),
+    # the weighted fit is the default of these
+    *(
+        Tolerance(case, place, _WEIGHTED, relative=1e-6)
+        for case in ("turbo-*", "checked-*", "model-*", "left-in*", "bk*", "rk4*", "demo-*")
+        for place in ("*", "other_readings.*", "add_to_mounted.*")
+    ),
     Tolerance("*-mesh", "mesh_check.rate", "a quotient of small differences of frequencies", relative=1e-6),
     # the path of an iteration, not its end
     Tolerance("fit-*", "history.parameters.*", "steps on the way to the solution", relative=1e-6),
