@@ -482,7 +482,7 @@ def seen_in(
     e, parts, _ = _without(W, residual, parts, parts[0])
     V = np.einsum("gk,kij->gij", np.column_stack((factor, ratios[:, 1:])), parts)
     V += 1e-12 * np.trace(V, axis1=1, axis2=2).max() * np.eye(len(e))
-    q = (e.conj() @ np.linalg.solve(V, e[:, None])[..., 0].T).real
+    q = (e.conj() @ np.linalg.solve(V, e[None, :, None])[..., 0].T).real
     seen = _normal(np.log(probability) - np.linalg.slogdet(V)[1] - q)
     return _chance(q, dof, probability), replace(run, probability=seen, ratios=ratios)
 
