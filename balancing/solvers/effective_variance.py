@@ -51,8 +51,8 @@ UNEXPLAINED = 0.95
 """Level of the χ² test beyond which the residuals are larger than the errors explain."""
 
 _STEPS, _HALVINGS = 100, 40
-_DONE = 1e-18  # predicted decrease: a step of 1e-9 standard deviations, after which Newton is at rounding
-_SEARCH, _SEARCHED = 60, 1e-9
+_DONE = 1e-13  # predicted decrease: a step of 3e-7 standard deviations, after which Newton is at rounding
+_NO_SHARE, _SEARCHED = 1e-9, 1e-13  # of the mean variance
 _STUCK = 1e-10  # above it, no way down means lost and not rounding
 
 
@@ -249,16 +249,25 @@ def _explained(
     fit: Callable[[float, FloatArray], _Minimum], first: FloatArray, ratio: float, dof: int
 ) -> tuple[_Minimum, float, int]:
     """The fit with a further share of the mean variance such that χ² = dof; the share; steps taken."""
-    share, steps = ratio - 1, 0
-    best = fit(share, first)
-    for _ in range(_SEARCH):
-        steps += best.steps
-        ratio = best.chi_square / dof
-        if abs(ratio - 1) <= _SEARCHED:
-            break
-        share = max((1 + share) * ratio - 1, 0.0)
-        best = fit(share, best.d)
-    return best, share, steps
+    from scipy.optimize import brentq
+
+    tried: dict[float, _Minimum] = {}
+
+    def excess(share: float) -> float:
+        near = min(tried, key=lambda other: abs(other - share), default=None)
+        tried[share] = fit(share, first if near is None else tried[near].d)
+        return tried[share].chi_square / dof - 1
+
+    low = high = ratio - 1  # χ² falls with the share
+    if excess(high) > 0:
+        while excess(high := 2 * high) > 0:
+            low = high
+    else:
+        while low > _NO_SHARE and excess(low := low / 2) < 0:
+            high = low
+    share = brentq(excess, low, high, xtol=_SEARCHED * low, rtol=_SEARCHED) if low > _NO_SHARE else 0.0
+    excess(share)
+    return tried[share], share, sum(one.steps for one in tried.values())
 
 
 def _minimise(problem: Problem, d: FloatArray) -> _Minimum:

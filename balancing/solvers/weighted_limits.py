@@ -142,9 +142,10 @@ def _descend(given: LimitedProblem, D: ComplexArray, settled: float) -> End:
         limits = replace(given.limits, sectors=_sectors_at(given, np.where(D == 0, down, D)))
         step = stretch(quadratic_minimum(limits, D, g, H)) - d
         expected, t = float(-2 * g @ step - step @ H @ step), 1.0
-        if kept and expected <= settled * (1 + at.objective):
-            return End(unstretch(d), at.objective, True)
         new = likelihood.evaluate(given.fit, d + step)
+        if kept and expected <= settled * (1 + at.objective):
+            # rounding of Q says nothing of so small a step, after which Newton is at rounding: taken whole
+            return End(unstretch(d + step), new.objective, True)
         if not kept:
             d, at, kept = d + step, new, True
             continue

@@ -33,7 +33,6 @@ class Tolerance:
 
 _CONSTRAINED = "what an active limit counts follows from the last multipliers of the solver"
 _CERTIFICATE = "the gap at which the solver stops is rounding, divided by what it began with"
-_WEIGHTED = "weights and solution are found in turn until they stand still to seven digits or so"
 _EXACT = "the data have no errors: residuals, and the deviations that follow from them, are rounding"
 
 TOLERANCES: tuple[Tolerance, ...] = (
@@ -51,19 +50,13 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),
     Tolerance("*", "certified: at most # better is possible.", _CERTIFICATE, absolute=1e-7),
     Tolerance("*minmax*", "*", "a conic solver stops within 5e-9 of the best", relative=1e-7),
+    Tolerance("turbo-max-mass", "*", "the same, along limits that χ² hardly tells apart", relative=1e-5),
     Tolerance("turbo-trade-off", "trade_off.points.*", "a conic solver, along a flat optimum", relative=1e-4),
     # covariances
     Tolerance("*minmax*", "corrections.*std*", _CONSTRAINED, relative=5e-4),
     Tolerance("*minmax*", "corrections.covariance", _CONSTRAINED, relative=5e-4),
     Tolerance("turbo-max-mass", "corrections.*std*", _CONSTRAINED, relative=5e-4),
     Tolerance("turbo-max-mass", "corrections.covariance", _CONSTRAINED, relative=5e-4),
-    Tolerance("*weighted*", "*", _WEIGHTED, relative=1e-6),
-    # the weighted fit is the default of these
-    *(
-        Tolerance(case, place, _WEIGHTED, relative=1e-6)
-        for case in ("turbo-*", "checked-*", "model-*", "left-in*", "bk*", "rk4*", "demo-*")
-        for place in ("*", "other_readings.*", "add_to_mounted.*")
-    ),
     Tolerance("*-mesh", "mesh_check.rate", "a quotient of small differences of frequencies", relative=1e-6),
     # the path of an iteration, not its end
     Tolerance("fit-*", "history.parameters.*", "steps on the way to the solution", relative=1e-6),

@@ -206,6 +206,26 @@ def test_unbalance_outside_the_planes():
     assert objective(stretch(fit.weights), W, Y, wider) == pytest.approx(20, rel=1e-5)
 
 
+@pytest.mark.parametrize("outside", [0.01, 0.1, 1.0, 30.0])
+@pytest.mark.parametrize("of_reading", [1e-4, 0.1])
+def test_the_further_error_explains_what_is_left(outside, of_reading):
+    """However far it is beyond the errors, and whatever a part of the readings knows exactly."""
+    rng = np.random.default_rng(14)
+    for _ in range(10):
+        W, D = complex_normal(rng, (17, 3)), complex_normal(rng, 3)
+        Y = -W @ D + outside * complex_normal(rng, 17)
+        errors = np.exp(rng.normal(np.log(of_reading), 2.0, 17))
+        C = np.zeros((17, 8, 8)) + np.diag(np.repeat([0.01, 0.02, 0.02, 0.02], 2)) ** 2
+        C *= errors[:, None, None] ** 2
+        fit = effective_variance(W, Y, C)
+        assert fit.converged
+        if fit.model_error:
+            first = np.linalg.lstsq(W, -Y, rcond=None)[0]
+            mean = np.mean(np.trace(prediction_covariance(first, C), axis1=1, axis2=2)) / 2
+            C[:, [0, 1], [0, 1]] += fit.model_error**2 + FLOOR**2 * mean
+            assert objective(stretch(fit.weights), W, Y, C) == pytest.approx(fit.dof, rel=1e-9)
+
+
 def test_the_covariance_against_the_scatter_of_simulated_jobs():
     """Standard deviations within 6 % (statistical: 2.2 %) of 1000 jobs; the errors of W matter."""
     W, _, C, D = problem(14, N=12)

@@ -10,8 +10,8 @@ from rotorid.cli.demo_samples import SAMPLES
 from rotorid.samples import sample_data
 
 NUMBERS = {
-    "main": ["135.240", "134.203 kg", "419.1  170.6°"],
-    "balancing": ["419.1  170.6°", "explained by the stated errors", "13.59  154.7°"],
+    "main": ["135.240", "134.203 kg", "423.0  168.9°"],
+    "balancing": ["423.0  168.9°", "explained by the stated errors", "13.59  154.7°"],
     "holes": ["No other choice of pieces is better (proven).", "1 × 20 g in hole 4 (at 45°)"],
     "rig": ["Both planes are determined", "disk 2"],
     "rotor": ["4176.22", "10932.4 rpm", "4391.84"],
