@@ -17,6 +17,8 @@ export PIP_BUILD_CONSTRAINT = $(CONSTRAINTS)
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy.
 export OPENBLAS_NUM_THREADS ?= 1
+# Compiled modules are kept: every test that starts the program needs them.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-full test-latest test-lowest mutants golden golden-exact lint docs format bench build constraints clean
 .DELETE_ON_ERROR:

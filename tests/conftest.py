@@ -1,5 +1,6 @@
 """Shared by all tests: the command line run in this process."""
 
+import functools
 import json
 import os
 import sys
@@ -7,13 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+import typer.main
 
 # Small matrices gain nothing from threads, and lose a hundredfold where cores are busy; before NumPy loads.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis
 
+import balancing.solvers.methods
+import balancing.solvers.sampling
 import rotorid.cli
+
+# typer makes the commands anew for every command line; once is enough for all those of a worker.
+typer.main.get_command = functools.cache(typer.main.get_command)
+
+FEWER_DRAWS = functools.partial(balancing.solvers.sampling.sampled_covariance, draws=100)
 
 # The suite is the same on every machine; HYPOTHESIS_PROFILE=search looks at new examples every time.
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
@@ -34,7 +43,11 @@ class Outcome:
 
 @pytest.fixture
 def cli(capsys, monkeypatch):
-    """Run `rotorid ARGS`; returns exit status, standard output and standard error."""
+    """Run `rotorid ARGS`; returns exit status, standard output and standard error.
+
+    Errors of weights that are drawn come from 100 draws instead of 400.
+    """
+    monkeypatch.setattr(balancing.solvers.methods, "sampled_covariance", FEWER_DRAWS)
 
     def run(*args):
         monkeypatch.setattr(sys, "argv", ["rotorid", *map(str, args)])

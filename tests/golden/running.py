@@ -7,6 +7,7 @@ Run as a program of its own, so that a tree, the width of the terminal and the l
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import html
 import io
@@ -213,10 +214,13 @@ def _page(text: str) -> str:
 
 def answer(target: str, *names: str) -> None:
     """The program that `run` starts: outcomes of the cases, to a file."""
+    import typer.main
+
     import balancing
     import fem
     import rotorid
 
+    typer.main.get_command = functools.cache(typer.main.get_command)  # once for all command lines
     for package in (balancing, fem, rotorid):
         if not Path(package.__file__).resolve().is_relative_to(TREE):
             raise RuntimeError(f"{package.__file__} is not in {TREE}")
