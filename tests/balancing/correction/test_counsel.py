@@ -41,34 +41,35 @@ def left(W, Y0, planes, choice):
     return float(np.linalg.norm(Y0 + W @ D) / np.linalg.norm(Y0))
 
 
-def test_good_jobs_are_not_warned_of():
+@each_of("method, share", [("least-squares", 0.98), ("weighted", 0.94)])
+def test_good_jobs_are_not_warned_of(method, share):
     rng = np.random.default_rng(1)
     words, worse = [], 0
     for i in range(50):
         trials, W, Y0 = simulated(rng, errors=ERRORS if i % 2 else None)
-        c = correct(estimate_influence(trials), refuse=False, method="least-squares")
+        c = correct(estimate_influence(trials), refuse=False, method=method)
         words.append(c.counsel.word)
         worse += c.counsel.word == "mount" and np.linalg.norm(Y0 + W @ c.weights) > np.linalg.norm(Y0)
-    assert words.count("mount") >= 0.98 * len(words)
+    assert words.count("mount") >= share * len(words)
     assert worse == 0
 
 
 def test_where_weights_fight_what_is_proposed_is_better():
     rng = np.random.default_rng(2)
-    ours, theirs, warned = [], [], 0
-    for _ in range(50):
-        trials, W, Y0 = simulated(rng, alike=0.02)
+    ours, theirs = [], []
+    for i in range(120):
+        trials, W, Y0 = simulated(rng, alike=(0.02, 0.1, 0.5)[i % 3])
         if W.shape[-1] == 1:
             continue
-        c = correct(estimate_influence(trials))
+        c = correct(estimate_influence(trials), refuse=False)
         if c.counsel.word == "mount":
             continue
-        warned += 1
         ours.append(left(W, Y0, c.planes, c.counsel.choices[0]))
         theirs.append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
         assert c.counsel.instead
-    assert warned > 5
-    assert np.mean(ours) < 0.7 * np.mean(theirs)
+    assert len(ours) > 20
+    assert np.mean(ours) < 0.4 * np.mean(theirs)
+    assert np.mean(np.array(ours) < theirs) > 0.9
     assert np.max(np.subtract(ours, theirs)) < 0.1
 
 
