@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 from scipy.special import chdtri, fdtri
 
 import balancing
-from balancing.coefficients.run_errors import marginal, run_columns, runs_of
+from balancing.coefficients.run_errors import (
+    marginal,
+    run_columns,
+    runs_of,
+)
 from balancing.data.errors import mean_covariance
 from rotorid import read_job
 

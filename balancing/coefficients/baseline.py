@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import NOTICEABLE_AMPLITUDE, describe, differences
-from balancing.coefficients.run_errors import marginal, run_columns, runs_of
+from balancing.coefficients.run_errors import (
+    marginal,
+    run_columns,
+    runs_of,
+)
 from balancing.data.conventions import Labels
 from balancing.data.errors import ErrorModel, error_model, mean_covariance, reading_covariance, symmetric
 from balancing.data.trials import ReadingErrors, Trials

@@ -17,19 +17,21 @@ from balancing.coefficients.identifiability import UndeterminedError, check_runs
 from balancing.coefficients.repeatability import describe, differences
 from balancing.coefficients.run_errors import ASSUMED as ASSUMED_RUN
 from balancing.coefficients.run_errors import (
-    EXPLAINED,
     RunColumns,
     RunErrors,
     Runs,
     assumed,
-    corrected_row,
-    estimated,
-    given,
     marginal,
     run_columns,
     runs_of,
-    scatter,
     shares_of,
+)
+from balancing.coefficients.run_likelihood import (
+    EXPLAINED,
+    corrected_row,
+    estimated,
+    given,
+    scatter,
     spare_rows,
 )
 from balancing.coefficients.significance import check_consistency, check_effects, weak_trials

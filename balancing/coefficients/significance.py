@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from balancing.coefficients.identifiability import UndeterminedError
-from balancing.coefficients.run_errors import Runs, scatter, spare_rows
+from balancing.coefficients.run_errors import Runs
+from balancing.coefficients.run_likelihood import scatter, spare_rows
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch

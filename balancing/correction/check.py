@@ -28,7 +28,12 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import Start, match_speeds, starting_point
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import both_directions, tail
-from balancing.coefficients.run_errors import RunColumns, marginal, run_columns, runs_of
+from balancing.coefficients.run_errors import (
+    RunColumns,
+    marginal,
+    run_columns,
+    runs_of,
+)
 from balancing.correction.correct import Correction
 from balancing.data.conventions import Labels
 from balancing.data.errors import error_model, reading_covariance, symmetric

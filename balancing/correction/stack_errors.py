@@ -8,7 +8,12 @@ import numpy as np
 
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.run_errors import RunErrors, run_columns, runs_of, seen_in
+from balancing.coefficients.run_errors import (
+    RunErrors,
+    run_columns,
+    runs_of,
+)
+from balancing.coefficients.run_likelihood import seen_in
 from balancing.data.errors import reading_covariance
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance

@@ -8,12 +8,14 @@ from scipy.stats import kstest
 
 from balancing.coefficients.run_errors import (
     RunErrors,
+    run_columns,
+    runs_of,
+)
+from balancing.coefficients.run_likelihood import (
     _grid,
     corrected_row,
     estimated,
     given,
-    run_columns,
-    runs_of,
     scatter,
     spare_rows,
     spectrum,

@@ -77,9 +77,9 @@ def test_assumed_errors_that_are_not_too_small(example):
 
 def test_errors_in_common_taken_as_independent_are_noticed(example, monkeypatch):
     """The bounds refuse the wrong model: every error between runs its own."""
-    import balancing.coefficients.run_errors as run_errors
+    import balancing.coefficients.run_likelihood as run_likelihood
 
-    monkeypatch.setattr(run_errors, "SHARES", (1.0,))
+    monkeypatch.setattr(run_likelihood, "SHARES", (1.0,))
     n = repetitions(500)
     found = [one for kind in example.KINDS[2:] for one in example.simulate(n // 3, "stated", kind)]
     inside = silent(found)
