@@ -19,7 +19,7 @@ import numpy as np
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem, project
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import RCOND, stretch, unstretch
+from rotorid.regression import RCOND, gain, stretch, unstretch
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 _DEPENDENT = 1e-10
 _NOTHING = 1e-9
+_LEAST_REACH = 1e-6
 TIGHTER = (3e-9, 3e-8, 3e-7, 3e-6)
 """By how much limits are tightened where amplitudes are limited, one after the other until all are kept."""
 
@@ -211,9 +212,12 @@ def quadratic_minimum(
             found[free] = quadratic_minimum(part, start[free], gradient[both], hessian[np.ix_(both, both)])
         return found
     n, M, newton = len(gradient), problem.max_weight, unstretch(np.linalg.solve(hessian, -gradient))
-    if not newton.any():
+    size = np.abs(start)  # a start may be beyond the limits, even where the gradient is 0
+    reach = max(np.abs(newton).max(), _LEAST_REACH * size.max(), (size - M).max())
+    reach = reach or np.abs(gain(problem.W) @ problem.Y).max()
+    if not reach:
         return start
-    sizes = np.minimum(float(np.abs(newton).max()), M + np.abs(start))
+    sizes = np.minimum(float(reach), M + size)
     transform = np.diag(sizes).astype(complex)
     x_size = np.repeat(sizes, 2)
     H, g = hessian * np.outer(x_size, x_size), gradient * x_size
