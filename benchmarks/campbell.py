@@ -6,8 +6,8 @@ modes only, because with six ARPACK takes minutes for one speed: the ratio is a 
 
 Answers are eigenvalues λ: frequency and log decrement together. At 23 elements all are compared with those of
 ROSS, at each speed as a set, since both programs follow modes in their own ways. On finer meshes all six are
-compared at one speed with the same equations solved in higher precision (tests/dense_rotor.py); the note says
-how far ROSS is from those.
+compared at one speed with the same equations solved in higher precision (tests/helpers/dense_rotor.py); the
+note says how far ROSS is from those.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ three there: the ratio is a lower bound.
 
 Answers: frequencies and shapes against ROSS at 23 elements. ROSS loses digits on fine meshes (its first
 frequency is wrong by 6e-4 at 460 elements), so both are compared there with the same equations solved in
-higher precision (19 digits, tests/dense_rotor.py); the note says how far ROSS is from that.
+higher precision (19 digits, tests/helpers/dense_rotor.py); the note says how far ROSS is from that.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Random balancing problems and what CVXPY answers for them: writes tests/data/minmax_reference.json.
 
 Run `.venv-hsbalance/bin/python -m benchmarks.minmax_reference` from the repository's root (the environment of
-hsbalance has CVXPY; some seconds). tests/minmax_problems.py makes the problems from seeds, here and in the
-tests; only optimum objectives are stored, with a fingerprint of each problem.
+hsbalance has CVXPY; some seconds). tests/helpers/minmax_problems.py makes the problems from seeds, here and
+in the tests; only optimum objectives are stored, with a fingerprint of each problem.
 
 Independent are the modelling (complex variables and norms as CVXPY writes them, scaled only as a whole) and
 the solver, CVXOPT, where clarabel is what rotorid uses. The objective is evaluated at the weights returned,
@@ -19,7 +19,7 @@ import cvxpy as cp
 import numpy as np
 
 TESTS = Path(__file__).resolve().parent.parent / "tests"
-sys.path.insert(0, str(TESTS))
+sys.path.insert(0, str(TESTS / "helpers"))
 
 from minmax_problems import SEEDS, case, fingerprint  # noqa: E402
 

@@ -1,7 +1,7 @@
 """Random rotors and what ROSS answers for them: writes tests/data/ross_reference.json.
 
 Run `.venv-bench/bin/python -m benchmarks.ross_reference` (some minutes); only public functions of ROSS
-are used. tests/test_fem_ross.py builds the same rotors in `fem` and compares.
+are used. tests/fem/test_ross.py builds the same rotors in `fem` and compares.
 
 Conventions of ROSS 2.3.0, from its documentation, its source and by trial, and what follows from them
 --------------------------------------------------------------------------------------------------------

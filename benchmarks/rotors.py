@@ -23,7 +23,7 @@ import fem
 
 SIZES = {23: 1, 92: 4, 460: 20}  # elements, and how many each row of the table is cut into
 ROOT = Path(__file__).resolve().parents[1]
-TABLE, TESTS = ROOT / "sample_data" / "rotor23.csv", ROOT / "tests"
+TABLE, TESTS = ROOT / "sample_data" / "rotor23.csv", ROOT / "tests" / "helpers"
 
 
 @contextlib.contextmanager

@@ -7,8 +7,8 @@ x-direction times ω² is the influence coefficient. At 92 and 460 elements ROSS
 1000 speeds and its time scaled up.
 
 Answers: all numbers against ROSS at 23 elements. Finer meshes are compared with the same equations solved in
-higher precision (tests/dense_rotor.py) at five speeds, two of them at resonance and one where an amplitude
-nearly vanishes (a tiny difference of large numbers: errors count relative to the largest of the six
+higher precision (tests/helpers/dense_rotor.py) at five speeds, two of them at resonance and one where an
+amplitude nearly vanishes (a tiny difference of large numbers: errors count relative to the largest of the six
 sensors); the note says how far ROSS is from those. "exact" is a factorisation of the banded equations
 in float64 at every speed, as ROSS' is of dense ones: both lose digits with the fourth power of the number of
 elements. "fast" loses less, and at 460 elements it alone stays within 1e-6 of the truth.

@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 import re
 from importlib import import_module
+from pathlib import Path
 
 from cases import each_of
 
@@ -28,6 +29,25 @@ OWN = {
     if inspect.isclass(value) and value.__module__.partition(".")[0] in PACKAGES
 }
 """All classes, by name."""
+ROOT = Path(__file__).parents[2]
+
+
+def test_files_of_the_repository_that_are_named_exist():
+    """In what is handed out and in the benchmarks, which no test runs; CHANGELOG.md tells of former times."""
+    named = re.compile(r"(?<![\w./])(?:tests|fem|rotorid|balancing|benchmarks|examples|docs)/[\w/]+\.py\b")
+    texts = [
+        path
+        for folder in (*PACKAGES, "benchmarks", "examples", "docs", "sample_data")
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in (".py", ".md", ".toml") and "_build" not in path.parts
+    ]
+    gone = {
+        (path.name, name)
+        for path in (*texts, ROOT / "README.md", ROOT / "Makefile")
+        for name in named.findall(path.read_text(encoding="utf-8"))
+        if not (ROOT / name).is_file()
+    }
+    assert gone == set()
 
 
 def public(kind):
