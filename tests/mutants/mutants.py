@@ -1,4 +1,4 @@
-"""Do the tests find one-line defects? Run by `make mutants`; options: `python tests/mutants/mutants.py --help`.
+"""Do tests find one-line defects? Run by `make mutants`; options: `python tests/mutants/mutants.py --help`.
 
 First the whole suite runs once in a copy of the tree and writes down which test runs which function (kept in
 `.mutants/` until a file changes; tests that fail without any mutation are named and left out). Then every
