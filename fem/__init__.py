@@ -19,7 +19,7 @@ from fem.modes import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
-from fem.response import influence, unbalance_response
+from fem.response import influence, response_peaks, unbalance_response
 from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
@@ -65,6 +65,7 @@ __all__ = [
     "probe",
     "refined",
     "required_margin",
+    "response_peaks",
     "speed_map",
     "stability_threshold",
     "state_space",
