@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
-from fem.matrices.pencil import TO_XY, Pencil, whole_rotor
+from fem.matrices.pencil import TO_XY, whole_rotor
 from fem.model.rotor import Rotor, whole
 from fem.modes import Modes
 from fem.solvers.eigen import fine_mesh_warning, finite_modes
@@ -136,8 +136,8 @@ def _modes(rotor: Rotor, found: list[Found], said: tuple[str, ...]) -> Modes:
         motions = "motion" if rigid == 1 else "motions"
         warnings += (
             f"the supports leave {rigid} rigid-body {motions} of the rotor free; "
-            f"{'it comes' if rigid == 1 else 'they come'} first, with speed 0, beside the critical speeds asked "
-            "for",
+            f"{'it comes' if rigid == 1 else 'they come'} first, with speed 0, beside the critical speeds "
+            "asked for",
         )
     parts = [_shapes(part) for part in found]
     arrays = [

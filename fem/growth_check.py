@@ -145,6 +145,15 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     )
 
 
+def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
+    """`unstable_windows`, and what to say of them; also where stability cannot be judged."""
+    try:
+        windows = unstable_windows(rotor, speeds)
+    except ValueError as problem:
+        return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
+    return windows, tuple(window.said() for window in windows)
+
+
 def _window(found: Bases, asked: FloatArray, knots: FloatArray, i: int, j: int) -> Window:
     """The window that holds the speeds number i to j."""
     begins, ends = i > 0, j + 1 < asked.size
@@ -164,7 +173,7 @@ def _window(found: Bases, asked: FloatArray, knots: FloatArray, i: int, j: int) 
 
 
 def _edge(found: Bases, unstable: float, stable: float, knots: FloatArray) -> float:
-    """Where growth ends that begins at one speed and is gone at another, rad/s: the edge next to the first."""
+    """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first."""
     from scipy.optimize import brentq
 
     def excess(speeds: FloatArray) -> FloatArray:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth_check import unstable_windows
+from fem.growth_check import judge
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
 from fem.model.rotor import Rotor
 from fem.model.sensors import SensorLike, as_sensors
@@ -23,22 +22,20 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "phase_degrees"]
 __all__ += ["response_peaks", "unbalance_response"]
 
-Method = Literal["fast", "exact"]
-
 
 def unbalance_response(
     rotor: Rotor,
     unbalance: Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex],
     speeds: ArrayLike,
     *,
-    method: Method = "fast",
     nodes: Sequence[int] | None = None,
 ) -> Response:
     """Compute the synchronous vibration of all nodes, or of some.
 
     The force is U ω² e^{iωt} on z = x + i y. The equations are those of the whole rotor as described: shaft
     with what its `Model` takes into account and its material damping, supports of any kind at the
-    running speed, pedestals.
+    running speed, pedestals. Modes with static corrections have an error far below 1e-6; where they lose
+    digits, banded equations are solved.
 
     Parameters
     ----------
@@ -48,9 +45,6 @@ def unbalance_response(
         `{node or station: m r e^{iφ}}`, kg·m, φ with the rotation from the mark.
     speeds
         rad/s, one or many, not negative.
-    method
-        "fast" (modes with static corrections; error far below 1e-6) or "exact" (banded equations solved at
-        every speed: a check).
     nodes
         Numbers of the nodes to keep; by default all. Few of them take little memory at many speeds.
 
@@ -72,7 +66,7 @@ def unbalance_response(
         raise ValueError("no unbalance is given: name at least one node")
     A = assemble(rotor)
     loads, factors = _loads(A, masses)
-    ready = prepare(rotor, A, A.deflections, loads, speeds, _exact(method))
+    ready = prepare(rotor, A, A.deflections, loads, speeds)
 
     def solve(speeds: FloatArray) -> Response:
         F, b = (np.zeros((speeds.size, kept.size), dtype=complex) for _ in range(2))
@@ -159,9 +153,8 @@ def _loads(A: Matrices, masses: Mapping[int, complex]) -> tuple[FloatArray, Comp
 
 def judged(response: Response) -> Response:
     """The response with the ranges of speed in which it does not exist."""
-    windows = unstable_windows(response.rotor, response.speeds)
-    said = tuple(window.said() for window in windows)
-    before = {window.said() for window in response.windows}
+    windows, said = judge(response.rotor, response.speeds)
+    before = {window.said() for window in response.windows} | {*said}
     kept = tuple(text for text in response.warnings if text not in before)
     return replace(response, windows=windows, warnings=(*kept, *said))
 
@@ -171,8 +164,6 @@ def influence(
     planes: Sequence[str | int],
     sensors: Sequence[SensorLike],
     speeds: ArrayLike,
-    *,
-    method: Method = "fast",
 ) -> InfluenceCoefficients:
     """Compute influence coefficients W: vibration at sensors per unbalance in planes, [S] (33).
 
@@ -187,8 +178,6 @@ def influence(
         x with the rotation.
     speeds
         rad/s, one or many, not negative.
-    method
-        As in `unbalance_response`.
 
     Raises
     ------
@@ -205,7 +194,7 @@ def influence(
     places = as_sensors(sensors, rotor)
     rows = np.array([A.deflection(rotor.node(sensor.node)) for sensor in places], dtype=np.intp)
     turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
-    ready = prepare(rotor, A, rows, loads, speeds, _exact(method))
+    ready = prepare(rotor, A, rows, loads, speeds)
     W = np.empty((speeds.size, rows.size, len(planes)), dtype=complex)
     doubts = []
     for part, found in ready.parts(speeds):
@@ -214,15 +203,9 @@ def influence(
             reading += found.b * turn
         W[part] = (speeds[part] ** 2)[:, None, None] * reading
         doubts.append(found.doubt)
-    windows = unstable_windows(rotor, speeds)
-    warnings = (*_model_warnings(ready), *rounding_warning(doubts), *(window.said() for window in windows))
+    windows, said = judge(rotor, speeds)
+    warnings = (*_model_warnings(ready), *rounding_warning(doubts), *said)
     return InfluenceCoefficients(speeds, sensors, planes, _frozen(W), warnings, windows)
-
-
-def _exact(method: str) -> bool:
-    if method not in ("fast", "exact"):
-        raise ValueError(f'method must be "fast" or "exact", not {method!r}')
-    return method == "exact"
 
 
 def _model_warnings(ready: Receptance) -> tuple[str, ...]:

@@ -131,7 +131,7 @@ class Response:
             "sensors": [label(sensor) for sensor in sensors],
             "amplitude_m": np.abs(Z).tolist(),
             "phase_deg": phase_degrees(Z).tolist(),
-            "unstable": [window.to_dict() for window in self.windows],
+            "unstable_speeds": [window.to_dict() for window in self.windows],
             "warnings": list(self.warnings),
         }
 
@@ -292,7 +292,7 @@ class InfluenceCoefficients:
         units = {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"}
         rows = self.to_frame().set_axis(list(keys), axis=1).to_dict("records")
         unstable = [window.to_dict() for window in self.windows]
-        return {"rows": rows, "units": units, "unstable": unstable, "warnings": list(self.warnings)}
+        return {"rows": rows, "units": units, "unstable_speeds": unstable, "warnings": list(self.warnings)}
 
     def summary(self) -> str:
         """A table at one speed, or the range of sizes over many, as text."""

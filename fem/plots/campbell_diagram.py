@@ -67,7 +67,7 @@ def campbell_figure(
     operating: tuple[float, float] | None = None,
     unstable: Sequence[tuple[float, float]] = (),
 ) -> Figure:
-    """Make a figure of a Campbell diagram over its logarithmic decrements, unstable ranges of speed hatched."""
+    """Make a figure of a Campbell diagram over its logarithmic decrements; unstable speeds are hatched."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 8.5), layout="constrained")

@@ -1,11 +1,11 @@
 """At which of many speeds a mode grows, decided for whole ranges of speed at a time.
 
-Between two knots of the tables D and K are linear in speed, and so is A of z' = A z, z = (u, u'). With the
+Between two knots of the tables D and K are linear in speed, and so is A of z' = A z, z = (u, u'). With
 eigenvalues Λ and vectors V of A in the middle of a range and S = −sign Re Λ, the Hermitian part of S V⁻¹ A V
-is linear, too: if it is negative at both ends it is so between, and no eigenvalue passes the imaginary axis in
-the range (inertia theorem of Ostrowski and Schneider for the Lyapunov function V⁻ᴴ S V⁻¹). A range for which
-this fails is halved. First in a coarse basis, with a margin for its error; what this leaves, in a fine one;
-the speeds that are left then, one by one.
+is linear, too: if it is negative at both ends it is so between, and no eigenvalue passes the imaginary axis
+in the range (inertia theorem of Ostrowski and Schneider, Lyapunov function V⁻ᴴ S V⁻¹). A range for which
+this fails is halved. So in a coarse basis, with a margin for its error; the speeds that are left, one by one
+in a fine one.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ def _certified(
 def _constant(
     state: Callable[[FloatArray], AnyArray], ranges: FloatArray, margins: tuple[FloatArray, FloatArray]
 ) -> tuple[BoolArray, AnyArray, FloatArray]:
-    """In which ranges, (B, 2), no eigenvalue comes near the axis; eigenvalues in the middle, and margins, (B, n).
+    """In which ranges, (B, 2), no eigenvalue comes near the axis; those in the middle, and margins, (B, n).
 
     The margin of an eigenvalue is that of the next frequency below.
     """
@@ -188,8 +188,6 @@ def _constant(
 
 def _first_order(Q: Quadratic, middle: float) -> Callable[[FloatArray], AnyArray] | None:
     """A of z' = A z at speeds, in units of energy about those at a middle speed; None without enough mass."""
-    from scipy.linalg import solve_triangular
-
     size, spread = np.linalg.eigvalsh(Q.M)[[-1, 0]]
     if not spread > 1e-12 * size:
         return None

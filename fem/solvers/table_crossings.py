@@ -1,6 +1,6 @@
 """Where natural frequencies over tabulated supports meet the speed: all crossings, also two in one interval.
 
-Eigenvalues λ of the conservative rotor rise with each stiffness. Between two speeds a and b a stiffness matrix
+Eigenvalues λ of the conservative rotor rise with each stiffness. Between two speeds a and b a matrix
 that is linear in speed lies between bounds (those of its ends where it only rises or falls): modes whose λ on
 the lower bound exceeds b², or on the upper one stays below a², do not cross there. The others are told by
 g = λ − Ω² at both ends and its slope: a curve that does not turn has one root or none; one
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -79,9 +80,7 @@ class TableSearch:
     def between(self, a: float, b: float) -> list[tuple[float, int]]:
         """Crossings in an interval of the tables, (speed, mode from 0), ascending, its upper end excluded."""
         ends = np.linspace(a, b, _PARTS + 1).tolist()
-        return sorted(
-            root for low, high in zip(ends, ends[1:], strict=False) for root in self._part(low, high, 0)
-        )
+        return sorted(root for low, high in pairwise(ends) for root in self._part(low, high, 0))
 
     def _part(self, a: float, b: float, depth: int) -> Iterator[tuple[float, int]]:
         soft, stiff = self._bounds(a, b)

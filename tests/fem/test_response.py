@@ -4,6 +4,7 @@ import math
 import numpy as np
 import pytest
 from cases import each_of
+from exact_solutions import SOLVERS, exactly
 from fem_rotors import mirrored, refined, rotor23, rotors, uniform
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
@@ -46,7 +47,7 @@ def test_laval_rotor_on_damped_supports_through_resonance(method):
     speeds = np.concatenate(
         (np.linspace(0.0, 3 * critical, 301), [critical], critical * np.array([1 - 1e-7, 1 + 1e-9]))
     )
-    response = fem.unbalance_response(laval(), {"disc": 2e-3 * np.exp(0.7j)}, speeds, method=method)
+    response = SOLVERS[method](fem.unbalance_response, laval(), {"disc": 2e-3 * np.exp(0.7j)}, speeds)
     disc, support = laval_closed_form(speeds)
     U = 2e-3 * np.exp(0.7j)
     np.testing.assert_allclose(response.at("disc"), U * disc, rtol=1e-9)
@@ -73,7 +74,7 @@ def test_the_fast_way_is_the_exact_solution(rotor, seed):
     top = fem.critical_speeds(rotor, n=4).frequencies[rng.integers(0, 4)] * rng.uniform(0.5, 2)
     speeds = np.linspace(0.02 * top, top, 37)
     fast = fem.influence(rotor, planes, sensors, speeds)
-    exact = fem.influence(rotor, planes, sensors, speeds, method="exact")
+    exact = exactly(fem.influence, rotor, planes, sensors, speeds)
     # where the banded solution itself says that rounding costs it more than 1e-6, it is no reference
     assume(not exact.warnings)
     assert worst(fast.W, exact.W) < 1e-6
@@ -132,7 +133,7 @@ def test_any_damping_from_none_to_a_lock(damping):
     )
     speeds = np.linspace(7.0, 3000.0, 200)
     fast = fem.influence(rotor, [13, 24], [3, 20, 47], speeds).W
-    assert worst(fast, fem.influence(rotor, [13, 24], [3, 20, 47], speeds, method="exact").W) < 1e-6
+    assert worst(fast, exactly(fem.influence, rotor, [13, 24], [3, 20, 47], speeds).W) < 1e-6
 
 
 def test_a_free_rotor_has_a_response_and_approaches_a_free_body():
@@ -140,11 +141,11 @@ def test_a_free_rotor_has_a_response_and_approaches_a_free_body():
     Z = fem.unbalance_response(rotor, {11: 1e-3}, [0.5]).amplitudes[0]
     np.testing.assert_allclose(Z, -1e-3 / rotor.total_mass, rtol=1e-6)
     # The banded equations lose digits where ω² M is small beside K, and say so.
-    exact = fem.unbalance_response(rotor, {11: 1e-3}, [0.5], method="exact")
+    exact = exactly(fem.unbalance_response, rotor, {11: 1e-3}, [0.5])
     np.testing.assert_allclose(exact.amplitudes[0], Z, rtol=1e-3)
     assert any("rounding may change the response" in text for text in exact.warnings)
     fine = fem.influence(uniform(60), [1, 31], [1, 31, 61], [100.0, 5000.0]).W
-    coarse = fem.influence(rotor, [1, 11], [1, 11, 21], [100.0, 5000.0], method="exact").W
+    coarse = exactly(fem.influence, rotor, [1, 11], [1, 11, 21], [100.0, 5000.0]).W
     assert worst(coarse, fine) < 2e-4
 
 
@@ -157,10 +158,10 @@ def test_an_undamped_rotor_at_its_critical_speed_is_refused(method, times):
         with pytest.raises(
             ValueError, match=r"undamped rotor stands exactly at its critical speed .*no limit"
         ):
-            fem.influence(rotor, [7], [7], [50.0, omega], method=method)
+            SOLVERS[method](fem.influence, rotor, [7], [7], [50.0, omega])
     with pytest.raises(ValueError, match="critical speed 0 rad/s"):
-        fem.influence(uniform(5), [1], [1], [0.0], method=method)
-    near = fem.influence(rotor, [7], [7], critical * (1 + 1e-6), method=method).W
+        SOLVERS[method](fem.influence, uniform(5), [1], [1], [0.0])
+    near = SOLVERS[method](fem.influence, rotor, [7], [7], critical * (1 + 1e-6)).W
     assert np.isfinite(near).all()
     assert np.abs(near).min() > 50
 
@@ -170,12 +171,8 @@ def test_at_a_damped_critical_speed_the_exact_solution_takes_over():
     critical = fem.critical_speeds(rotor).frequencies
     beside = critical * (1 + 1e-6)
     at = fem.influence(rotor, [7, 12], [2, 18], critical).W
-    np.testing.assert_allclose(
-        at, fem.influence(rotor, [7, 12], [2, 18], beside, method="exact").W, rtol=2e-3
-    )
-    np.testing.assert_allclose(
-        at, fem.influence(rotor, [7, 12], [2, 18], critical, method="exact").W, rtol=1e-12
-    )
+    np.testing.assert_allclose(at, exactly(fem.influence, rotor, [7, 12], [2, 18], beside).W, rtol=2e-3)
+    np.testing.assert_allclose(at, exactly(fem.influence, rotor, [7, 12], [2, 18], critical).W, rtol=1e-12)
 
 
 def test_hardly_any_damping_on_a_fine_mesh_is_said():
@@ -198,7 +195,6 @@ def test_hardly_any_damping_on_a_fine_mesh_is_said():
         ({"planes": [25]}, "node 25 does not exist: the rotor has nodes 1 to 24"),
         ({"sensors": ["left"]}, "no station is called 'left'"),
         ({"sensors": []}, "name at least one plane and one sensor"),
-        ({"method": "quick"}, 'method must be "fast" or "exact", not \'quick\''),
     ],
 )
 def test_impossible_requests_are_refused(arguments, message):
