@@ -66,6 +66,8 @@ class Campbell:
         Modes that grow at some of the speeds, and from which speed on, by that speed.
     windows
         Ranges of speed in which any mode grows, listed or not.
+    cut
+        What the list of critical speeds leaves out because only n modes were asked for; else empty.
     """
 
     speeds: FloatArray
@@ -81,6 +83,7 @@ class Campbell:
     warnings: tuple[str, ...] = ()
     unstable: tuple[Growing, ...] = ()
     windows: tuple[Window, ...] = ()
+    cut: str = ""
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -117,6 +120,7 @@ class Campbell:
                 }
                 for speed, mode, delta, way in self._criticals()
             ],
+            "damped_critical_speeds_cut": self.cut or None,
             "unstable": [mode.to_dict() for mode in self.unstable],
             "unstable_speeds": [window.to_dict() for window in self.windows],
             "warnings": list(self.warnings),
@@ -171,6 +175,8 @@ class Campbell:
                     )
         if not self.critical_speeds.size:
             lines.append("no damped critical speed in this range")
+        if self.cut:
+            lines.append(self.cut)
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -265,11 +271,11 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
         warnings=(
             *(mode.said() for mode in unstable),
             *hidden,
-            *_cut(whirl, paths, columns),
             *_warnings(whirl, paths, columns, n, asked),
         ),
         unstable=unstable,
         windows=windows,
+        cut=_cut(whirl, paths, columns),
     )
 
 
@@ -290,7 +296,7 @@ def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, 
     return found
 
 
-def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> tuple[str, ...]:
+def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
     """What to say where modes that are not listed have critical speeds in the range."""
     f = off_synchronous(np.delete(paths.values, columns, axis=1), whirl.speeds[:, None])
     k, _ = np.nonzero(f[:-1] * f[1:] < 0)
@@ -298,16 +304,16 @@ def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> tuple[str, ...]:
         near = ", ".join(f"{speed:.6g}" for speed in np.unique(whirl.speeds[k])[:_NAMED])
         return (
             f"the list of critical speeds is cut: modes that are not listed have {k.size} more in this "
-            f"range, just above {near} rad/s; ask for more modes (-n)",
+            f"range, just above {near} rad/s; ask for more modes (-n)"
         )
     sizes = np.abs(whirl.found.values[-1].imag)
     top, last = float(np.nan_to_num(sizes).max(initial=0.0)), float(whirl.speeds[-1])
     if np.isfinite(sizes).all() and top < last and sizes.size < available_modes(whirl.Q.P.rotor):
         return (
             f"the list of critical speeds may be cut: the modes followed reach {top:.6g} rad/s only at "
-            f"{last:.6g} rad/s; ask for more modes (-n)",
+            f"{last:.6g} rad/s; ask for more modes (-n)"
         )
-    return ()
+    return ""
 
 
 def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:

@@ -176,8 +176,11 @@ def _edge(found: Bases, unstable: float, stable: float, knots: FloatArray) -> fl
     """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first."""
     from scipy.optimize import brentq
 
+    # Where the mode decays beyond rounding on the other side, its growth vanishes at the edge.
+    level = 0.0 if largest_growth(found, np.array([stable]))[0] < -GROWTH else GROWTH
+
     def excess(speeds: FloatArray) -> FloatArray:
-        return largest_growth(found, speeds) - GROWTH
+        return largest_growth(found, speeds) - level
 
     between = knots[(knots > min(unstable, stable)) & (knots < max(unstable, stable))]
     trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))

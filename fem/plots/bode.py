@@ -108,7 +108,10 @@ def draw_bode(
         if phase.size:
             # The middle of the curve between -360 and 0: a lag, as engineers read it.
             phase -= 360 * np.ceil(np.median(phase) / 360)
-        below.plot(omega, _with_gaps(phase, seen), style, color=COLORS[k % len(COLORS)], linewidth=1.6)
+        shown = seen | ~steady
+        below.plot(
+            omega[shown], _with_gaps(phase, seen)[shown], style, color=COLORS[k % len(COLORS)], linewidth=1.6
+        )
     plain(below)
     below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
     below.yaxis.set_major_locator(_right_angles(below))

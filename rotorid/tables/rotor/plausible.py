@@ -91,12 +91,13 @@ def warn_of_value(source: str, key: str, stem: str, value: float) -> None:
 def warn_of_rotor(source: str, rotor: Rotor) -> None:
     """What only the whole rotor shows: its shape, and how its bearings carry it."""
     span, thin = float(rotor.positions[-1]), float(rotor.outer_diameter.min())
-    if span < thin:
+    if span < thin and rotor.density.any():  # a shaft without mass is a model, not a body
         _warn(
             f"{source}: the shaft is {span:.4g} m long in all and {thin:.4g} m thick at least; are length "
             "and diameter exchanged?"
         )
     bearings = [s for s in rotor.supports if s.kind == "bearing"]
+    soft, first = [], ""
     for number, bearing in enumerate(bearings, start=1):
         k = bearing.at(np.array(bearing.speeds or (0.0,)))[0]
         stiff = float(np.linalg.norm(k, axis=(1, 2)).max()) / math.sqrt(2)
@@ -104,11 +105,14 @@ def warn_of_rotor(source: str, rotor: Rotor) -> None:
         if 0 < stiff < weight / _SAG:
             meant = [name for name, size in _STIFF if weight / (stiff * size) < 0.01]
             name = repr(bearing.name) if bearing.name else f"{number} at node {bearing.node}"
-            _warn(
-                f"{source}: bearing {name} of {stiff:.4g} N/m would sag {weight / stiff:.3g} m under its "
-                f"share of {rotor.total_mass:.4g} kg; is its stiffness in "
-                f"{meant[0] if meant else 'another unit'}?"
+            soft.append(
+                f"of {stiff:.4g} N/m would sag {weight / stiff:.3g} m under its share of "
+                f"{rotor.total_mass:.4g} kg; is its stiffness in {meant[0] if meant else 'another unit'}?"
             )
+            first = first if len(soft) > 1 else name
+    if soft:
+        more = f" (and {len(soft) - 1} more)" if len(soft) > 1 else ""
+        _warn(f"{source}: bearing {first}{more} {soft[0]}")
 
 
 def _warn_of_labels(table: Table, rows: list[int]) -> None:
