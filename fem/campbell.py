@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.growth import Growing, growing
-from fem.growth_check import Window, judge, within
+from fem.growth_check import judge
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
 from fem.model.supports import ROUNDED
@@ -19,6 +19,7 @@ from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.solvers.tracking import Followed, follow
 from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
+from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats
 from rotorid.base.units import RPM, rpm_text

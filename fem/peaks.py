@@ -35,6 +35,7 @@ Edition = Literal["2005", "1996"]
 HALF_POWER = float(np.sqrt(0.5))
 _UNDAMPED = 1e5  # an AF beyond which damping is none
 _POINTS = 6  # of the local polynomial
+UNLIMITED = 1e300  # amplitude of what nothing limits; infinities have no differences
 _NO_LIMIT = "practically undamped: AF exceeds 100000, damping does not limit the amplitude"
 
 
@@ -282,7 +283,7 @@ def _peak(
 ) -> Peak:
     speed = _maximum(curve, float(omega[k - 1]), float(omega[k]), float(omega[k + 1]))
     amplitude = curve(speed)
-    if not np.isfinite(amplitude):
+    if amplitude >= UNLIMITED:
         return _without_limit(speed, operating, edition)
     level = HALF_POWER * amplitude
     below, why_below = _half_power(omega, A, k, -1, curve, level, speed)
@@ -308,7 +309,7 @@ def _peak(
 
 
 def _without_limit(speed: float, operating: tuple[float, float] | None, edition: Edition) -> Peak:
-    """A peak of infinite amplitude."""
+    """A peak that nothing limits."""
     margin, required = _margins(speed, np.inf, operating, edition)
     return Peak(speed, np.inf, None, None, None, margin, required, _NO_LIMIT, undamped=True)
 

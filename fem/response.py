@@ -12,7 +12,7 @@ from fem.growth_check import judge
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
 from fem.model.rotor import Rotor
 from fem.model.sensors import SensorLike, as_sensors
-from fem.peaks import Edition, Peak, Peaks, find_peaks
+from fem.peaks import UNLIMITED, Edition, Peak, Peaks, find_peaks
 from fem.solvers.banded import rounding_warning
 from fem.solvers.eigen import fine_mesh_warning
 from fem.solvers.receptance import Receptance, prepare
@@ -81,8 +81,9 @@ def unbalance_response(
             largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
             doubts.append(found.doubt)
         said = (*_model_warnings(ready), *rounding_warning(doubts))
-        arrays = (_frozen(array) for array in (F, b, largest, where))
-        return Response(speeds, next(arrays), masses, rotor, said, *arrays, kept, solve=solve)
+        for array in (F, b, largest, where):
+            array.flags.writeable = False
+        return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve=solve)
 
     return judged(solve(speeds))
 
@@ -121,7 +122,7 @@ def response_peaks(
         try:
             ((_, found),) = ready.parts(np.array([speed]))
         except ValueError:
-            return np.inf  # undamped, and critical
+            return UNLIMITED  # undamped, and critical
         F = (found.F @ factors)[0, 0] * turn.conjugate()
         return float(speed**2 * abs(F if found.b is None else F + (found.b @ factors)[0, 0] * turn))
 

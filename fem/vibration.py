@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.growth_check import Window, within
 from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
+from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.units import phase_deg, speed_text
 

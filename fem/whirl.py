@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from fem.matrices.bands import assemble
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.eigen import finite_modes
 from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -19,8 +19,6 @@ from rotorid.base.units import RPM, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
-
-DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth_check import Window, within
 from fem.model.sensors import label
+from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.style import (
     COLORS,

@@ -192,7 +192,7 @@ def _values(mu: ComplexArray, scale: float) -> tuple[ComplexArray, BoolArray]:
     """λ from μ, and which are finite."""
     # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
     finite = np.abs(mu) > _INFINITE * np.abs(mu).max(axis=1)[:, None]
-    return scale * (_SHIFT + 1 / np.where(finite, mu, 1.0)), finite
+    return np.asarray(scale * (_SHIFT + 1 / np.where(finite, mu, 1.0))), np.asarray(finite)
 
 
 def _sorted(

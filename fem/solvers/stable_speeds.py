@@ -117,7 +117,7 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         )
         out = _certified(found.coarse, speeds, cuts, margins, found.low)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
-        high = (np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1)
+        high: BoolArray = (np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1)
         at = np.searchsorted(cuts, speeds)
         out[high[at] | high[np.maximum(at - 1, 0)]] = 0
     left = np.flatnonzero(out == 0)
@@ -177,7 +177,7 @@ def _constant(
     own = np.arange(V.shape[1])
     V[:, own, own] += _REGULAR  # vectors of equal eigenvalues may be one
     inverse = np.linalg.inv(V)
-    sure = np.ones(len(ranges), dtype=bool)
+    sure: BoolArray = np.ones(len(ranges), dtype=bool)
     for end in (0, 1):
         H = sign * (inverse @ state(ranges[:, end]) @ V)
         H = (H + np.swapaxes(H.conj(), 1, 2)) / 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -137,7 +137,9 @@ def _with(result: Response, extra: FloatArray) -> Response | None:
         return None
     order = np.argsort(np.concatenate((omega, extra)), kind="stable")
 
-    both = {name: np.concatenate((getattr(result, name), getattr(more, name)))[order] for name in _OVER_SPEED}
+    both: dict[str, Any] = {
+        name: np.concatenate((getattr(result, name), getattr(more, name)))[order] for name in _OVER_SPEED
+    }
     return dataclasses.replace(result, **both)
 
 

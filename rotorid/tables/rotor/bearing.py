@@ -28,7 +28,7 @@ ENTRIES = {
 }
 DIAGONAL = ("kxx", "kyy", "cxx", "cyy")
 """What pushes back, or brakes, in a bearing; the others may have either sign."""
-OUTWARDS = "0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
+OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
 TILTING = "tilting_stiffness_N_m_per_rad"
 PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_N_s_per_m")
 _STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)

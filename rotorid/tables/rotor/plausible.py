@@ -116,11 +116,10 @@ def warn_of_rotor(source: str, rotor: Rotor) -> None:
 
 
 def _warn_of_labels(table: Table, rows: list[int]) -> None:
-    """A label that stands twice, unless labels are kinds of elements."""
+    """A number of an element that stands twice; names may be kinds of elements."""
     labels = Counter(label for row in rows if (label := table.shown("element", row).strip()))
-    numbers = all(label.isdecimal() for label in labels)
-    twice = [label for label, count in labels.items() if count > 1]
-    if twice and (numbers or 2 * len(labels) > labels.total()):
+    twice = [label for label, n in labels.items() if n > 1 and label.isdecimal()]
+    if twice:
         second = [table.rows[row] for row in rows if table.shown("element", row).strip() == twice[0]][1]
         _warn(f"{table.source}, row {second}: there is an element {twice[0]} before; is a row twice here?")
 
