@@ -13,12 +13,12 @@ from fem.growth_check import judge
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
 from fem.model.supports import ROUNDED
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import off_synchronous, synchronous, turns
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.solvers.tracking import Followed, follow
-from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
+from fem.whirl import available_modes, checked_number, checked_speeds, in_both_planes
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import crossings
 from fem.solvers.quadratic import NONE
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
-from fem.whirl import DIRECTION_NAMES, in_both_planes
+from fem.whirl import in_both_planes
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
 

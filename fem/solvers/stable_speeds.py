@@ -117,7 +117,7 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         )
         out = _certified(found.coarse, speeds, cuts, margins, found.low)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
-        high: BoolArray = (np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1)
+        high = np.asarray((np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1))
         at = np.searchsorted(cuts, speeds)
         out[high[at] | high[np.maximum(at - 1, 0)]] = 0
     left = np.flatnonzero(out == 0)
