@@ -26,6 +26,7 @@ from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.vibration import BearingForces, InfluenceCoefficients, Response
 from fem.whirl import WhirlModes, whirl_modes
+from fem.windows import Window
 
 __all__ = [
     "STEEL_DENSITY",
@@ -53,6 +54,7 @@ __all__ = [
     "StaticDeflection",
     "Support",
     "WhirlModes",
+    "Window",
     "campbell",
     "compliance",
     "critical_speeds",

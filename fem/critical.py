@@ -42,7 +42,7 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     Modes
         Frequencies in rad/s and shapes; of fewer than n where bearing tables end before, with a warning. Over
         bearing tables a mode may cross the speed more than once: all crossings count, and where there are
-        more than n a warning names them.
+        more than n `cut` names them.
 
     Raises
     ------
@@ -53,6 +53,7 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     n = whole(n, "the number of critical speeds")
     A = assemble(rotor)
     said: tuple[str, ...] = ()
+    cut = ""
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
         rigid = pencil.rigid.shape[1]
@@ -64,8 +65,8 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
         parts = [found.only(slice(0, n + rigid))]
     else:
         _check_number(n, n)
-        parts, said = _over_speed(rotor, A, n)
-    return _modes(rotor, parts, said)
+        parts, said, cut = _over_speed(rotor, A, n)
+    return replace(_modes(rotor, parts, said), cut=cut)
 
 
 def _check_number(n: int, available: int, reason: str = "") -> None:
@@ -76,10 +77,10 @@ def _check_number(n: int, available: int, reason: str = "") -> None:
         )
 
 
-def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[str, ...]]:
+def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[str, ...], str]:
     """The n lowest intersections of natural frequency and speed, over the range of all bearing tables.
 
-    There may be fewer, or more; then warnings say so.
+    There may be fewer, which warnings say, or more, which comes last.
     """
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
@@ -103,8 +104,6 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
             f"only {len(found)} of {n} critical speeds {'lies' if len(found) == 1 else 'lie'} between "
             f"{first:.6g} and {last:.6g} rad/s, where the tables hold; extend them to find more",
         )
-    if len(found) > n:
-        warnings += (cut_list([speed for speed, _ in found], n),)
     if below:
         warnings += (
             f"at {first:.6g} rad/s, where the bearing tables begin, the lowest natural frequency is only "
@@ -115,11 +114,13 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
     for speed, k in found[:n]:
         mode = search.at(speed).only(slice(k, k + 1))
         result.append(replace(mode, squares=np.array([speed * speed])))
-    return result, warnings
+    return result, warnings, _cut([speed for speed, _ in found], n)
 
 
-def cut_list(speeds: Sequence[float], n: int) -> str:
-    """A sentence that a list of critical speeds, rad/s, was cut after n."""
+def _cut(speeds: Sequence[float], n: int) -> str:
+    """A sentence if a list of critical speeds, rad/s, was cut after n."""
+    if len(speeds) <= n:
+        return ""
     more = ", ".join(f"{speed:.6g}" for speed in speeds[n : n + _NAMED])
     rest = len(speeds) - n
     return (

@@ -1,13 +1,16 @@
+import dataclasses
 import json
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 from cases import each_of
 from exact_solutions import SOLVERS, exactly
-from fem_rotors import mirrored, refined, rotor23, rotors, uniform
+from fem_rotors import machines, mirrored, refined, rotor23, rotors, uniform
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 
 import fem
 from fem.solvers import receptance
@@ -261,3 +264,58 @@ def test_results_as_tables_json_and_text():
 def test_no_unbalance_no_vibration():
     for rotor in (rotor23(1e4), refined(rotor23(1e4), 3)):
         assert not fem.unbalance_response(rotor, {5: 0.0}, [10.0, 500.0]).amplitudes.any()
+
+
+@given(machines(elements=(2, 12), tables=False), st.floats(-9, -3))
+@settings(max_examples=15, deadline=None)
+def test_a_free_rotor_far_below_its_first_critical_speed_is_a_free_body(rotor, power):
+    free = dataclasses.replace(rotor, supports=[])
+    first = fem.critical_speeds(free, 1).frequencies[-1]
+    centre = (
+        float(
+            (free.density * free.area * free.length) @ ((free.positions[:-1] + free.positions[1:]) / 2)
+            + sum(disc.mass * free.positions[disc.node - 1] for disc in free.discs)
+        )
+        / free.total_mass
+    )
+    # Equal and opposite about the centre of mass: two planes that make a force there without a couple.
+    ends, where = (1, free.n_nodes), free.positions[[0, -1]]
+    share = (where[1] - centre) / (where[1] - where[0])
+    found = fem.unbalance_response(
+        free, {ends[0]: 1e-3 * share, ends[1]: 1e-3 * (1 - share)}, [10**power * first]
+    )
+    np.testing.assert_allclose(
+        found.amplitudes[0], -1e-3 / free.total_mass, rtol=1e-6 + 1e3 * 10 ** (2 * power)
+    )
+    assert found.warnings == tuple(text for text in found.warnings if "ignored" in text)
+
+
+@given(st.floats(1.0, 5000.0), st.floats(1.0, 5000.0), st.sampled_from([6, 8, 12]))
+@settings(max_examples=200, deadline=None)
+def test_speeds_written_in_rpm_do_not_fall_off_a_table(low, step, digits):
+    support = fem.Support(1, [1e6, 2e6], speeds=(low, low + step))
+    for speed, k in ((low, 1e6), (low + step, 2e6)):
+        rpm = float(f"{speed * 30 / np.pi:.{digits}g}")
+        written = rpm * np.pi / 30
+        assert support.at(written)[0][0, 0] == pytest.approx(k, rel=1e-5 * (1 + (low + step) / step))
+    with pytest.raises(ValueError, match="not extrapolated"):
+        support.at((low + step) * 1.0001)
+
+
+def test_memory_grows_with_the_answer():
+    """Of 600 elements at 4,000 speeds two nodes are asked for: all nodes would be 77 MB and more."""
+    rotor = refined(rotor23(2e4), 26)
+    speeds = np.linspace(20.0, 900.0, 4000 if FULL else 1000)
+    tracemalloc.start()
+    try:
+        found = fem.unbalance_response(rotor, {100: 1e-3}, speeds, nodes=[50, 300])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    whole = 2 * 16 * speeds.size * rotor.n_nodes
+    assert peak < 12e6 + 0.1 * whole
+    every = fem.unbalance_response(rotor, {100: 1e-3}, speeds[::97])
+    np.testing.assert_allclose(found.amplitudes[::97], every.amplitudes[:, [49, 299]], rtol=1e-6)
+    np.testing.assert_array_equal(found.largest_node[::97], every.major.argmax(axis=1) + 1)
+    with pytest.raises(ValueError, match="node 7 was not kept"):
+        found.at(7)
