@@ -22,6 +22,7 @@ from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, I
 
 GROWTH = 1e-7  # Re λ / |λ| above which a mode is said to grow: an undamped one has rounding there
 AWAY = 1e-6  # a real eigenvalue above this part of the reference frequency runs away
+_FREE = 1e-3  # part of the lowest bending frequency of a free rotor below which motions are rigid
 _COMPLETE = 40  # unknowns per plane up to which the basis is the whole space
 _LEAST = 8  # modes of the reference rotor
 _TIMES = 2.0  # the highest speed: modes up to there are low ones
@@ -129,7 +130,9 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
 def _rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
     """Growth of motions as `largest_growth` counts it; −1 where the basis does not know them."""
     rate = np.where(oscillates, lam.real / np.abs(lam), lam.real / found.scale * (GROWTH / AWAY))
-    return np.where(np.abs(lam.imag) <= found.highest, rate, -1.0)
+    # What rounding makes of the motions of a free rotor, which nothing drives, does not count.
+    known = np.abs(lam) > (0.0 if found.fine.P.rotor.supports else _FREE * found.scale)
+    return np.where(known & (np.abs(lam.imag) <= found.highest), rate, -1.0)
 
 
 def _certified(

@@ -270,7 +270,10 @@ def test_no_unbalance_no_vibration():
 @settings(max_examples=15, deadline=None)
 def test_a_free_rotor_far_below_its_first_critical_speed_is_a_free_body(rotor, power):
     free = dataclasses.replace(rotor, supports=[])
-    first = fem.critical_speeds(free, 1).frequencies[-1]
+    try:
+        first = fem.critical_speeds(free, 1).frequencies[-1]
+    except ValueError:  # more polar than diametral inertia
+        assume(False)
     centre = (
         float(
             (free.density * free.area * free.length) @ ((free.positions[:-1] + free.positions[1:]) / 2)
