@@ -19,13 +19,14 @@ from fem.modes import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
-from fem.response import influence, unbalance_response
+from fem.response import influence, response_peaks, unbalance_response
 from fem.speed_map import Intersection, SpeedMap, speed_map
 from fem.stability import Stability, stability_threshold
 from fem.state_space import StateSpace, state_space
 from fem.static import StaticDeflection, compliance, static_deflection
 from fem.vibration import BearingForces, InfluenceCoefficients, Response
 from fem.whirl import WhirlModes, whirl_modes
+from fem.windows import Window
 
 __all__ = [
     "STEEL_DENSITY",
@@ -53,6 +54,7 @@ __all__ = [
     "StaticDeflection",
     "Support",
     "WhirlModes",
+    "Window",
     "campbell",
     "compliance",
     "critical_speeds",
@@ -65,6 +67,7 @@ __all__ = [
     "probe",
     "refined",
     "required_margin",
+    "response_peaks",
     "speed_map",
     "stability_threshold",
     "state_space",

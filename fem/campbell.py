@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth import GROWTH, Growing, growing
+from fem.growth import Growing, growing
+from fem.growth_check import judge
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
-from fem.orbits import whirl_direction
-from fem.solvers.crossing import synchronous
+from fem.model.supports import ROUNDED
+from fem.orbits import DIRECTION_NAMES, whirl_direction
+from fem.solvers.crossing import off_synchronous, synchronous, turns
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
+from fem.solvers.stable_speeds import GROWTH
 from fem.solvers.tracking import Followed, follow
-from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
+from fem.whirl import available_modes, checked_number, checked_speeds, in_both_planes
+from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats
 from rotorid.base.units import RPM, rpm_text
@@ -24,6 +28,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+HEAVY = 1.28  # log decrement at an amplification factor of 2.5: critically damped after API 684
+_ROUNDS = 4  # of looking for crossings between the speeds
+_NAMED = 5  # critical speeds that a warning names
 _SPARE = 2  # modes above those asked for, which may come down; more are taken where a mode is lost
 _MOST = 3  # modes computed for each one asked for, at most
 _REACH = 0.5  # part of the highest frequency computed above which a mode that vanished may have gone on
@@ -58,6 +65,10 @@ class Campbell:
         What the reader must know.
     unstable
         Modes that grow at some of the speeds, and from which speed on, by that speed.
+    windows
+        Ranges of speed in which any mode grows, listed or not.
+    cut
+        What the list of critical speeds leaves out because only n modes were asked for; else empty.
     """
 
     speeds: FloatArray
@@ -72,6 +83,8 @@ class Campbell:
     rotor: Rotor
     warnings: tuple[str, ...] = ()
     unstable: tuple[Growing, ...] = ()
+    windows: tuple[Window, ...] = ()
+    cut: str = ""
 
     @property
     def eigenvalues(self) -> ComplexArray:
@@ -104,10 +117,13 @@ class Campbell:
                     "mode": int(mode),
                     "log_decrement": float(delta),
                     "direction": DIRECTION_NAMES[float(way)],
+                    "heavily_damped": bool(delta > HEAVY),
                 }
                 for speed, mode, delta, way in self._criticals()
             ],
+            "damped_critical_speeds_cut": self.cut or None,
             "unstable": [mode.to_dict() for mode in self.unstable],
+            "unstable_speeds": [window.to_dict() for window in self.windows],
             "warnings": list(self.warnings),
         }
 
@@ -145,16 +161,23 @@ class Campbell:
                 text = f"{omega:16.4f} {_LETTERS[float(self.direction[s, k])]}{_rounded(delta):10.4f}"
                 parts.append(text if np.isfinite(omega) else f"{'none':>18}{'':10}")
             lines.append("".join(parts))
-        if self.critical_speeds.size:
-            lines.append("damped critical speeds")
-            lines.append("mode     rad/s         rpm   log dec  direction")
-        for speed, mode, delta, way in self._criticals():
-            delta = _rounded(delta)
-            lines.append(
-                f"{mode:4d}{speed:12.4f}{speed * RPM:12.2f}{delta:10.4f}  {DIRECTION_NAMES[float(way)]}"
-            )
+        heavy = self.critical_log_decrements > HEAVY
+        for title, which in (
+            ("damped critical speeds", ~heavy),
+            (f"heavily damped, without a peak (log decrement above {HEAVY})", heavy),
+        ):
+            if which.any():
+                lines += [title, "mode     rad/s         rpm   log dec  direction"]
+            for (speed, mode, delta, way), here in zip(self._criticals(), which, strict=True):
+                if here:
+                    lines.append(
+                        f"{mode:4d}{speed:12.4f}{speed * RPM:12.2f}{_rounded(delta):10.4f}  "
+                        f"{DIRECTION_NAMES[float(way)]}"
+                    )
         if not self.critical_speeds.size:
             lines.append("no damped critical speed in this range")
+        if self.cut:
+            lines.append(self.cut)
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -205,7 +228,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     """
     speeds = checked_speeds(speeds)
     checked_number(rotor, n)
-    whirl, paths, columns = followed(rotor, speeds, n)
+    whirl, paths, columns = _followed_closely(rotor, speeds, n)
+    asked = np.searchsorted(whirl.speeds, speeds)
     if not columns.size:
         raise ValueError("the rotor has no oscillating mode at these speeds: all motions are overdamped")
     values, X = paths.values[:, columns], paths.vectors[:, columns]
@@ -214,7 +238,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
             "the rotor on its supports is statically unstable at these speeds: a support has negative "
             "stiffness; check its sign and size"
         )
-    lam, x, y = in_both_planes(values, whirl.Q.nodes(X))
+    lam, x, y = in_both_planes(values[asked], whirl.Q.nodes(X[asked]))
     gone = ~np.isfinite(lam)
     direction = np.where(gone, 0.0, whirl_direction(np.nan_to_num(x), np.nan_to_num(y)))
     frequencies = np.where(gone, np.nan, lam.imag)
@@ -222,6 +246,16 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     crossings = synchronous(whirl, values, X)
     at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
     unstable = growing(whirl, values, X)
+    windows, said = judge(rotor, speeds)
+    shown = np.zeros(speeds.size, dtype=bool)
+    for mode in unstable:
+        shown |= (speeds >= mode.speed) & (speeds <= mode.last)
+    hidden = [
+        f"{text} (a mode that is not listed: ask for more)"
+        for window, text in zip(windows, said, strict=False)
+        if window.mode is not None and (within((window,), speeds) & ~shown).any()
+    ]
+    hidden += said[len(windows) :]
     for array in (frequencies, log_decrements, direction, crossings.speeds):
         array.flags.writeable = False
     return Campbell(
@@ -235,9 +269,52 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
         critical_direction=whirl_direction(cx, cy),
         error=whirl.error,
         rotor=rotor,
-        warnings=(*(mode.said() for mode in unstable), *_warnings(whirl, paths, columns, n)),
+        warnings=(
+            *(mode.said() for mode in unstable),
+            *hidden,
+            *_warnings(whirl, paths, columns, n, asked),
+        ),
         unstable=unstable,
+        windows=windows,
+        cut=_cut(whirl, paths, columns),
     )
+
+
+def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
+    """`followed`, over tables with so many speeds between that no two crossings of the 1× line are hidden."""
+    knots = np.array([knot for support in rotor.supports for knot in support.speeds])
+    knots = knots[(knots > speeds[0]) & (knots < speeds[-1])]
+    apart = np.abs(knots[:, None] - speeds).min(axis=1, initial=np.inf) > ROUNDED * speeds[-1]
+    grid = np.union1d(speeds, knots[apart])
+    for _ in range(_ROUNDS):
+        found = followed(rotor, grid, n)
+        if rotor.constant:
+            break
+        extra = turns(found[0], found[1].values, found[1].vectors, off_synchronous)
+        if not extra.size:
+            break
+        grid = np.union1d(grid, extra)
+    return found
+
+
+def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
+    """What to say where modes that are not listed have critical speeds in the range."""
+    f = off_synchronous(np.delete(paths.values, columns, axis=1), whirl.speeds[:, None])
+    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
+    if k.size:
+        near = ", ".join(f"{speed:.6g}" for speed in np.unique(whirl.speeds[k])[:_NAMED])
+        return (
+            f"the list of critical speeds is cut: modes that are not listed have {k.size} more in this "
+            f"range, just above {near} rad/s; ask for more modes (-n)"
+        )
+    sizes = np.abs(whirl.found.values[-1].imag)
+    top, last = float(np.nan_to_num(sizes).max(initial=0.0)), float(whirl.speeds[-1])
+    if np.isfinite(sizes).all() and top < last and sizes.size < available_modes(whirl.Q.P.rotor):
+        return (
+            f"the list of critical speeds may be cut: the modes followed reach {top:.6g} rad/s only at "
+            f"{last:.6g} rad/s; ask for more modes (-n)"
+        )
+    return ""
 
 
 def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
@@ -352,19 +429,21 @@ def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
     return out
 
 
-def _warnings(whirl: Whirl, paths: Followed, columns: IndexArray, n: int) -> tuple[str, ...]:
+def _warnings(
+    whirl: Whirl, paths: Followed, columns: IndexArray, n: int, asked: IndexArray
+) -> tuple[str, ...]:
     texts = []
-    values = paths.values[:, columns]
+    values, speeds = paths.values[asked][:, columns], whirl.speeds[asked]
     gone = ~np.isfinite(values)
-    above = went_above(whirl, paths, columns)
+    above = went_above(whirl, paths, columns)[asked]
     for text, cells in (
         ("does not oscillate (overdamped)", gone & ~above),
         ("was not found (overdamped, or above the frequencies computed)", above),
     ):
         for k in np.flatnonzero(cells.any(axis=0)):
-            where = whirl.speeds[cells[:, k]]
+            where = speeds[cells[:, k]]
             texts.append(
-                f"mode {k + 1} {text} at {where.size} of {whirl.speeds.size} speeds, "
+                f"mode {k + 1} {text} at {where.size} of {speeds.size} speeds, "
                 f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
             )
     if columns.size < n:

@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
-from fem.matrices.pencil import TO_XY, Pencil, whole_rotor
+from fem.matrices.pencil import TO_XY, whole_rotor
 from fem.model.rotor import Rotor, whole
 from fem.modes import Modes
-from fem.solvers.eigen import fine_mesh_warning, finite_modes, lowest_modes
+from fem.solvers.eigen import fine_mesh_warning, finite_modes
+from fem.solvers.table_crossings import Found, TableSearch, positive_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line
-_SHAPES = 1e-8  # tolerance of mode shapes; that of frequencies is its square
-_STEPS = 2  # trial speeds per interval of a bearing table
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """Critical speeds squared, and vectors of the pencil they belong to."""
-
-    squares: FloatArray
-    vectors: AnyArray
-    pencil: Pencil
-    rounding: FloatArray
+_NAMED = 5  # critical speeds beyond the end of a list that are named
 
 
 def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
@@ -45,12 +35,14 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     rotor
         The rotor; without enough supports its rigid-body motions come first, with frequency 0.
     n
-        How many, from 1.
+        How many, from 1; rigid-body motions, of frequency 0, come besides.
 
     Returns
     -------
     Modes
-        Frequencies in rad/s and shapes; of fewer than n where bearing tables end before, with a warning.
+        Frequencies in rad/s and shapes; of fewer than n where bearing tables end before, with a warning. Over
+        bearing tables a mode may cross the speed more than once: all crossings count, and where there are
+        more than n `cut` names them.
 
     Raises
     ------
@@ -61,14 +53,20 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     n = whole(n, "the number of critical speeds")
     A = assemble(rotor)
     said: tuple[str, ...] = ()
+    cut = ""
     if rotor.constant:
         pencil = whole_rotor(rotor, A)
-        _check_number(n, finite_modes(pencil))
-        found = [_lowest(pencil, n)]
+        rigid = pencil.rigid.shape[1]
+        available = finite_modes(pencil)
+        _check_number(n, max(available - rigid, min(available, 1)))
+        found = positive_modes(pencil, n + rigid)
+        thin = " (discs whose polar inertia exceeds the diametral one take some away)"
+        _check_number(n, found.squares.size - rigid, thin)
+        parts = [found.only(slice(0, n + rigid))]
     else:
-        _check_number(n, finite_modes(A) * (1 if rotor.symmetric else 2))
-        found, said = _over_speed(rotor, A, n)
-    return _modes(rotor, found, said)
+        _check_number(n, n)
+        parts, said, cut = _over_speed(rotor, A, n)
+    return replace(_modes(rotor, parts, said), cut=cut)
 
 
 def _check_number(n: int, available: int, reason: str = "") -> None:
@@ -79,24 +77,10 @@ def _check_number(n: int, available: int, reason: str = "") -> None:
         )
 
 
-def _lowest(pencil: Pencil, n: int) -> _Found:
-    """The n lowest modes of positive mass."""
-    available, m = finite_modes(pencil), n
-    while True:
-        spectrum = lowest_modes(pencil.rotor, pencil.matrices, m, pencil, _SHAPES)
-        real = np.flatnonzero(spectrum.squares >= 0)
-        if real.size >= n or m == available:
-            break
-        m = min(available, 2 * m + 2)
-    _check_number(n, real.size, " (discs whose polar inertia exceeds the diametral one take some away)")
-    real = real[np.argsort(spectrum.squares[real], kind="stable")][:n]
-    return _Found(spectrum.squares[real], spectrum.vectors[:, real], pencil, spectrum.rounding[real])
-
-
-def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[_Found], tuple[str, ...]]:
+def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[str, ...], str]:
     """The n lowest intersections of natural frequency and speed, over the range of all bearing tables.
 
-    There may be fewer; then warnings say so.
+    There may be fewer, which warnings say, or more, which comes last.
     """
     tables = [support.speeds for support in rotor.supports if support.speeds]
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
@@ -104,40 +88,15 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[_Found], tuple[
         raise ValueError("the tables of the supports have no speed in common: extend them")
     knots = np.unique(np.concatenate([np.array(table) for table in tables]))
     knots = knots[(knots >= first) & (knots <= last)]
-    grid = np.unique(np.concatenate([np.linspace(a, b, _STEPS + 1) for a, b in itertools.pairwise(knots)]))
-
-    def at(omega: float, count: int) -> _Found:
-        pencil = whole_rotor(rotor, A, omega)
-        return _lowest(pencil, min(count, finite_modes(pencil)))
-
-    def surplus(omega: float, k: int) -> float:
-        return float(np.sqrt(max(at(omega, k + 1).squares[k], 0.0)) - omega)
-
-    m, below = n, 0  # modes to follow; those below the first speed are met where nothing is known
-    while True:
-        frequencies = [np.sqrt(np.maximum(at(first, m).squares, 0.0))]
-        below = int(np.count_nonzero(frequencies[0] < first))
-        if frequencies[0].size < m or m >= n + below:
-            break
-        m = n + below
-    found: list[tuple[float, int]] = []
-    for left, right in itertools.pairwise(grid):
-        frequencies.append(np.sqrt(np.maximum(at(right, m).squares, 0.0)))
-        a, b = frequencies[-2] - left, frequencies[-1] - right
-        crossing = [k for k in range(min(a.size, b.size)) if (a[k] >= 0) != (b[k] >= 0)]
-        found += [(_root(surplus, k, left, right, a[k], b[k]), k) for k in crossing]
-        if len(found) >= n:
-            break
-    found = sorted(found)[:n]
+    search = TableSearch(rotor, A)
+    found = [root for a, b in itertools.pairwise(knots.tolist()) for root in search.between(a, b)]
+    below = int(np.count_nonzero(search.at(first).squares < first * first))
     if not found:
-        reason = (
-            f"the first natural frequency at {first:.6g} rad/s is {frequencies[0][0]:.6g} rad/s"
-            if below
-            else f"the first natural frequency at {last:.6g} rad/s is {frequencies[-1][0]:.6g} rad/s"
-        )
+        at = first if below else last
         raise ValueError(
             f"no critical speed lies between {first:.6g} and {last:.6g} rad/s, where the bearing tables "
-            f"hold; {reason}: extend the tables"
+            f"hold; the first natural frequency at {at:.6g} rad/s is "
+            f"{np.sqrt(search.at(at).squares[0]):.6g} rad/s: extend the tables"
         )
     warnings: tuple[str, ...] = ()
     if len(found) < n:
@@ -148,40 +107,29 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[_Found], tuple[
     if below:
         warnings += (
             f"at {first:.6g} rad/s, where the bearing tables begin, the lowest natural frequency is only "
-            f"{frequencies[0][0]:.6g} rad/s: critical speeds below the tables are not known, nor counted",
+            f"{np.sqrt(search.at(first).squares[0]):.6g} rad/s: critical speeds below the tables are not "
+            "known, nor counted",
         )
     result = []
-    for omega, k in found:
-        modes = at(omega, k + 1)
-        pick = slice(k, k + 1)
-        result.append(
-            _Found(np.array([omega * omega]), modes.vectors[:, pick], modes.pencil, modes.rounding[pick])
-        )
-    return result, warnings
+    for speed, k in found[:n]:
+        mode = search.at(speed).only(slice(k, k + 1))
+        result.append(replace(mode, squares=np.array([speed * speed])))
+    return result, warnings, _cut([speed for speed, _ in found], n)
 
 
-def _root(function: Callable[[float, int], float], k: int, a: float, b: float, fa: float, fb: float) -> float:
-    """Zero of `function(·, k)` between a and b: secants kept inside the bracket (Illinois)."""
-    for _ in range(60):
-        if fb == fa:
-            break
-        c = b - fb * (b - a) / (fb - fa)
-        if not min(a, b) < c < max(a, b):
-            c = (a + b) / 2
-        fc = function(c, k)
-        if abs(fc) <= 1e-13 * c:
-            return c
-        if (fc < 0) == (fb < 0):
-            fa = fa / 2
-        else:
-            a, fa = b, fb
-        b, fb = c, fc
-        if abs(b - a) <= 1e-14 * abs(b):
-            break
-    return b
+def _cut(speeds: Sequence[float], n: int) -> str:
+    """A sentence if a list of critical speeds, rad/s, was cut after n."""
+    if len(speeds) <= n:
+        return ""
+    more = ", ".join(f"{speed:.6g}" for speed in speeds[n : n + _NAMED])
+    rest = len(speeds) - n
+    return (
+        f"the list is cut: {rest} more critical {'speed lies' if rest == 1 else 'speeds lie'} in this range, "
+        f"at {more}{' …' if rest > _NAMED else ''} rad/s; -n {len(speeds)} lists all"
+    )
 
 
-def _modes(rotor: Rotor, found: list[_Found], said: tuple[str, ...]) -> Modes:
+def _modes(rotor: Rotor, found: list[Found], said: tuple[str, ...]) -> Modes:
     squares = np.concatenate([part.squares for part in found])
     rounding = np.concatenate([part.rounding for part in found])
     warnings = said + ignored_inertia(rotor) + fine_mesh_warning(rotor, rounding)
@@ -190,7 +138,8 @@ def _modes(rotor: Rotor, found: list[_Found], said: tuple[str, ...]) -> Modes:
         motions = "motion" if rigid == 1 else "motions"
         warnings += (
             f"the supports leave {rigid} rigid-body {motions} of the rotor free; "
-            f"{'it comes' if rigid == 1 else 'they come'} first, with critical speed 0",
+            f"{'it comes' if rigid == 1 else 'they come'} first, with speed 0, beside the critical speeds "
+            "asked for",
         )
     parts = [_shapes(part) for part in found]
     arrays = [
@@ -204,7 +153,7 @@ def _modes(rotor: Rotor, found: list[_Found], said: tuple[str, ...]) -> Modes:
     return Modes(frequencies, shapes, slopes, rotor, direction, x, y, warnings)
 
 
-def _shapes(part: _Found) -> tuple[FloatArray, FloatArray, AnyArray, AnyArray, list[str]]:
+def _shapes(part: Found) -> tuple[FloatArray, FloatArray, AnyArray, AnyArray, list[str]]:
     """Shapes, slopes, amplitudes in x and y, each (N, n), and directions."""
     w, tilt = part.vectors[part.pencil.waves], part.vectors[part.pencil.tilts]
     if len(w) == 1:

@@ -7,20 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import crossings
 from fem.solvers.quadratic import NONE
 from fem.solvers.reduced_whirl import Whirl
-from fem.whirl import DIRECTION_NAMES, in_both_planes
+from fem.solvers.stable_speeds import GROWTH
+from fem.whirl import in_both_planes
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
-
-GROWTH = 1e-7  # Re λ / |λ| above which a mode is said to grow: an undamped one has rounding there
 
 
 @dataclass(frozen=True)
 class Growing:
-    """A mode that grows at some of the speeds.
+    """A range of speeds in which a mode grows; a mode may have several.
 
     Attributes
     ----------
@@ -32,6 +31,8 @@ class Growing:
         Whether it grows at the first speed already (or at the first where it oscillates).
     last
         Last of the given speeds at which it grows, rad/s.
+    end
+        Where it stops growing, rad/s; None if it grows at the last speed (or the last where it oscillates).
     frequency, direction
         Whirl frequency, rad/s, and 1 forward, −1 backward, 0 neither, where it starts.
     log_decrement
@@ -42,6 +43,7 @@ class Growing:
     speed: float
     from_start: bool
     last: float
+    end: float | None
     frequency: float
     direction: float
     log_decrement: float
@@ -59,6 +61,7 @@ class Growing:
             "speed_rpm": self.speed * RPM,
             "from_start": self.from_start,
             "last_speed_rad_s": self.last,
+            "end_rad_s": self.end,
             "frequency_rad_s": self.frequency,
             "direction": self.way,
             "lowest_log_decrement": self.log_decrement,
@@ -66,48 +69,57 @@ class Growing:
 
     def said(self) -> str:
         """What happens, as a warning."""
-        where = "already at" if self.from_start else "above"
+        where = ("already at " if self.from_start else "above ") + speed_text(self.speed)
+        if self.end is not None:
+            first = "the first speed, " if self.from_start else ""
+            where = f"from {first}{speed_text(self.speed)} to {speed_text(self.end)}"
         return (
-            f"unstable: mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows {where} "
-            f"{speed_text(self.speed)}, log decrement down to "
+            f"unstable: mode {self.mode} ({self.way} whirl, {self.frequency:.6g} rad/s) grows {where}, "
+            "log decrement down to "
             f"{self.log_decrement:.3g} in this range"
         )
 
 
 def growing(whirl: Whirl, values: ComplexArray, X: ComplexArray) -> tuple[Growing, ...]:
-    """Modes that grow somewhere, by the speed where they start to, from shapes (S, n) and (S, n, R)."""
+    """Ranges in which modes grow, by the speed where they start to, from shapes (S, n) and (S, n, R)."""
     growth = values.real / np.abs(values)
     grows = np.nan_to_num(growth, nan=-np.inf) > GROWTH
-    modes = [int(mode) for mode in np.flatnonzero(grows.any(axis=0))]
-    first = grows.argmax(axis=0)
     only = np.full_like(values, NONE)
-    for mode in modes:
-        k = first[mode]
-        if k > 0 and growth[k - 1, mode] < 0:
-            only[k - 1 : k + 1, mode] = values[k - 1 : k + 1, mode]
-    refined: dict[int, tuple[float, ComplexArray, ComplexArray]] = {}
+    runs = []
+    for mode in np.flatnonzero(grows.any(axis=0)).tolist():
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], grows[:, mode], [False])))).tolist()
+        runs += [(mode, start, end - 1) for start, end in zip(edges[::2], edges[1::2], strict=True)]
+    for mode, i, j in runs:
+        for k in (i - 1, j):
+            if 0 <= k < len(growth) - 1 and min(growth[k, mode], growth[k + 1, mode]) < 0:
+                only[k : k + 2, mode] = values[k : k + 2, mode]
+    roots: dict[int, list[tuple[float, ComplexArray, ComplexArray]]] = {}
     if np.isfinite(only).any():
         found = crossings(whirl, only, X, _level)
-        for i, mode in enumerate(found.modes):
-            refined[int(mode)] = (float(found.speeds[i]), found.values[i : i + 1], found.shapes[i : i + 1])
+        for c, mode in enumerate(found.modes.tolist()):
+            root = float(found.speeds[c]), found.values[c : c + 1], found.shapes[c : c + 1]
+            roots.setdefault(mode, []).append(root)
     out = []
-    for mode in modes:
-        k = int(first[mode])
-        from_start = k == 0 or not np.isfinite(values[k - 1, mode])
-        here = values[k : k + 1, mode], whirl.Q.nodes(X[k : k + 1, mode])
-        speed, lam, shape = refined.get(mode, (float(whirl.speeds[k]), here[0], here[1]))
+    speeds = whirl.speeds
+    for mode, i, j in runs:
+        here = float(speeds[i]), values[i : i + 1, mode], whirl.Q.nodes(X[i : i + 1, mode])
+        before = i > 0 and np.isfinite(values[i - 1, mode])
+        starts = [r for r in roots.get(mode, []) if before and speeds[i - 1] <= r[0] <= speeds[i]]
+        after = j + 1 < len(speeds) and np.isfinite(values[j + 1, mode])
+        ends = [r[0] for r in roots.get(mode, []) if after and speeds[j] <= r[0] <= speeds[j + 1]]
+        speed, lam, shape = starts[0] if starts else here
         lam, x, y = in_both_planes(lam, shape)
+        mine = values[i : j + 1, mode]
         out.append(
             Growing(
                 mode=mode + 1,
                 speed=speed,
-                from_start=from_start,
-                last=float(whirl.speeds[grows[:, mode]][-1]),
+                from_start=not before,
+                last=float(speeds[j]),
+                end=(ends[-1] if ends else float(speeds[j])) if after else None,
                 frequency=float(lam.imag[0]),
                 direction=float(whirl_direction(x, y)[0]),
-                log_decrement=float(
-                    np.nanmin(-2 * np.pi * values[:, mode].real / np.abs(values[:, mode].imag))
-                ),
+                log_decrement=float(np.nanmin(-2 * np.pi * mine.real / np.abs(mine.imag))),
             )
         )
     return tuple(sorted(out, key=lambda g: (g.speed, g.mode)))

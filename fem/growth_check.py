@@ -1,30 +1,51 @@
-"""Whether a steady response exists at all: a cheap look at the stability of the rotor that is asked about."""
+"""At which speeds a steady response exists at all: the stability of the rotor at every speed asked for."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
-from fem.model.supports import Support
+from fem.orbits import whirl_direction
+from fem.solvers.quadratic import solve
+from fem.solvers.stable_speeds import GROWTH, Bases, bases, growing_at, largest_growth
+from fem.whirl import in_both_planes
+from fem.windows import Window
 from rotorid.base.arrays import FloatArray
-from rotorid.base.units import speed_text
 
-_MODES = 6  # of lowest frequency that are looked at
-_PEAKS = 3
-_STEPS = 12  # of the search for the speed where growth starts
+_PARTS = 8  # into how many parts the step with an edge is divided
+_SLACK = 1e-12  # of the largest entry: rounding
 
 
-def surely_stable(rotor: Rotor) -> bool:
-    """Whether nothing feeds energy into whirl, so that no mode can grow.
+def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
+    """Frequency above which no mode grows at each speed, rad/s, shape (S,); 0: none grows, inf: not known.
 
-    So it is without material damping where each stiffness matrix is symmetric and holds, and no damping
-    matrix is negative; gyroscopic moments do no work.
+    Multiplied by the conjugate velocity, the equations of a growing motion (Re λ > 0) on positive stiffness
+    and damping show that work of the circulating forces exceeds that of the damping, which rises with the
+    frequency: q / c at a support, the speed itself for the material of the shaft. Gyroscopic moments do no
+    work.
     """
-    return not np.any(rotor.material_damping) and all(_passive(support) for support in rotor.supports)
+    bound = np.where(np.any(rotor.material_damping), speeds, 0.0)
+    for support in rotor.supports:
+        k, c = support.at(speeds)
+        tiny = _SLACK * np.abs(k).max(axis=(1, 2))
+        c = (c + np.swapaxes(c, 1, 2)) / 2
+        circulating = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2
+        braking = np.sqrt(np.maximum(np.linalg.det(c), 0.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            own = np.where(circulating > tiny, circulating / braking, 0.0)
+        own = np.where(
+            np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny, np.maximum(own, speeds), own
+        )
+        wrong = np.linalg.eigvalsh(c)[:, 0] < -_SLACK * np.abs(c).max(axis=(1, 2))
+        bound = np.maximum(bound, np.where(wrong, np.inf, own))
+    return np.asarray(bound)
 
 
-def growing_warning(rotor: Rotor, speeds: FloatArray, size: FloatArray) -> tuple[str, ...]:
-    """What to say if a mode grows at the first, middle or last speed, or at the largest peaks.
+def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
+    """Ranges of speed without a steady response, as far as they hold one of the speeds asked for.
+
+    Every speed is judged: first by `growth_bound`, then as `fem.solvers.stable_speeds` says.
 
     Parameters
     ----------
@@ -32,66 +53,71 @@ def growing_warning(rotor: Rotor, speeds: FloatArray, size: FloatArray) -> tuple
         The rotor.
     speeds
         rad/s, in any order, shape (S,).
-    size
-        How large the response is at each, shape (S,).
+
+    Raises
+    ------
+    ValueError
+        If the rotor on the mean stiffness of its supports is statically unstable.
     """
-    from fem.growth import GROWTH
-    from fem.matrices.lateral_planes import both_planes
-    from fem.solvers.reduced_whirl import solve_whirl
-    from fem.whirl import available_modes
-
-    order = np.argsort(speeds, kind="stable")
-    ranked, height = speeds[order], size[order]
-    inner = np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])) + 1
-    peaks = inner[np.argsort(-height[inner], kind="stable")[:_PEAKS]]
-    some = np.unique(ranked[[0, len(ranked) // 2, -1, *peaks]])
-    m = min(_MODES, available_modes(rotor))
-    try:
-        whirl = solve_whirl(both_planes(rotor), some, m)
-    except ValueError as problem:
-        return (f"whether the rotor is stable at these speeds is not known: {problem}",)
-    values = whirl.found.values
-    grows = np.nan_to_num(values.real / np.abs(values), nan=-np.inf) > GROWTH
-    away = [bool(real.size) and real.max() > 1e-6 * whirl.scale for real in whirl.found.real]
-    if not grows.any() and not any(away):
+    asked = np.unique(speeds)
+    bound = growth_bound(rotor, asked)
+    doubtful = bound > 0
+    if not doubtful.any():
         return ()
-    if not grows.any():
-        at = float(some[np.argmax(away)])
-        return (
-            f"the steady response does not exist at {at:.6g} rad/s: the rotor runs away without oscillating; "
-            "check negative stiffness",
-        )
-    return (_said(rotor, ranked, float(some[np.flatnonzero(grows.any(axis=1))[0]]), m),)
-
-
-def _said(rotor: Rotor, speeds: FloatArray, unstable: float, m: int) -> str:
-    """From which speed on which mode grows."""
-    from fem.campbell import campbell
-
-    below = float(speeds[0])
-    if unstable > below:
-        found = campbell(rotor, np.linspace(below, unstable, _STEPS + 1), m).unstable
-    else:
-        found = campbell(rotor, [unstable], m).unstable
-    if not found:
-        return f"the steady response does not exist at {unstable:.6g} rad/s: a mode grows"
-    first = found[0]
-    where = "at and above" if first.from_start else "above"
-    return (
-        f"the steady response does not exist {where} {speed_text(first.speed)}: "
-        f"mode {first.mode} ({first.way} whirl, {first.frequency:.6g} rad/s) grows there; amplitudes "
-        "computed there are never reached"
+    knots = np.unique([speed for support in rotor.supports for speed in support.speeds])
+    found = bases(both_planes(rotor), asked[doubtful], float(bound.max()))
+    grows = np.zeros(asked.size, dtype=bool)
+    grows[doubtful] = growing_at(found, asked[doubtful], knots)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], grows, [False]))))
+    return tuple(
+        _window(found, asked, knots, int(start), int(end) - 1)
+        for start, end in zip(edges[::2], edges[1::2], strict=True)
     )
 
 
-def _passive(support: Support) -> bool:
-    """Whether a support cannot drive whirl at any speed."""
-    if support.plain:
-        return bool(support.stiffness >= 0 and support.damping >= 0)
-    for k, c in zip(*support.at(np.array(support.speeds or (0.0,))), strict=True):
-        slack = 1e-12 * np.abs(k).max()
-        if abs(k[0, 1] - k[1, 0]) > slack or np.linalg.eigvalsh(k)[0] < -slack:
-            return False
-        if np.linalg.eigvalsh(c + c.T)[0] < -1e-12 * np.abs(c).max():
-            return False
-    return True
+def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
+    """`unstable_windows`, and what to say of them; also where stability cannot be judged."""
+    try:
+        windows = unstable_windows(rotor, speeds)
+    except ValueError as problem:
+        return (), (f"whether the rotor is stable at these speeds is not known: {problem}",)
+    return windows, tuple(window.said() for window in windows)
+
+
+def _window(found: Bases, asked: FloatArray, knots: FloatArray, i: int, j: int) -> Window:
+    """The window that holds the speeds number i to j."""
+    begins, ends = i > 0, j + 1 < asked.size
+    first = _edge(found, asked[i], asked[i - 1], knots) if begins else float(asked[i])
+    last = _edge(found, asked[j], asked[j + 1], knots) if ends else float(asked[j])
+    at = first if begins or not ends else last
+    pairs = solve(found.fine, np.array([at]), found.fine.size, found.scale)
+    values = pairs.values[0]
+    rates = np.nan_to_num(values.real / np.abs(values), nan=-1.0)
+    rates[np.nan_to_num(np.abs(values.imag)) > found.highest] = -1.0
+    k = int(np.argmax(rates))
+    real = float(pairs.real[0].max(initial=-found.scale))
+    if real > max(rates[k], 0.0) * found.scale:
+        return Window(first, last, begins, ends)
+    lam, x, y = in_both_planes(values[k : k + 1], found.fine.nodes(pairs.vectors[:1, k]))
+    return Window(first, last, begins, ends, k + 1, float(lam.imag[0]), float(whirl_direction(x, y)[0]))
+
+
+def _edge(found: Bases, unstable: float, stable: float, knots: FloatArray) -> float:
+    """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first."""
+    from scipy.optimize import brentq
+
+    # Where the mode decays beyond rounding on the other side, its growth vanishes at the edge.
+    level = 0.0 if largest_growth(found, np.array([stable]))[0] < -GROWTH else GROWTH
+
+    def excess(speeds: FloatArray) -> FloatArray:
+        return largest_growth(found, speeds) - level
+
+    between = knots[(knots > min(unstable, stable)) & (knots < max(unstable, stable))]
+    trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))
+    trials = trials if stable > unstable else trials[::-1]
+    over = excess(trials) > 0
+    k = int(np.argmin(over))
+    if over.all() or k == 0:
+        return unstable
+    a, b = float(trials[k - 1]), float(trials[k])
+    return float(brentq(lambda v: float(excess(np.array([v]))[0]), a, b, xtol=1e-13 * max(a, b), rtol=1e-12))

@@ -42,6 +42,8 @@ class Modes:
         Complex amplitudes of both lateral directions, shape (N, n), in the scale of `shapes`.
     warnings
         What the reader must know.
+    cut
+        Which critical speeds the bearing tables hold beyond the n asked for; else empty.
     """
 
     frequencies: FloatArray
@@ -52,6 +54,7 @@ class Modes:
     x: ComplexArray
     y: ComplexArray
     warnings: tuple[str, ...] = ()
+    cut: str = ""
 
     @property
     def positions(self) -> FloatArray:
@@ -71,6 +74,7 @@ class Modes:
             "positions_m": self.positions.tolist(),
             "mode_shapes": self.shapes.T.tolist(),
             "direction": list(self.direction),
+            "critical_speeds_cut": self.cut or None,
             "warnings": list(self.warnings),
         }
 
@@ -93,6 +97,7 @@ class Modes:
             lines.append(
                 f"{k:4d} {omega:11.4f} {omega * RPM:13.2f} {omega / (2 * np.pi):13.4f}{note}",
             )
+        lines += [self.cut] if self.cut else []
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
     def plot(self, ax: Axes | None = None) -> Axes:

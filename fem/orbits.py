@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 
+DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 STRAIGHT = 1e-9  # minor by major axis below which an orbit is a line: rounding, not whirl
 _SMALL = 1e-2  # area by the largest area of a mode below which a node has no say in its direction
 

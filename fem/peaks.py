@@ -35,6 +35,8 @@ Edition = Literal["2005", "1996"]
 HALF_POWER = float(np.sqrt(0.5))
 _UNDAMPED = 1e5  # an AF beyond which damping is none
 _POINTS = 6  # of the local polynomial
+UNLIMITED = 1e300  # amplitude of what nothing limits; infinities have no differences
+_NO_LIMIT = "practically undamped: AF exceeds 100000, damping does not limit the amplitude"
 
 
 @dataclass(frozen=True)
@@ -281,6 +283,8 @@ def _peak(
 ) -> Peak:
     speed = _maximum(curve, float(omega[k - 1]), float(omega[k]), float(omega[k + 1]))
     amplitude = curve(speed)
+    if amplitude >= UNLIMITED:
+        return _without_limit(speed, operating, edition)
     level = HALF_POWER * amplitude
     below, why_below = _half_power(omega, A, k, -1, curve, level, speed)
     above, why_above = _half_power(omega, A, k, 1, curve, level, speed)
@@ -295,20 +299,32 @@ def _peak(
             AF = speed / (omega[k + 1] - omega[k - 1])
         undamped = bool(_UNDAMPED < AF)
         if undamped:
-            notes.append("practically undamped: AF exceeds 100000, damping does not limit the amplitude")
+            notes.append(_NO_LIMIT)
         elif unresolved:
             AF = None
             notes.append("fewer than three speeds lie in the half-power band: take smaller steps here")
-    margin, required = None, None
-    if operating is not None:
-        low, high = operating
-        over = speed > high
-        margin = 100 * (speed - high) / high if over else max(0.0, 100 * (low - speed) / low)
-        if AF is not None:
-            # Inside the range any margin is missing; the smaller requirement is then said.
-            required = required_margin(AF, above=over, edition=edition)
+    margin, required = _margins(speed, AF, operating, edition)
     shown = None if undamped else AF
     return Peak(speed, amplitude, below, above, shown, margin, required, "; ".join(notes), undamped)
+
+
+def _without_limit(speed: float, operating: tuple[float, float] | None, edition: Edition) -> Peak:
+    """A peak that nothing limits."""
+    margin, required = _margins(speed, np.inf, operating, edition)
+    return Peak(speed, np.inf, None, None, None, margin, required, _NO_LIMIT, undamped=True)
+
+
+def _margins(
+    speed: float, AF: float | None, operating: tuple[float, float] | None, edition: Edition
+) -> tuple[float | None, float | None]:
+    """Separation margin, and what is required, percent."""
+    if operating is None:
+        return None, None
+    low, high = operating
+    over = speed > high
+    margin = 100 * (speed - high) / high if over else max(0.0, 100 * (low - speed) / low)
+    # Inside the range any margin is missing; the smaller requirement is then said.
+    return margin, None if AF is None else required_margin(AF, above=over, edition=edition)
 
 
 def _maximum(curve: Callable[[float], float], a: float, b: float, c: float) -> float:

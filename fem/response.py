@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth_check import growing_warning, surely_stable
+from fem.growth_check import judge
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
 from fem.model.rotor import Rotor
 from fem.model.sensors import SensorLike, as_sensors
+from fem.peaks import UNLIMITED, Edition, Peak, Peaks, find_peaks
+from fem.solvers.banded import rounding_warning
 from fem.solvers.eigen import fine_mesh_warning
-from fem.solvers.receptance import receptance
+from fem.solvers.receptance import Receptance, prepare
 from fem.vibration import BearingForces, InfluenceCoefficients, Response, phase_degrees
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "phase_degrees"]
-__all__ += ["unbalance_response"]
-
-Method = Literal["fast", "exact"]
+__all__ += ["response_peaks", "unbalance_response"]
 
 
 def unbalance_response(
@@ -28,13 +28,14 @@ def unbalance_response(
     unbalance: Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex],
     speeds: ArrayLike,
     *,
-    method: Method = "fast",
+    nodes: Sequence[int] | None = None,
 ) -> Response:
-    """Compute the synchronous vibration of all nodes.
+    """Compute the synchronous vibration of all nodes, or of some.
 
     The force is U ω² e^{iωt} on z = x + i y. The equations are those of the whole rotor as described: shaft
     with what its `Model` takes into account and its material damping, supports of any kind at the
-    running speed, pedestals.
+    running speed, pedestals. Modes with static corrections have an error far below 1e-6; where they lose
+    digits, banded equations are solved.
 
     Parameters
     ----------
@@ -44,9 +45,8 @@ def unbalance_response(
         `{node or station: m r e^{iφ}}`, kg·m, φ with the rotation from the mark.
     speeds
         rad/s, one or many, not negative.
-    method
-        "fast" (modes with static corrections; error far below 1e-6) or "exact" (banded equations solved at
-        every speed: a check).
+    nodes
+        Numbers of the nodes to keep; by default all. Few of them take little memory at many speeds.
 
     Raises
     ------
@@ -55,6 +55,7 @@ def unbalance_response(
         bearing table, or for a mesh too fine for float64.
     """
     speeds = _checked_speeds(speeds)
+    kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
     masses: dict[int, complex] = {}
     for key, value in dict(unbalance).items():
         node, amount = rotor.node(key), complex(value)
@@ -63,19 +64,100 @@ def unbalance_response(
         masses[node] = masses.get(node, 0j) + amount
     if not masses:
         raise ValueError("no unbalance is given: name at least one node")
-    U = np.array(list(masses.values()))
     A = assemble(rotor)
-    # The matrices are real: one complex load is two real ones.
+    loads, factors = _loads(A, masses)
+    ready = prepare(rotor, A, A.deflections, loads, speeds)
+
+    def solve(speeds: FloatArray) -> Response:
+        F, b = (np.zeros((speeds.size, kept.size), dtype=complex) for _ in range(2))
+        largest, where = np.empty(speeds.size), np.empty(speeds.size, dtype=np.intp)
+        doubts = []
+        for part, found in ready.parts(speeds):
+            force = (speeds[part] ** 2)[:, None]
+            forward = force * (found.F @ factors)
+            backward = np.zeros_like(forward) if found.b is None else force * (found.b @ factors)
+            size = np.abs(forward) + np.abs(backward)
+            F[part], b[part] = forward[:, kept - 1], backward[:, kept - 1]
+            largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
+            doubts.append(found.doubt)
+        said = (*_model_warnings(ready), *rounding_warning(doubts))
+        for array in (F, b, largest, where):
+            array.flags.writeable = False
+        return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve=solve)
+
+    return judged(solve(speeds))
+
+
+def response_peaks(
+    response: Response,
+    sensor: SensorLike,
+    *,
+    operating: tuple[float, float] | None = None,
+    edition: Edition = "2005",
+) -> Peaks:
+    """Find the peaks of one reading, evaluated by the model between the speeds of the response.
+
+    Parameters
+    ----------
+    response
+        At speeds between which no peak is hidden; those without a steady response do not count.
+    sensor
+        Where it is read.
+    operating, edition
+        As in `find_peaks`.
+
+    Raises
+    ------
+    ValueError
+        As `find_peaks`.
+    """
+    rotor, place = response.rotor, as_sensors((sensor,), response.rotor)[0]
+    A = assemble(rotor)
+    loads, factors = _loads(A, response.unbalance)
+    at = np.array([A.deflection(rotor.node(place.node))])
+    ready = prepare(rotor, A, at, loads, response.speeds)
+    turn = np.exp(1j * place.radians)
+
+    def reading(speed: float) -> float:
+        try:
+            ((_, found),) = ready.parts(np.array([speed]))
+        except ValueError:
+            return UNLIMITED  # undamped, and critical
+        F = (found.F @ factors)[0, 0] * turn.conjugate()
+        return float(speed**2 * abs(F if found.b is None else F + (found.b @ factors)[0, 0] * turn))
+
+    speeds, size = response.speeds, np.abs(response.at(sensor))
+    counted = response.steady & (speeds > 0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], counted, [False]))))
+    peaks: list[Peak] = []
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - start >= 3:
+            part = slice(start, end)
+            found = find_peaks(
+                speeds[part], size[part], operating=operating, edition=edition, evaluate=reading
+            )
+            peaks += found.peaks
+    return Peaks(tuple(peaks), operating, edition)
+
+
+def _loads(A: Matrices, masses: Mapping[int, complex]) -> tuple[FloatArray, ComplexArray]:
+    """Real load vectors of an unbalance, and their factors: one complex load is two real ones."""
+    U = np.array(list(masses.values()))
     loads = np.zeros((A.size, 2))
     at = [A.deflection(node) for node in masses]
     loads[at, 0], loads[at, 1] = U.real, U.imag
     used = np.flatnonzero(loads.any(axis=0))
     if not used.size:
         used = np.array([0])
-    F, b, warnings = _solve(rotor, A, A.deflections, loads[:, used], speeds, method)
-    factors = np.array([1.0, 1j])[used]
-    backward = np.zeros(F.shape[:2], dtype=complex) if b is None else b @ factors
-    return Response(speeds, _frozen(F @ factors), masses, rotor, warnings, _frozen(backward))
+    return loads[:, used], np.array([1.0, 1j])[used]
+
+
+def judged(response: Response) -> Response:
+    """The response with the ranges of speed in which it does not exist."""
+    windows, said = judge(response.rotor, response.speeds)
+    before = {window.said() for window in response.windows} | {*said}
+    kept = tuple(text for text in response.warnings if text not in before)
+    return replace(response, windows=windows, warnings=(*kept, *said))
 
 
 def influence(
@@ -83,8 +165,6 @@ def influence(
     planes: Sequence[str | int],
     sensors: Sequence[SensorLike],
     speeds: ArrayLike,
-    *,
-    method: Method = "fast",
 ) -> InfluenceCoefficients:
     """Compute influence coefficients W: vibration at sensors per unbalance in planes, [S] (33).
 
@@ -99,8 +179,6 @@ def influence(
         x with the rotation.
     speeds
         rad/s, one or many, not negative.
-    method
-        As in `unbalance_response`.
 
     Raises
     ------
@@ -116,34 +194,23 @@ def influence(
     loads[[A.deflection(rotor.node(plane)) for plane in planes], np.arange(len(planes))] = 1.0
     places = as_sensors(sensors, rotor)
     rows = np.array([A.deflection(rotor.node(sensor.node)) for sensor in places], dtype=np.intp)
-    W, b, warnings = _solve(rotor, A, rows, loads, speeds, method)
     turn = np.exp(1j * np.array([sensor.radians for sensor in places]))[:, None]
-    if b is not None:
-        W = W * turn.conj() + b * turn
-    elif any(sensor.angle for sensor in places):
-        W = W * turn.conj()
-    return InfluenceCoefficients(speeds, sensors, planes, _frozen(W), warnings)
+    ready = prepare(rotor, A, rows, loads, speeds)
+    W = np.empty((speeds.size, rows.size, len(planes)), dtype=complex)
+    doubts = []
+    for part, found in ready.parts(speeds):
+        reading = found.F * turn.conj()
+        if found.b is not None:
+            reading += found.b * turn
+        W[part] = (speeds[part] ** 2)[:, None, None] * reading
+        doubts.append(found.doubt)
+    windows, said = judge(rotor, speeds)
+    warnings = (*_model_warnings(ready), *rounding_warning(doubts), *said)
+    return InfluenceCoefficients(speeds, sensors, planes, _frozen(W), warnings, windows)
 
 
-def _solve(
-    rotor: Rotor,
-    A: Matrices,
-    rows: IndexArray,
-    loads: FloatArray,
-    speeds: FloatArray,
-    method: str,
-) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...]]:
-    if method not in ("fast", "exact"):
-        raise ValueError(f'method must be "fast" or "exact", not {method!r}')
-    F, b, warnings, rounding = receptance(rotor, A, rows, loads, speeds, method == "exact")
-    force = (speeds * speeds)[:, None, None]
-    F *= force
-    if b is not None:
-        b *= force
-    if not surely_stable(rotor):
-        size = np.abs(F).max(axis=(1, 2)) + (0.0 if b is None else np.abs(b).max(axis=(1, 2)))
-        warnings = (*warnings, *growing_warning(rotor, speeds, size))
-    return F, b, (*ignored_inertia(rotor), *fine_mesh_warning(rotor, rounding), *warnings)
+def _model_warnings(ready: Receptance) -> tuple[str, ...]:
+    return (*ignored_inertia(ready.rotor), *fine_mesh_warning(ready.rotor, ready.rounding))
 
 
 def _checked_speeds(speeds: ArrayLike) -> FloatArray:
@@ -159,6 +226,6 @@ def _checked_speeds(speeds: ArrayLike) -> FloatArray:
     return array
 
 
-def _frozen(array: ComplexArray) -> ComplexArray:
+def _frozen(array: AnyArray) -> AnyArray:
     array.flags.writeable = False
     return array

@@ -242,7 +242,7 @@ def _criticals(rotor: Rotor, n: int) -> FloatArray:
     """The n lowest, NaN for those that the model does not have."""
     for m in range(n, 0, -1):
         try:
-            found = critical_speeds(rotor, m).frequencies
+            found = critical_speeds(rotor, m).frequencies[:m]
         except ValueError:
             # Thin discs take critical speeds away; anything else is the user's to know.
             if m == 1 or not rotor.model.gyroscopic:

@@ -19,11 +19,11 @@ import numpy as np
 from fem.campbell import followed, runs_away
 from fem.matrices.lateral_planes import Quadratic
 from fem.model.rotor import Rotor
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.quadratic import Solutions, polish, solve
 from fem.solvers.reduced_whirl import Whirl, enriched
 from fem.solvers.tracking import likeness, mass_weight
-from fem.whirl import DIRECTION_NAMES, available_modes, checked_number, checked_speeds, in_both_planes
+from fem.whirl import available_modes, checked_number, checked_speeds, in_both_planes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.json import finite
 from rotorid.base.units import RPM, speed_text

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
-from rotorid.base.arrays import ComplexArray, FloatArray
+from fem.windows import Window, within
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.units import phase_deg, speed_text
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class Response:
     speeds
         rad/s, shape (S,).
     amplitudes
-        Forward complex amplitudes F, m, shape (S, N); positive phase = lead.
+        Forward complex amplitudes F, m, of the K nodes kept, shape (S, K); positive phase = lead.
     unbalance
         What was mounted, `{node: m r e^{iφ}}`, kg·m.
     rotor
@@ -38,7 +39,15 @@ class Response:
     warnings
         What the reader must know.
     backward
-        Complex amplitudes b, m, shape (S, N).
+        Complex amplitudes b, m, shape (S, K).
+    largest, largest_node
+        Longest half axis of all nodes' orbits, m, and the number of that node, shape (S,).
+    nodes
+        Numbers of the nodes kept, by default all, shape (K,).
+    windows
+        Ranges of speed in which no steady response exists: amplitudes there are never reached.
+    solve
+        The same at other speeds of the range, rad/s, ascending; not judged for stability.
     """
 
     speeds: FloatArray
@@ -47,26 +56,50 @@ class Response:
     rotor: Rotor
     warnings: tuple[str, ...]
     backward: ComplexArray
+    largest: FloatArray
+    largest_node: IndexArray
+    nodes: IndexArray
+    windows: tuple[Window, ...] = ()
+    solve: Callable[[FloatArray], Response] | None = field(default=None, repr=False)
+
+    @property
+    def steady(self) -> BoolArray:
+        """At which speeds a steady response exists, shape (S,)."""
+        return ~within(self.windows, self.speeds)
 
     @property
     def x(self) -> ComplexArray:
-        """Complex amplitudes of the deflection in x, m, shape (S, N)."""
+        """Complex amplitudes of the deflection in x, m, shape (S, K)."""
         return np.asarray(self.amplitudes + self.backward)
 
     @property
     def y(self) -> ComplexArray:
-        """Complex amplitudes of the deflection in y, m, shape (S, N)."""
+        """Complex amplitudes of the deflection in y, m, shape (S, K)."""
         return np.asarray(-1j * (self.amplitudes - self.backward))
 
     @property
     def major(self) -> FloatArray:
-        """Longer half axis of each orbit, m, shape (S, N)."""
+        """Longer half axis of each orbit, m, shape (S, K)."""
         return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
 
     @property
     def minor(self) -> FloatArray:
-        """Shorter half axis, m, shape (S, N); negative where the orbit runs against the rotation."""
+        """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
         return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+
+    def column(self, node: str | int) -> int:
+        """Which column of the amplitudes belongs to a node.
+
+        Raises
+        ------
+        ValueError
+            If there is no such node, or it was not kept.
+        """
+        number = self.rotor.node(node)
+        found = np.flatnonzero(self.nodes == number)
+        if not found.size:
+            raise ValueError(f"node {number} was not kept: name it in nodes=…")
+        return int(found[0])
 
     def at(self, sensor: SensorLike) -> ComplexArray:
         """Complex amplitude that a sensor reads over speed, m, shape (S,).
@@ -74,7 +107,7 @@ class Response:
         A node or station means the direction x; (node, angle) or a `Sensor` any other.
         """
         sensor = as_sensor(sensor, self.rotor)
-        i, turn = self.rotor.node(sensor.node) - 1, np.exp(1j * sensor.radians)
+        i, turn = self.column(sensor.node), np.exp(1j * sensor.radians)
         return np.asarray(self.amplitudes[:, i] * turn.conj() + self.backward[:, i] * turn)
 
     def bearing_forces(self) -> BearingForces:
@@ -82,21 +115,23 @@ class Response:
         X, Y = self.x, self.y
         forces = np.empty((2, self.speeds.size, len(self.rotor.supports)), dtype=complex)
         for k, support in enumerate(self.rotor.supports):
-            motion = np.stack((X[:, support.node - 1], Y[:, support.node - 1]), axis=1)
+            i = self.column(support.node)
+            motion = np.stack((X[:, i], Y[:, i]), axis=1)
             D = support.dynamic_stiffness(self.speeds)
             forces[:, :, k] = np.einsum("sij,sj->is", D, motion)
         forces.flags.writeable = False
-        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1])
+        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
-        sensors = list(range(1, self.rotor.n_nodes + 1) if sensors is None else sensors)
+        sensors = list(self.nodes.tolist() if sensors is None else sensors)
         Z = np.array([self.at(sensor) for sensor in sensors]).reshape(len(sensors), -1)
         return {
             "speeds_rad_s": self.speeds.tolist(),
             "sensors": [label(sensor) for sensor in sensors],
             "amplitude_m": np.abs(Z).tolist(),
             "phase_deg": phase_degrees(Z).tolist(),
+            "unstable_speeds": [window.to_dict() for window in self.windows],
             "warnings": list(self.warnings),
         }
 
@@ -104,10 +139,10 @@ class Response:
         """One row per speed and node: the reading in x; where x and y differ, also y and the orbit."""
         import pandas as pd
 
-        S, N = self.amplitudes.shape
+        S, K = self.amplitudes.shape
         columns = {
-            "speed_rad_s": np.repeat(self.speeds, N),
-            "node": np.tile(np.arange(1, N + 1), S),
+            "speed_rad_s": np.repeat(self.speeds, K),
+            "node": np.tile(self.nodes, S),
             "amplitude_m": np.abs(self.x).ravel(),
             "phase_deg": phase_degrees(self.x).ravel(),
         }
@@ -121,12 +156,14 @@ class Response:
         return pd.DataFrame(columns)
 
     def summary(self) -> str:
-        """The highest peak and where it is, as text."""
-        amplitude = self.major
-        k, i = np.unravel_index(int(np.argmax(amplitude)), amplitude.shape)
+        """The highest peak of a steady response and where it is, as text."""
+        k = largest_at(self.largest, self.steady)
         lines = [
             f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
-            f"largest amplitude {1e6 * amplitude[k, i]:.4g} µm at node {i + 1}, {speed_text(self.speeds[k])}",
+            "no steady response at any of these speeds"
+            if k is None
+            else f"largest amplitude {1e6 * self.largest[k]:.4g} µm at node {self.largest_node[k]}, "
+            f"{speed_text(self.speeds[k])}",
         ]
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
@@ -149,12 +186,15 @@ class BearingForces:
         What is loaded, length B.
     x, y
         Complex amplitudes, N, shape (S, B).
+    steady
+        At which speeds they exist, shape (S,).
     """
 
     speeds: FloatArray
     supports: Sequence[Support]
     x: ComplexArray
     y: ComplexArray
+    steady: BoolArray
 
     @property
     def largest(self) -> FloatArray:
@@ -199,9 +239,10 @@ class BearingForces:
         """The largest force on each support, as text."""
         lines = [f"{'support':>16}{'largest force, N':>18}{'at rad/s':>12}"]
         for support, force in zip(self.supports, self.largest.T, strict=True):
-            k = int(np.argmax(force))
+            k = largest_at(force, self.steady)
             name = support.name or f"node {support.node}"
-            lines.append(f"{name:>16}{force[k]:18.6g}{self.speeds[k]:12.6g}")
+            values = f"{'none':>18}{'-':>12}" if k is None else f"{force[k]:18.6g}{self.speeds[k]:12.6g}"
+            lines.append(f"{name:>16}{values}")
         return "\n".join(lines)
 
 
@@ -219,6 +260,8 @@ class InfluenceCoefficients:
         Complex, m per kg·m, shape (S, C, P); Z = W U, positive phase = lead.
     warnings
         What the reader must know.
+    windows
+        As in `Response`.
     """
 
     speeds: FloatArray
@@ -226,6 +269,7 @@ class InfluenceCoefficients:
     planes: tuple[str | int, ...]
     W: ComplexArray
     warnings: tuple[str, ...] = ()
+    windows: tuple[Window, ...] = ()
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane: the influence table of INTERFACE.md."""
@@ -247,7 +291,8 @@ class InfluenceCoefficients:
         keys = ("speed", "sensor", "plane", "influence", "phase")
         units = {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"}
         rows = self.to_frame().set_axis(list(keys), axis=1).to_dict("records")
-        return {"rows": rows, "units": units, "warnings": list(self.warnings)}
+        unstable = [window.to_dict() for window in self.windows]
+        return {"rows": rows, "units": units, "unstable_speeds": unstable, "warnings": list(self.warnings)}
 
     def summary(self) -> str:
         """A table at one speed, or the range of sizes over many, as text."""
@@ -258,12 +303,16 @@ class InfluenceCoefficients:
         ]
         if self.speeds.size > 1:
             lines[1] = f"{'sensor':>12}{'plane':>12}{'µm per g·mm, least':>20}{'largest':>12}{'at rad/s':>12}"
+        steady = ~within(self.windows, self.speeds)
         for c, sensor in enumerate(self.sensors):
             for p, plane in enumerate(self.planes):
                 size = np.abs(self.W[:, c, p])
-                k = int(np.argmax(size))
+                k = largest_at(size, steady)
                 line = f"{label(sensor)!s:>12}{plane!s:>12}"
-                if self.speeds.size > 1:
+                if k is None:
+                    line += f"{'none: unstable':>20}"
+                elif self.speeds.size > 1:
+                    size = np.where(steady, size, size[k])
                     line += f"{size.min():20.4g}{size[k]:12.4g}{self.speeds[k]:12.6g}"
                 else:
                     line += f"{size[0]:14.4g}{phase_degrees(self.W[:, c, p])[0]:17.2f}"
@@ -275,6 +324,11 @@ class InfluenceCoefficients:
         from fem.plots import draw_influence
 
         return draw_influence(self, ax)
+
+
+def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
+    """Where a size is largest of all that exist, both of shape (S,); None if none does."""
+    return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
 
 
 def phase_degrees(Z: ComplexArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,17 +11,14 @@ from numpy.typing import ArrayLike
 from fem.matrices.bands import assemble
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
-from fem.orbits import whirl_direction
+from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.eigen import finite_modes
-from fem.solvers.full_whirl import exact_modes
 from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
-
-DIRECTION_NAMES = {1.0: "forward", -1.0: "backward", 0.0: "mixed"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +108,8 @@ class WhirlModes:
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
 
-def whirl_modes(
-    rotor: Rotor, speed: float, n: int = 6, *, method: Literal["fast", "exact"] = "fast"
-) -> WhirlModes:
-    """Compute the whirl modes of lowest frequency at a speed.
+def whirl_modes(rotor: Rotor, speed: float, n: int = 6) -> WhirlModes:
+    """Compute the whirl modes of lowest frequency at a speed, in a reduced basis: to 1e-7 and better.
 
     Parameters
     ----------
@@ -124,8 +119,6 @@ def whirl_modes(
         rad/s.
     n
         How many modes that oscillate; forward and backward whirl count apart.
-    method
-        "fast" (a reduced basis whose error is known, below 1e-7) or "exact" (the full model: a check).
 
     Raises
     ------
@@ -136,19 +129,12 @@ def whirl_modes(
     speeds = checked_speeds([speed])
     P = both_planes(rotor)
     n = checked_number(rotor, n)
-    if method not in ("fast", "exact"):
-        raise ValueError(f'method must be "fast" or "exact", not {method!r}')
-    if method == "exact":
-        values, vectors, real, still = exact_modes(P, float(speeds[0]), n)
-        shapes = vectors[:, :, :: P.A.stride]
-        error = 0.0
-    else:
-        solution = solve_whirl(P, speeds, n)
-        values, real = solution.found.values[0], solution.found.real[0]
-        still, error = int(solution.found.still[0]), solution.error
-        there = np.isfinite(values)
-        values = values[there]
-        shapes = solution.Q.nodes(solution.found.vectors[0, there])
+    solution = solve_whirl(P, speeds, n)
+    values, real = solution.found.values[0], solution.found.real[0]
+    still = int(solution.found.still[0])
+    there = np.isfinite(values)
+    values = values[there]
+    shapes = solution.Q.nodes(solution.found.vectors[0, there])
     if not values.size:
         raise ValueError(
             f"the rotor has no oscillating mode at {speed:.6g} rad/s: all motions are overdamped"
@@ -157,7 +143,7 @@ def whirl_modes(
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
     x, y = x.T / size, y.T / size
     warnings = told(P.planes, real, still, values.size, n)
-    return WhirlModes(float(speeds[0]), values, x, y, real, error, rotor, warnings)
+    return WhirlModes(float(speeds[0]), values, x, y, real, solution.error, rotor, warnings)
 
 
 def in_both_planes(

@@ -137,7 +137,8 @@ def modal_shapes(
         raise ValueError(f"the model has only {found.shapes.shape[1]} of {modes} modes in reach")
     nodes = planes.values() if isinstance(planes, Mapping) else planes
     rows = [rotor.node(node) - 1 for node in nodes]
-    return np.asarray(found.shapes[rows] / np.abs(found.shapes).max(axis=0))
+    shapes = found.shapes[:, :modes]
+    return np.asarray(shapes[rows] / np.abs(shapes).max(axis=0))
 
 
 def _radii(planes: Mapping[str, str | int], radii: Mapping[str, float] | None) -> FloatArray:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import attachment, number
 
+ROUNDED = 5e-6  # relative error of a speed that was written with six digits: it does not end a table
 Matrix2 = tuple[tuple[float, float], tuple[float, float]]
 Coefficient = float | Matrix2  # isotropic, or ((xx, xy), (yx, yy))
 Pair = float | tuple[float, float]  # in both directions, or in x and in y
@@ -158,7 +159,7 @@ class Support:
         Raises
         ------
         ValueError
-            Outside the table: it is never extrapolated.
+            Outside the table, but for the rounding of six digits: it is never extrapolated.
         """
         omega = np.asarray(omega, dtype=float)
         if self.constant:
@@ -166,7 +167,7 @@ class Support:
             shape = (*omega.shape, 2, 2)
             return np.broadcast_to(k, shape), np.broadcast_to(c, shape)
         first, last = self.speeds[0], self.speeds[-1]
-        slack = 1e-12 * last
+        slack = ROUNDED * last
         if omega.size and not (omega.min() >= first - slack and omega.max() <= last + slack):
             outside = omega.min() if omega.min() < first - slack else omega.max()
             raise ValueError(

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.model.sensors import label
-from rotorid.base.arrays import FloatArray
+from fem.windows import Window, within
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.style import (
     COLORS,
     MARKERS,
@@ -19,6 +20,7 @@ from rotorid.base.style import (
     new_axes,
     plain,
     rpm_above,
+    shade_unstable,
 )
 from rotorid.base.units import RPM
 
@@ -36,10 +38,10 @@ def draw_response(response: Response, ax: Axes | None, nodes: Sequence[str | int
         # Where a machine is measured, and where it moves most.
         named_nodes: list[str | int] = [*response.rotor.stations]
         named_nodes = named_nodes or [support.node for support in response.rotor.supports]
-        nodes = list(dict.fromkeys([*named_nodes, int(np.argmax(amplitude.max(axis=0))) + 1]))
+        nodes = list(dict.fromkeys([*named_nodes, int(response.nodes[np.argmax(amplitude.max(axis=0))])]))
     named = [f"node {node}" if isinstance(node, int) else str(node) for node in nodes]
-    curves = amplitude[:, [response.rotor.node(node) - 1 for node in nodes]]
-    return _over_speed(ax, response.speeds, 1e6 * curves, named, "amplitude, µm")
+    curves = amplitude[:, [response.column(node) for node in nodes]]
+    return _over_speed(ax, response.speeds, 1e6 * curves, named, "amplitude, µm", response.windows)
 
 
 def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
@@ -50,7 +52,7 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
     ]
     # 1 m per kg·m is 1 µm per g·mm.
     curves = np.abs(influence.W).reshape(S, -1)
-    return _over_speed(ax, influence.speeds, curves, named, "influence, µm per g·mm")
+    return _over_speed(ax, influence.speeds, curves, named, "influence, µm per g·mm", influence.windows)
 
 
 def draw_bode(
@@ -61,6 +63,7 @@ def draw_bode(
     *,
     peaks: Sequence[tuple[float, str]] = (),
     operating: tuple[float, float] | None = None,
+    windows: Sequence[Window] = (),
 ) -> tuple[Axes, Axes]:
     """Draw amplitude and phase of readings over speed.
 
@@ -78,6 +81,8 @@ def draw_bode(
         Speeds to mark, rad/s, each with a text for the amplitude's axes.
     operating
         Range of operating speeds, rad/s, shaded.
+    windows
+        Ranges without a steady response: hatched, and nothing is drawn there.
 
     Returns
     -------
@@ -93,15 +98,20 @@ def draw_bode(
         axes = above, below
     above, below = axes
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
-    _over_speed(above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak")
+    _over_speed(above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak", windows)
+    shade_unstable(below, _ranges(windows), "")
+    steady = ~within(tuple(windows), omega)
     for k, reading in enumerate(Z.T):
         style = _style(k, len(labels))
-        seen = np.abs(reading) > 0
+        seen = steady & (np.abs(reading) > 0)
         phase = np.degrees(np.unwrap(np.angle(reading[seen])))
         if phase.size:
             # The middle of the curve between -360 and 0: a lag, as engineers read it.
             phase -= 360 * np.ceil(np.median(phase) / 360)
-        below.plot(omega[seen], phase, style, color=COLORS[k % len(COLORS)], linewidth=1.6)
+        shown = seen | ~steady
+        below.plot(
+            omega[shown], _with_gaps(phase, seen)[shown], style, color=COLORS[k % len(COLORS)], linewidth=1.6
+        )
     plain(below)
     below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
     below.yaxis.set_major_locator(_right_angles(below))
@@ -142,7 +152,13 @@ def draw_bode(
 
 
 def draw_polar(
-    speeds: ArrayLike, readings: ArrayLike, labels: Sequence[str], ax: Axes | None = None, *, marks: int = 6
+    speeds: ArrayLike,
+    readings: ArrayLike,
+    labels: Sequence[str],
+    ax: Axes | None = None,
+    *,
+    marks: int = 6,
+    windows: Sequence[Window] = (),
 ) -> Axes:
     """Draw readings as curves in the plane (Nyquist): distance is amplitude, angle is phase lead.
 
@@ -154,17 +170,22 @@ def draw_polar(
         Polar axes; new ones if None.
     marks
         About how many speeds to write along each curve.
+    windows
+        Ranges without a steady response, which are left out.
     """
     if ax is None:
         from matplotlib import pyplot as plt
 
         _, ax = plt.subplots(figsize=(7.5, 7), layout="constrained", subplot_kw={"projection": "polar"})
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
+    steady = ~within(tuple(windows), omega)
+    omega, Z = omega[steady], Z[steady]
     marked: list[complex] = []
     for k, (reading, named) in enumerate(zip(Z.T, labels, strict=True)):
         color = COLORS[k % len(COLORS)]
         phase, size = np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
-        ax.plot(phase, size, STYLES[k % len(STYLES)], color=color, linewidth=1.6, label=named)
+        curve = _with_gaps(phase, steady), _with_gaps(size, steady)
+        ax.plot(*curve, STYLES[k % len(STYLES)], color=color, linewidth=1.6, label=named)
         for i in _along(reading, marks):
             if any(abs(reading[i] - other) < 0.05 * np.abs(Z).max() for other in marked):
                 continue
@@ -186,6 +207,17 @@ def draw_polar(
     ax.set_xlabel("amplitude, µm peak, over phase lead in degrees; marks: speed in rpm", labelpad=10)
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), ncols=3, frameon=False, fontsize="small")
     return ax
+
+
+def _ranges(windows: Sequence[Window]) -> list[tuple[float, float]]:
+    return [(window.first, window.last) for window in windows]
+
+
+def _with_gaps(values: FloatArray, there: BoolArray) -> FloatArray:
+    """Values of the places that are there, with NaN at the others."""
+    out = np.full(there.shape, np.nan)
+    out[there] = values
+    return out
 
 
 def _along(curve: np.ndarray[tuple[int], np.dtype[np.complex128]], marks: int) -> list[int]:
@@ -212,9 +244,16 @@ def _style(k: int, n: int) -> str:
 
 
 def _over_speed(
-    ax: Axes | None, speeds: FloatArray, curves: FloatArray, labels: Sequence[str], ylabel: str
+    ax: Axes | None,
+    speeds: FloatArray,
+    curves: FloatArray,
+    labels: Sequence[str],
+    ylabel: str,
+    windows: Sequence[Window],
 ) -> Axes:
     ax = new_axes() if ax is None else ax
+    curves = np.where(within(tuple(windows), speeds)[:, None], np.nan, curves)
+    shade_unstable(ax, _ranges(windows))
     n = len(COLORS)
     order = np.argsort(speeds, kind="stable")
     marker = "o" if speeds.size < 12 else None

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, QUIET, VERMILION, hertz_beside, new_axes, plain, rpm_above
+from rotorid.base.style import (
+    COLORS,
+    QUIET,
+    VERMILION,
+    hertz_beside,
+    new_axes,
+    plain,
+    rpm_above,
+    shade_unstable,
+)
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -56,14 +65,17 @@ def campbell_figure(
     criticals: Sequence[tuple[float, float]] = (),
     *,
     operating: tuple[float, float] | None = None,
+    unstable: Sequence[tuple[float, float]] = (),
 ) -> Figure:
-    """Make a figure of a Campbell diagram over its logarithmic decrements."""
+    """Make a figure of a Campbell diagram over its logarithmic decrements; unstable speeds are hatched."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 8.5), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(5, 3))
     draw_campbell(campbell, above, criticals=criticals, operating=operating)
     draw_log_decrements(campbell, below)
+    for ax, word in ((above, "unstable"), (below, "")):
+        shade_unstable(ax, unstable, word)
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     return figure

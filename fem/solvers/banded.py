@@ -9,6 +9,8 @@ material damping takes no part in forward whirl, which does not strain the turni
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from fem.matrices.bands import Matrices, general, multiply
@@ -23,10 +25,10 @@ AT_CRITICAL = 1e-8  # relative distance of λ from ω² at which an undamped rot
 
 def solve_banded(
     rotor: Rotor, A: Matrices, at: Supported, rows: IndexArray, loads: FloatArray, speeds: FloatArray
-) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...]]:
+) -> tuple[ComplexArray, ComplexArray | None, tuple[float, float]]:
     """Amplitudes F and b, each of shape (S, a, b), at unknowns `rows` under forward loads.
 
-    Also a warning where rounding the entries of K changes the result by more than 1e-6 of itself; it is
+    Also by how much of itself rounding the entries of K changes the result, and at which speed, rad/s; it is
     looked for at the slowest and fastest speed and at the largest response. b is None for one plane.
 
     Raises
@@ -75,13 +77,18 @@ def solve_banded(
     suspects = {int(np.argmin(speeds)), int(np.argmax(speeds)), int(np.argmax(size))}
     errors = {k: _sensitivity(A, loads, deflection(k)[::planes, :-1]) for k in suspects}
     worst = max(errors, key=errors.__getitem__)
-    warnings: tuple[str, ...] = ()
-    if errors[worst] >= 1e-6:
-        warnings = (
-            f"near {speeds[worst]:.6g} rad/s rounding may change the response by {errors[worst]:.0e} of "
-            "itself: hardly any damping limits it, or the mesh is too fine, or the speed is very low",
-        )
-    return parts[0], parts[1] if planes == 2 else None, warnings
+    return parts[0], parts[1] if planes == 2 else None, (errors[worst], float(speeds[worst]))
+
+
+def rounding_warning(doubts: Iterable[tuple[float, float] | None]) -> tuple[str, ...]:
+    """A sentence where rounding changes more than 1e-6 of some response: relative errors and their speeds."""
+    error, speed = max((doubt for doubt in doubts if doubt is not None), default=(0.0, 0.0))
+    if error < 1e-6:
+        return ()
+    return (
+        f"near {speed:.6g} rad/s rounding may change the response by {error:.0e} of "
+        "itself: hardly any damping limits it, or the mesh is too fine, or the speed is very low",
+    )
 
 
 def unlimited(omega: float) -> ValueError:
@@ -120,10 +127,12 @@ def _check_limited(
     """
     work = np.abs(np.einsum("i,is->s", probe, X[:, 0]))
     energy = np.zeros(speeds.size)
-    stiffness = A.shaft + rigid_scale(rotor) * A.mass if A.rigid else A.shaft
+    # Rigid-body motions have λ = 0: only a rotor at rest stands there.
+    inertia = np.where(speeds == 0, rigid_scale(rotor), 0.0) if A.rigid else np.zeros(speeds.size)
     for plane in range(X.shape[1]):
         for part in (X[:, plane].real, X[:, plane].imag):
-            energy += np.einsum("is,is->s", part, multiply(stiffness, part))
+            energy += np.einsum("is,is->s", part, multiply(A.shaft, part))
+            energy += inertia * np.einsum("is,is->s", part, multiply(A.mass, part))
         held = np.abs(at.stiffness[:, :, plane, plane]) * np.abs(X[feet, plane]).T ** 2
         energy += held.sum(axis=1)
     wrong = work <= AT_CRITICAL * energy

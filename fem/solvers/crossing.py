@@ -25,6 +25,8 @@ _STEPS = 60
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends
 _JUMP = 1e-4  # the same of a rank: more is a mode that came or went
 _NOTHING = 1e-11  # of the largest |f|: rounding
+_FALL = 3.0  # times the width of an interval: more a function does not fall within it
+_SLOPE = 1e-4  # of an interval: step for a slope
 _PARTS = 8  # into how many parts a doubtful bracket is divided
 _SAME = 0.9  # MAC of a mode before and after the last digits
 Function = Callable[[ComplexArray, FloatArray], FloatArray]
@@ -54,7 +56,12 @@ class Crossings:
 
 def synchronous(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> Crossings:
     """Speeds that equal the whirl frequency of a mode."""
-    return crossings(whirl, values, vectors, lambda lam, speed: np.abs(lam.imag) - speed)
+    return crossings(whirl, values, vectors, off_synchronous)
+
+
+def off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
+    """Whirl frequency less the speed."""
+    return np.asarray(np.abs(lam.imag) - speed)
 
 
 def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> Crossings:
@@ -93,6 +100,34 @@ def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, functio
         X = np.where(good[:, None], Y, X)
     order = np.argsort(found, kind="stable")
     return Crossings(found[order], mode[order], lam[order], Q.nodes(X[order]))
+
+
+def turns(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> FloatArray:
+    """Speeds between those given near which a function of a mode turns towards zero, ascending.
+
+    There it may vanish twice without a change of sign. Only intervals count over which it may fall so far:
+    by its slopes at both ends, of a step of the model.
+    """
+    speeds, Q = whirl.speeds, whirl.Q
+    f = function(values, speeds[:, None])
+    width = np.diff(speeds)[:, None]
+    k, mode = np.nonzero((f[:-1] * f[1:] > 0) & (np.minimum(np.abs(f[:-1]), np.abs(f[1:])) < _FALL * width))
+    if not k.size:
+        return np.empty(0)
+    sign, h = np.sign(f[k, mode]), width[k, 0]
+    slopes = []
+    for end, way in ((k, 1), (k + 1, -1)):
+        step = way * _SLOPE * h
+        near = speeds[end] + step
+        lam, _, _ = polish(Q, near, np.arange(k.size), values[end, mode], vectors[end, mode], 2)
+        slopes.append(sign * (function(lam, near) - f[end, mode]) / step)
+    first, last = slopes
+    before, after = sign * f[k, mode], sign * f[k + 1, mode]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meet = (after - before - last * h) / (first - last)  # from the start, where the tangents meet
+        deep = (first < 0) & (last > 0) & (before + first * meet < 0)
+    part = np.clip(meet[deep] / h[deep], 0.05, 0.95)
+    return np.unique(speeds[k][deep] + part * h[deep])
 
 
 def _verified(

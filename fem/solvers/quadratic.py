@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.matrices.lateral_planes import Quadratic
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 NONE = complex(np.nan, np.nan)  # no mode: neither part of it may pass for a number
 _SHIFT = 0.3  # σ in units of the reference frequency
@@ -81,6 +81,18 @@ def solve(Q: Quadratic, speeds: FloatArray, m: int, scale: float, *, left: bool 
     for k in _degenerate(values):
         vectors[k] = _by_elimination(A[k], values[k], scale, Q.size)
     return Solutions(values, vectors, others, real, still)
+
+
+def all_values(Q: Quadratic, speeds: FloatArray, scale: float) -> tuple[ComplexArray, BoolArray]:
+    """All eigenvalues at each speed, shape (S, 2 R), and which of them belong to motions that oscillate.
+
+    Motions without mass, and rigid-body motions without stiffness, count as −scale.
+    """
+    D, K = Q.at(speeds)
+    lam, finite = _values(np.asarray(np.linalg.eigvals(_companion(Q.M, D, K, scale)), dtype=complex), scale)
+    size = np.abs(lam)
+    moving = finite & (size >= _STILL * scale)
+    return np.where(moving, lam, -scale), moving & (np.abs(lam.imag) > _REAL * size)
 
 
 def polish(
@@ -176,13 +188,18 @@ def _companion(M: FloatArray, D: AnyArray, K: AnyArray, scale: float) -> AnyArra
     return A
 
 
+def _values(mu: ComplexArray, scale: float) -> tuple[ComplexArray, BoolArray]:
+    """λ from μ, and which are finite."""
+    # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
+    finite = np.abs(mu) > _INFINITE * np.abs(mu).max(axis=1)[:, None]
+    return np.asarray(scale * (_SHIFT + 1 / np.where(finite, mu, 1.0))), np.asarray(finite)
+
+
 def _sorted(
     mu: ComplexArray, scale: float, m: int, planes: int
 ) -> tuple[ComplexArray, tuple[FloatArray, ...], IndexArray]:
     """Values of the m lowest oscillating modes, and what does not oscillate."""
-    # Motions without mass have μ = 0, as double eigenvalues that rounding turns into the root of its size.
-    finite = np.abs(mu) > _INFINITE * np.abs(mu).max(axis=1)[:, None]
-    lam = scale * (_SHIFT + 1 / np.where(finite, mu, 1.0))
+    lam, finite = _values(mu, scale)
     size = np.abs(lam)
     still = finite & (size < _STILL * scale)
     oscillates = finite & ~still & (np.abs(lam.imag) > _REAL * size)
@@ -204,7 +221,7 @@ def _inverse_iteration(
     D: AnyArray,
     K: AnyArray,
     values: ComplexArray,
-    there: np.ndarray[tuple[int, ...], np.dtype[np.bool_]],
+    there: BoolArray,
 ) -> ComplexArray:
     k, _ = np.nonzero(there)
     P = _dynamic(M, D, K, k, values[there])

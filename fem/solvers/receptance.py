@@ -9,6 +9,7 @@ coupled. A bound on what the series leaves out decides how long it must be. The 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from fem.matrices.dynamic_stiffness import Supported, supported
 from fem.matrices.pencil import Pencil, one_plane
 from fem.model.rotor import Rotor
 from fem.solvers.banded import solve_banded
-from fem.solvers.eigen import DENSE, Spectrum, finite_modes, lowest_modes, rigid_scale
+from fem.solvers.eigen import DENSE, Spectrum, factor, finite_modes, lowest_modes, rigid_scale
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 TOLERANCE = 1e-10  # of the series, relative to the response
@@ -51,10 +52,95 @@ class _Series:
         return np.asarray((self.factors @ terms).reshape(*self.shape, -1))
 
 
-def receptance(
-    rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray, exact: bool
-) -> tuple[ComplexArray, ComplexArray | None, tuple[str, ...], FloatArray]:
-    """Deflections at unknowns `rows` under real load vectors rotating at each speed.
+@dataclass(frozen=True, eq=False)
+class Receptance:
+    """Deflections under loads that rotate with the rotor, ready for any speed of a range.
+
+    Attributes
+    ----------
+    rotor, A
+        The rotor and its matrices.
+    rows
+        Unknowns from 0, shape (a,).
+    loads
+        Real load vectors, shape (size, b).
+    reference
+        Springs {node: N/m} of the conservative rotor.
+    moving
+        Which of these differ from what the supports do, shape (s,).
+    forward, backward
+        Series of both directions; None where the banded equations are solved instead, or one is enough.
+    spectra
+        Of the conservative rotors.
+    beta
+        Material damping, s.
+    """
+
+    rotor: Rotor
+    A: Matrices
+    rows: IndexArray
+    loads: FloatArray
+    reference: dict[int, float]
+    moving: IndexArray
+    forward: _Series | None
+    backward: _Series | None
+    spectra: tuple[Spectrum, ...]
+    beta: float
+
+    @property
+    def rounding(self) -> FloatArray:
+        """As in `Spectrum`."""
+        return self.spectra[0].rounding
+
+    def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, Amplitudes]]:
+        """Amplitudes at speeds in rad/s, some speeds at a time, so that memory does not grow with them."""
+        for start in range(0, speeds.size, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            yield part, self._at(speeds[part])
+
+    def _at(self, speeds: FloatArray) -> Amplitudes:
+        at = supported(self.rotor, speeds)
+        if self.forward is None:
+            return Amplitudes(*solve_banded(self.rotor, self.A, at, self.rows, self.loads, speeds))
+        a, change = self.rows.size, _change(at, self.reference)[:, self.moving]
+        near = np.zeros(speeds.size, dtype=bool)
+        for spectrum in self.spectra:
+            near |= _near(spectrum, speeds)
+        b = None
+        if self.backward is None:
+            if at.planes == 2:
+                b = np.zeros((speeds.size, a, self.loads.shape[1]), dtype=complex)
+            F, lost = _one_plane(self.forward, a, self.moving.size, change[..., 0, 0], speeds, near)
+        else:
+            springs = np.array(list(self.reference.values()))[self.moving]
+            F, b, lost = _two_planes(self.forward, self.backward, a, change, self.beta, springs, speeds, near)
+        near |= lost
+        if not near.any():
+            return Amplitudes(F, b, None)
+        few = Supported(at.nodes, at.stiffness[near], at.reference, at.planes)
+        F[near], behind, doubt = solve_banded(self.rotor, self.A, few, self.rows, self.loads, speeds[near])
+        if b is not None and behind is not None:
+            b[near] = behind
+        return Amplitudes(F, b, doubt)
+
+
+@dataclass(frozen=True, eq=False)
+class Amplitudes:
+    """Forward and backward amplitude per unit of load, z = F e^{iωt} + b̄ e^{−iωt}, each of shape (S, a, b).
+
+    b is None on rotationally symmetric supports; `doubt` is the largest relative error that rounding of the
+    banded equations may cause, and the speed, rad/s: None where they were not solved.
+    """
+
+    F: ComplexArray
+    b: ComplexArray | None
+    doubt: tuple[float, float] | None
+
+
+def prepare(
+    rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray, exact: bool = False
+) -> Receptance:
+    """Modes and series for deflections at unknowns `rows` under real load vectors rotating at each speed.
 
     Parameters
     ----------
@@ -65,19 +151,9 @@ def receptance(
     loads
         Shape (size, b).
     speeds
-        rad/s, shape (S,).
+        rad/s, shape (S,): the range in which it is to be used.
     exact
         Solve the banded system at every speed instead of at the few where the fast way loses digits.
-
-    Returns
-    -------
-    F, b
-        Forward and backward amplitude per unit of load, z = F e^{iωt} + b̄ e^{−iωt}, shape (S, a, b); b is
-        None on rotationally symmetric supports.
-    warnings
-        Said where damping is so light that rounding of the banded equations shows.
-    rounding
-        As in `Spectrum`.
 
     Raises
     ------
@@ -85,69 +161,44 @@ def receptance(
         At a critical speed that no damping limits, or outside a bearing table.
     """
     at = supported(rotor, speeds)
-    reference = _reference(rotor, at)
+    reference = _reference(rotor, A, at)
     feet = np.array([A.deflection(node) for node in reference], dtype=np.intp)
-    change = _change(at, reference)
-    moving = np.flatnonzero(np.abs(change).max(axis=(0, 2, 3), initial=0.0) > 0)
-    feet, change = feet[moving], change[:, moving]
+    varies = {support.node for support in rotor.supports if not support.plain}
+    change = np.abs(_change(at, reference)).max(axis=(0, 2, 3), initial=0.0) > 0
+    moving = np.flatnonzero(change | np.array([node in varies for node in reference], dtype=bool))
+    feet = feet[moving]
     top = float(speeds.max())
 
-    forward_pencil = one_plane(rotor, A, 1, reference)
-    spectrum = _modes_for(forward_pencil, top)
-    near = _near(spectrum, speeds)
-    columns = np.hstack((loads, _units(A, feet)))
-    forward = None if exact else _series(forward_pencil, spectrum, np.concatenate((rows, feet)), columns, top)
+    pencil = one_plane(rotor, A, 1, reference)
+    spectra = [_modes_for(pencil, top)]
+    both = np.concatenate((rows, feet))
+    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, feet))), top)
     backward = None
-    beta = 0.0
+    beta = _uniform(rotor)
     if at.planes == 2 and forward is not None and feet.size:
-        material = _uniform(rotor)
-        if material is None:
+        if beta is None:
             forward = None
         else:
-            beta = material
-            behind = forward_pencil if not rotor.model.gyroscopic else one_plane(rotor, A, -1, reference)
-            others = spectrum if behind is forward_pencil else _modes_for(behind, top)
-            near |= _near(others, speeds)
-            backward = _series(behind, others, np.concatenate((rows, feet)), _units(A, feet), top)
+            behind = pencil if not rotor.model.gyroscopic else one_plane(rotor, A, -1, reference)
+            if behind is not pencil:
+                spectra.append(_modes_for(behind, top))
+            backward = _series(behind, spectra[-1], both, _units(A, feet), top)
             forward = None if backward is None else forward
-    if forward is None:
-        return *solve_banded(rotor, A, at, rows, loads, speeds), spectrum.rounding
-
-    a = rows.size
-    # Speeds last: what one formula writes for many speeds stands together.
-    F = np.moveaxis(np.empty((a, loads.shape[1], speeds.size), dtype=complex), 2, 0)
-    b = (
-        np.moveaxis(np.zeros((a, loads.shape[1], speeds.size), dtype=complex), 2, 0)
-        if at.planes == 2
-        else None
+    return Receptance(
+        rotor, A, rows, loads, reference, moving, forward, backward, tuple(spectra), beta or 0.0
     )
-    for start in range(0, speeds.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        omega, skip = speeds[part], near[part]
-        if backward is None or b is None:
-            F[part], lost = _one_plane(forward, a, feet.size, change[part, :, 0, 0], omega, skip)
-        else:
-            F[part], b[part], lost = _two_planes(
-                forward, backward, a, change[part], beta, _spring(reference, moving), omega, skip
-            )
-        near[part] |= lost
-    if not near.any():
-        return F, b, (), spectrum.rounding
-    few = Supported(at.nodes, at.stiffness[near], at.reference, at.planes)
-    F[near], behind_near, warnings = solve_banded(rotor, A, few, rows, loads, speeds[near])
-    if b is not None and behind_near is not None:
-        b[near] = behind_near
-    return F, b, warnings, spectrum.rounding
 
 
-def _reference(rotor: Rotor, at: Supported) -> dict[int, float]:
-    """Springs {node: N/m} of the conservative rotor; a gyroscopic one must be held."""
+def _reference(rotor: Rotor, A: Matrices, at: Supported) -> dict[int, float]:
+    """Springs {node: N/m} of the conservative rotor; a gyroscopic one may have to be held."""
     springs = dict(zip(at.nodes, at.reference.tolist(), strict=True))
-    if not rotor.model.gyroscopic:
-        return springs
-    # M − G may be negative in a rigid motion, so that no shift makes K + σ M positive.
     hold = rigid_scale(rotor) * rotor.total_mass
-    if sum(k > 1e-3 * hold for k in springs.values()) < 2:
+    if not rotor.model.gyroscopic or sum(k > 1e-3 * hold for k in springs.values()) >= 2:
+        return springs
+    try:
+        factor(one_plane(rotor, A, 1, springs))
+    except ValueError:
+        # M − G is negative in a rigid motion, so that no shift makes K + σ M positive.
         for node in (1, rotor.n_nodes):
             springs[node] = springs.get(node, 0.0) + hold
     return springs
@@ -161,10 +212,6 @@ def _change(at: Supported, reference: dict[int, float]) -> ComplexArray:
     for i in (0, 1):
         change[:, :, i, i] -= springs
     return change
-
-
-def _spring(reference: dict[int, float], moving: IndexArray) -> FloatArray:
-    return np.array(list(reference.values()))[moving]
 
 
 def _units(A: Matrices, unknowns: IndexArray) -> FloatArray:
@@ -201,7 +248,9 @@ def _modes_for(pencil: Pencil, top: float) -> Spectrum:
 
 def _near(spectrum: Spectrum, speeds: FloatArray) -> BoolArray:
     squared = speeds * speeds
-    margin = NEAR * (np.abs(spectrum.squares) + spectrum.shift)
+    # Rigid-body motions have λ = 0 without rounding.
+    moving = spectrum.squares != 0
+    margin = np.where(moving, NEAR * (np.abs(spectrum.squares) + spectrum.shift), 0.0)
     within = (spectrum.squares + margin >= squared.min()) & (spectrum.squares - margin <= squared.max())
     gap = np.abs(spectrum.squares[within, None] - squared)
     return np.asarray((gap <= margin[within, None]).any(axis=0))

@@ -32,11 +32,14 @@ class Reference:
         Cholesky factor U of its K + σ M, an upper band.
     scale
         Frequency of its lowest mode that is no rigid-body motion, rad/s.
+    frequencies
+        Of its modes, rad/s, shape (m,).
     """
 
     modes: FloatArray
     factor: FloatArray
     scale: float
+    frequencies: FloatArray
 
 
 def reference(P: Planes, speeds: FloatArray, m: int) -> Reference:
@@ -59,7 +62,8 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> Reference:
     spectrum = lowest_modes(rotor, A, min(m, finite_modes(A)))
     moving = spectrum.squares[spectrum.squares > 0]
     lowest = float(moving[0]) if moving.size else spectrum.shift
-    return Reference(spectrum.vectors, spectrum.factor, float(np.sqrt(lowest)))
+    frequencies = np.sqrt(np.maximum(spectrum.squares, 0.0))
+    return Reference(spectrum.vectors, spectrum.factor, float(np.sqrt(lowest)), frequencies)
 
 
 def starting_vectors(P: Planes, ref: Reference, m: int) -> tuple[FloatArray, FloatArray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +52,24 @@ def plain(ax: Axes) -> None:
     ax.grid(color=GRID, linewidth=0.8)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
+
+
+def shade_unstable(ax: Axes, ranges: Iterable[tuple[float, float]], word: str = "no steady state") -> None:
+    """Hatch ranges of speed in which the rotor is unstable."""
+    for first, last in ranges:
+        ax.axvspan(
+            first, last, facecolor=VERMILION, alpha=0.12, hatch="///", edgecolor=VERMILION, linewidth=0.6
+        )
+        ax.annotate(
+            word,
+            ((first + last) / 2, 0.98),
+            xycoords=("data", "axes fraction"),
+            rotation=90,
+            ha="center",
+            va="top",
+            fontsize="small",
+            color="#8a3d00",
+        )
 
 
 def rpm_above(ax: Axes) -> None:

@@ -99,14 +99,22 @@ def bode_picture(
     Z = np.stack([response.at(place) for place in places], axis=1)
     marks = []
     if peaks:
-        loudest = int(np.argmax(np.abs(Z).max(axis=0)))
+        loudest = int(np.argmax(np.abs(Z[response.steady]).max(axis=0, initial=0.0)))
         marks = [(peak.speed, f"{peak.speed * RPM:.0f} rpm") for peak in peaks[loudest].peaks]
 
     def draw(figure: Figure) -> None:
         from fem.plots import draw_bode
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        draw_bode(response.speeds, Z, labels, (above, below), peaks=marks, operating=operating)
+        draw_bode(
+            response.speeds,
+            Z,
+            labels,
+            (above, below),
+            peaks=marks,
+            operating=operating,
+            windows=response.windows,
+        )
         columns = 3 if len(labels) > 4 else 2
         handles, named = above.get_legend_handles_labels()
         _legend(above, handles, named, (0.5, 1.16), columns)

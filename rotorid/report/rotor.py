@@ -184,6 +184,7 @@ def _criticals(document: Mapping[str, Any], show: Numbers) -> Grid:
             row.append(show(f"mesh_check.relative_error.{k}", 2, scale=100.0))
         rows.append(tuple(row))
     note = "The distance is in percent of the nearest end of the operating range." if operating else ""
+    note = f"{note} {document.get('critical_speeds_cut') or ''}".strip()
     return Grid("Where the frequency of free whirl equals the speed of rotation", tuple(heads), tuple(rows),
                 (4,), note)  # fmt: skip
 

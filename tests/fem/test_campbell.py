@@ -4,6 +4,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from exact_solutions import whirl_exactly
 from fem_rotors import rotor23
 from hypothesis import given, settings
 from whirl_rotors import FULL, machine, whirling_rotors
@@ -36,7 +37,7 @@ def test_every_speed_is_as_alone(rotor):
     speeds = np.linspace(0.0, 900.0, 12)
     found = fem.campbell(rotor, speeds, n=4)
     for k in (0, 5, 11):
-        alone = fem.whirl_modes(rotor, speeds[k], 12, method="exact").eigenvalues
+        alone = whirl_exactly(rotor, speeds[k], 12).eigenvalues
         for lam in found.eigenvalues[k]:
             if np.isfinite(lam):
                 assert np.abs(alone - lam).min() < 1e-7 * abs(lam)
@@ -74,7 +75,7 @@ def test_damped_critical_speeds_are_roots():
         found.critical_direction,
         strict=True,
     ):
-        there = fem.whirl_modes(rotor, speed, 6, method="exact")
+        there = whirl_exactly(rotor, speed, 6)
         k = int(np.argmin(np.abs(there.frequencies - speed)))
         assert there.frequencies[k] == pytest.approx(speed, rel=1e-10)
         assert there.log_decrements[k] == pytest.approx(delta, abs=1e-9)

@@ -33,7 +33,7 @@ def test_refined_reference_rotor_is_the_continuous_beam():
 
 
 def test_frequencies_converge_with_the_fourth_power_of_the_element_length():
-    errors = [fem.critical_speeds(uniform(n), n=5).frequencies[2:] / free_beam() - 1 for n in (16, 32, 64)]
+    errors = [fem.critical_speeds(uniform(n), n=3).frequencies[2:] / free_beam() - 1 for n in (16, 32, 64)]
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (np.array(errors) > 0).all()
     np.testing.assert_allclose(rates, 4.0, atol=0.05)
@@ -41,7 +41,7 @@ def test_frequencies_converge_with_the_fourth_power_of_the_element_length():
 
 @pytest.mark.parametrize("n", [60, 200, 800])
 def test_fine_meshes_keep_their_digits(n):
-    found = fem.critical_speeds(uniform(n), n=5).frequencies[2:]
+    found = fem.critical_speeds(uniform(n), n=3).frequencies[2:]
     np.testing.assert_allclose(found, free_beam(), rtol=1e-10 + (4.7 / n) ** 4)
 
 
@@ -55,7 +55,7 @@ def test_a_fine_mesh_is_said_and_a_hopeless_one_refused():
 
 
 def test_rigid_body_modes_of_a_free_rotor():
-    modes = fem.critical_speeds(uniform(20), n=5)
+    modes = fem.critical_speeds(uniform(20), n=3)
     np.testing.assert_array_equal(modes.frequencies[:2], 0.0)
     np.testing.assert_allclose(modes.frequencies[2:], free_beam(), rtol=1e-4)
     np.testing.assert_allclose(modes.shapes[:, 0], 1.0, rtol=1e-12)
@@ -196,7 +196,7 @@ def test_ignored_inertia_is_said():
 @pytest.mark.parametrize(
     ("rotor", "n", "message"),
     [
-        (uniform(3), 0, "0 critical speeds cannot be found: the model has 1 to 8"),
+        (uniform(3), 0, "0 critical speeds cannot be found: the model has 1 to 6"),
         (uniform(3), 9, "9 critical speeds cannot be found"),
         (uniform(3), 2.0, "the number of critical speeds must be a whole number"),
         (fem.Rotor([0.1] * 3, 0.05, density=0.0, supports=[fem.Support(1, 1e6)]), 1, "the model has 1 to 0"),

@@ -1,12 +1,16 @@
+import dataclasses
 import json
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 from cases import each_of
-from fem_rotors import mirrored, refined, rotor23, rotors, uniform
+from exact_solutions import SOLVERS, exactly
+from fem_rotors import machines, mirrored, refined, rotor23, rotors, uniform
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from repetitions import FULL
 
 import fem
 from fem.solvers import receptance
@@ -46,7 +50,7 @@ def test_laval_rotor_on_damped_supports_through_resonance(method):
     speeds = np.concatenate(
         (np.linspace(0.0, 3 * critical, 301), [critical], critical * np.array([1 - 1e-7, 1 + 1e-9]))
     )
-    response = fem.unbalance_response(laval(), {"disc": 2e-3 * np.exp(0.7j)}, speeds, method=method)
+    response = SOLVERS[method](fem.unbalance_response, laval(), {"disc": 2e-3 * np.exp(0.7j)}, speeds)
     disc, support = laval_closed_form(speeds)
     U = 2e-3 * np.exp(0.7j)
     np.testing.assert_allclose(response.at("disc"), U * disc, rtol=1e-9)
@@ -73,7 +77,7 @@ def test_the_fast_way_is_the_exact_solution(rotor, seed):
     top = fem.critical_speeds(rotor, n=4).frequencies[rng.integers(0, 4)] * rng.uniform(0.5, 2)
     speeds = np.linspace(0.02 * top, top, 37)
     fast = fem.influence(rotor, planes, sensors, speeds)
-    exact = fem.influence(rotor, planes, sensors, speeds, method="exact")
+    exact = exactly(fem.influence, rotor, planes, sensors, speeds)
     # where the banded solution itself says that rounding costs it more than 1e-6, it is no reference
     assume(not exact.warnings)
     assert worst(fast.W, exact.W) < 1e-6
@@ -132,7 +136,7 @@ def test_any_damping_from_none_to_a_lock(damping):
     )
     speeds = np.linspace(7.0, 3000.0, 200)
     fast = fem.influence(rotor, [13, 24], [3, 20, 47], speeds).W
-    assert worst(fast, fem.influence(rotor, [13, 24], [3, 20, 47], speeds, method="exact").W) < 1e-6
+    assert worst(fast, exactly(fem.influence, rotor, [13, 24], [3, 20, 47], speeds).W) < 1e-6
 
 
 def test_a_free_rotor_has_a_response_and_approaches_a_free_body():
@@ -140,11 +144,11 @@ def test_a_free_rotor_has_a_response_and_approaches_a_free_body():
     Z = fem.unbalance_response(rotor, {11: 1e-3}, [0.5]).amplitudes[0]
     np.testing.assert_allclose(Z, -1e-3 / rotor.total_mass, rtol=1e-6)
     # The banded equations lose digits where ω² M is small beside K, and say so.
-    exact = fem.unbalance_response(rotor, {11: 1e-3}, [0.5], method="exact")
+    exact = exactly(fem.unbalance_response, rotor, {11: 1e-3}, [0.5])
     np.testing.assert_allclose(exact.amplitudes[0], Z, rtol=1e-3)
     assert any("rounding may change the response" in text for text in exact.warnings)
     fine = fem.influence(uniform(60), [1, 31], [1, 31, 61], [100.0, 5000.0]).W
-    coarse = fem.influence(rotor, [1, 11], [1, 11, 21], [100.0, 5000.0], method="exact").W
+    coarse = exactly(fem.influence, rotor, [1, 11], [1, 11, 21], [100.0, 5000.0]).W
     assert worst(coarse, fine) < 2e-4
 
 
@@ -157,10 +161,10 @@ def test_an_undamped_rotor_at_its_critical_speed_is_refused(method, times):
         with pytest.raises(
             ValueError, match=r"undamped rotor stands exactly at its critical speed .*no limit"
         ):
-            fem.influence(rotor, [7], [7], [50.0, omega], method=method)
+            SOLVERS[method](fem.influence, rotor, [7], [7], [50.0, omega])
     with pytest.raises(ValueError, match="critical speed 0 rad/s"):
-        fem.influence(uniform(5), [1], [1], [0.0], method=method)
-    near = fem.influence(rotor, [7], [7], critical * (1 + 1e-6), method=method).W
+        SOLVERS[method](fem.influence, uniform(5), [1], [1], [0.0])
+    near = SOLVERS[method](fem.influence, rotor, [7], [7], critical * (1 + 1e-6)).W
     assert np.isfinite(near).all()
     assert np.abs(near).min() > 50
 
@@ -170,12 +174,8 @@ def test_at_a_damped_critical_speed_the_exact_solution_takes_over():
     critical = fem.critical_speeds(rotor).frequencies
     beside = critical * (1 + 1e-6)
     at = fem.influence(rotor, [7, 12], [2, 18], critical).W
-    np.testing.assert_allclose(
-        at, fem.influence(rotor, [7, 12], [2, 18], beside, method="exact").W, rtol=2e-3
-    )
-    np.testing.assert_allclose(
-        at, fem.influence(rotor, [7, 12], [2, 18], critical, method="exact").W, rtol=1e-12
-    )
+    np.testing.assert_allclose(at, exactly(fem.influence, rotor, [7, 12], [2, 18], beside).W, rtol=2e-3)
+    np.testing.assert_allclose(at, exactly(fem.influence, rotor, [7, 12], [2, 18], critical).W, rtol=1e-12)
 
 
 def test_hardly_any_damping_on_a_fine_mesh_is_said():
@@ -198,7 +198,6 @@ def test_hardly_any_damping_on_a_fine_mesh_is_said():
         ({"planes": [25]}, "node 25 does not exist: the rotor has nodes 1 to 24"),
         ({"sensors": ["left"]}, "no station is called 'left'"),
         ({"sensors": []}, "name at least one plane and one sensor"),
-        ({"method": "quick"}, 'method must be "fast" or "exact", not \'quick\''),
     ],
 )
 def test_impossible_requests_are_refused(arguments, message):
@@ -265,3 +264,61 @@ def test_results_as_tables_json_and_text():
 def test_no_unbalance_no_vibration():
     for rotor in (rotor23(1e4), refined(rotor23(1e4), 3)):
         assert not fem.unbalance_response(rotor, {5: 0.0}, [10.0, 500.0]).amplitudes.any()
+
+
+@given(machines(elements=(2, 12), tables=False), st.floats(-9, -3))
+@settings(max_examples=15, deadline=None)
+def test_a_free_rotor_far_below_its_first_critical_speed_is_a_free_body(rotor, power):
+    free = dataclasses.replace(rotor, supports=[])
+    try:
+        first = fem.critical_speeds(free, 1).frequencies[-1]
+    except ValueError:  # more polar than diametral inertia
+        assume(False)
+    centre = (
+        float(
+            (free.density * free.area * free.length) @ ((free.positions[:-1] + free.positions[1:]) / 2)
+            + sum(disc.mass * free.positions[disc.node - 1] for disc in free.discs)
+        )
+        / free.total_mass
+    )
+    # Equal and opposite about the centre of mass: two planes that make a force there without a couple.
+    ends, where = (1, free.n_nodes), free.positions[[0, -1]]
+    share = (where[1] - centre) / (where[1] - where[0])
+    found = fem.unbalance_response(
+        free, {ends[0]: 1e-3 * share, ends[1]: 1e-3 * (1 - share)}, [10**power * first]
+    )
+    np.testing.assert_allclose(
+        found.amplitudes[0], -1e-3 / free.total_mass, rtol=1e-6 + 1e3 * 10 ** (2 * power)
+    )
+    assert found.warnings == tuple(text for text in found.warnings if "ignored" in text)
+
+
+@given(st.floats(1.0, 5000.0), st.floats(1.0, 5000.0), st.sampled_from([6, 8, 12]))
+@settings(max_examples=200, deadline=None)
+def test_speeds_written_in_rpm_do_not_fall_off_a_table(low, step, digits):
+    support = fem.Support(1, [1e6, 2e6], speeds=(low, low + step))
+    for speed, k in ((low, 1e6), (low + step, 2e6)):
+        rpm = float(f"{speed * 30 / np.pi:.{digits}g}")
+        written = rpm * np.pi / 30
+        assert support.at(written)[0][0, 0] == pytest.approx(k, rel=1e-5 * (1 + (low + step) / step))
+    with pytest.raises(ValueError, match="not extrapolated"):
+        support.at((low + step) * 1.0001)
+
+
+def test_memory_grows_with_the_answer():
+    """Of 600 elements at 4,000 speeds two nodes are asked for: all nodes would be 77 MB and more."""
+    rotor = refined(rotor23(2e4), 26)
+    speeds = np.linspace(20.0, 900.0, 4000 if FULL else 1000)
+    tracemalloc.start()
+    try:
+        found = fem.unbalance_response(rotor, {100: 1e-3}, speeds, nodes=[50, 300])
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    whole = 2 * 16 * speeds.size * rotor.n_nodes
+    assert peak < 12e6 + 0.1 * whole
+    every = fem.unbalance_response(rotor, {100: 1e-3}, speeds[::97])
+    np.testing.assert_allclose(found.amplitudes[::97], every.amplitudes[:, [49, 299]], rtol=1e-6)
+    np.testing.assert_array_equal(found.largest_node[::97], every.major.argmax(axis=1) + 1)
+    with pytest.raises(ValueError, match="node 7 was not kept"):
+        found.at(7)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
+from exact_solutions import whirl_exactly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigvals
@@ -189,7 +190,7 @@ def test_a_shaft_with_shear_but_without_rotary_inertia():
     supports = [fem.Support(1, 1e7, 1e3), fem.Support(9, ((2e7, 1e6), (-1e6, 3e7)))]
     rotor = fem.Rotor([0.1] * 8, 0.05, supports=supports, model=fem.Model(shear=True))
     model = state_space(fem.equations_of_motion(rotor), inputs=["f_x3"], outputs=["x3", "y5"])
-    for value in fem.whirl_modes(rotor, 0.0, 6, method="exact").eigenvalues:
+    for value in whirl_exactly(rotor, 0.0, 6).eigenvalues:
         assert np.abs(model.eigenvalues - value).min() < 1e-9 * abs(value)
 
 
@@ -225,7 +226,7 @@ def test_a_rotor_with_massless_pedestals_and_shaft():
         model = state_space(motion, inputs=(), outputs=())
         assert len(model.A) == 2 * 8 + 3  # x and y of node 1, and y of the foot
         assert {"x1", "y1"} <= set(model.states)
-        theirs = fem.whirl_modes(rotor, speed, 6, method="exact").eigenvalues
+        theirs = whirl_exactly(rotor, speed, 6).eigenvalues
         for value in theirs:
             assert np.abs(model.eigenvalues - value).min() < 1e-9 * abs(value)
         assert model.speed == speed

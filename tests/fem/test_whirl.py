@@ -4,6 +4,7 @@ import math
 import numpy as np
 import pytest
 from dense_rotor import whirl as dense_whirl
+from exact_solutions import whirl_exactly
 from fem_rotors import rotor23, uniform
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,7 +24,7 @@ def relative(found, expected):
 def test_fast_is_exact(rotor, speed):
     n = 6
     fast = fem.whirl_modes(rotor, speed, n)
-    exact = fem.whirl_modes(rotor, speed, n, method="exact")
+    exact = whirl_exactly(rotor, speed, n)
     assert relative(fast.eigenvalues, exact.eigenvalues) < 1e-7
     assert fast.error < 1e-7
 
@@ -51,7 +52,7 @@ def test_the_estimated_error_is_the_true_one(times):
     rotor = machine(times)
     speeds = np.linspace(0.0, 1000.0, 21)
     fast = solve_whirl(both_planes(rotor), speeds, 8)
-    exact = [fem.whirl_modes(rotor, speed, 8, method="exact").eigenvalues for speed in speeds[::5]]
+    exact = [whirl_exactly(rotor, speed, 8).eigenvalues for speed in speeds[::5]]
     error = relative(fast.found.values[::5], np.array(exact))
     assert error < 3e-8
     assert error < 5 * fast.error
@@ -60,8 +61,8 @@ def test_the_estimated_error_is_the_true_one(times):
 def test_dense_and_sparse_checks_agree():
     rotor = machine(8)  # 370 unknowns: dense
     finer = machine(9)  # sparse
-    one = fem.whirl_modes(rotor, 700.0, 8, method="exact").eigenvalues
-    other = fem.whirl_modes(finer, 700.0, 8, method="exact").eigenvalues
+    one = whirl_exactly(rotor, 700.0, 8).eigenvalues
+    other = whirl_exactly(finer, 700.0, 8).eigenvalues
     # The same rotor on two fine meshes: the difference is that of the meshes.
     np.testing.assert_allclose(other, one, rtol=2e-6)
     assert relative(fem.whirl_modes(finer, 700.0, 8).eigenvalues, other) < 1e-7
@@ -273,8 +274,6 @@ def test_outside_a_table():
     )
     with pytest.raises(ValueError, match=r"front.*100 to 500 rad/s, not 600"):
         fem.whirl_modes(rotor, 600.0)
-    with pytest.raises(ValueError, match='"fast" or "exact"'):
-        fem.whirl_modes(rotor, 300.0, method="slow")
 
 
 def test_results_speak():

@@ -47,6 +47,7 @@ def campbell(
     Example: rotorid campbell sample_data/compressor/rotor.toml --speeds 1000:15000:250rpm --plot campbell.png
     """
     import fem
+    from fem.campbell import HEAVY
     from fem.plots import campbell_figure
     from rotorid.tables import read_rotor, rotor_files
 
@@ -57,10 +58,16 @@ def campbell(
         result = fem.campbell(model, omega, n)
 
     def picture() -> Figure:
-        return campbell_figure(result, result.criticals, operating=service)
+        return campbell_figure(
+            result, result.criticals, operating=service, unstable=[(w.first, w.last) for w in result.windows]
+        )
 
     document = result.to_dict()
-    inside = None if service is None else separation([float(c[0]) for c in result.criticals], service)
+    inside = (
+        None
+        if service is None
+        else separation([speed for speed, damping in result.criticals if damping <= HEAVY], service)
+    )
     if inside is not None:
         document["operating"] = inside
     note_rotor(model, speeds=len(omega), estimated_relative_error=result.error)

@@ -30,7 +30,12 @@ if TYPE_CHECKING:
 
 def critical(
     rotor: RotorArgument,
-    n: Annotated[int, typer.Option("-n", "--number", min=1, help="How many.")] = 3,
+    n: Annotated[
+        int,
+        typer.Option(
+            "-n", "--number", min=1, help="How many critical speeds; rigid-body motions come besides."
+        ),
+    ] = 3,
     mesh_check: Annotated[
         bool, typer.Option("--mesh-check", help="Estimate by refinement how far off the mesh makes each.")
     ] = False,

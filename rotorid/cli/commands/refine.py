@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.arrays import AnyArray, BoolArray, FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from fem import Peaks, Response, Rotor
@@ -21,16 +21,17 @@ _ROUNDS = 14
 _MOST = 30_000  # speeds
 _AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
 _CRITICALS = 32
+_OVER_SPEED = ("speeds", "amplitudes", "backward", "largest", "largest_node")
 
 
 def response_from_rest(
-    model: Rotor, unbalance: Mapping[int, complex], speeds: Sequence[float] | FloatArray
+    model: Rotor, unbalance: Mapping[int, complex], speeds: Sequence[float] | FloatArray, nodes: list[int]
 ) -> Response:
     """`fem.unbalance_response`, also of a free rotor at rest: without rotation there is no force.
 
     Parameters
     ----------
-    model, unbalance
+    model, unbalance, nodes
         As there.
     speeds
         rad/s, ascending.
@@ -40,14 +41,16 @@ def response_from_rest(
     omega = np.asarray(speeds, dtype=float)
     known = all(not support.speeds or support.speeds[0] == 0 for support in model.supports)
     if omega[0] > 0 or omega.size < 2 or not known:
-        return fem.unbalance_response(model, unbalance, omega)
-    moving = fem.unbalance_response(model, unbalance, omega[1:])
-    rest = np.zeros((1, model.n_nodes), dtype=complex)
+        return fem.unbalance_response(model, unbalance, omega, nodes=nodes)
+    moving = fem.unbalance_response(model, unbalance, omega[1:], nodes=nodes)
+    rest = np.zeros((1, len(nodes)), dtype=complex)
     return dataclasses.replace(
         moving,
         speeds=omega,
         amplitudes=np.concatenate((rest, moving.amplitudes)),
         backward=np.concatenate((rest, moving.backward)),
+        largest=np.insert(moving.largest, 0, 0.0),
+        largest_node=np.insert(moving.largest_node, 0, 1),
     )
 
 
@@ -73,7 +76,7 @@ def refine(result: Response, places: Iterable[SensorLike]) -> Response:
         if merged is None:
             break
         result = merged
-        moving = result.speeds > 0
+        moving = result.steady & (result.speeds > 0)
         readings = [np.abs(result.at(place))[moving] for place in places]
         extra = np.array([speed for A in readings for speed in _closer(result.speeds[moving], A)])
         if not extra.size or result.speeds.size + extra.size > _MOST:
@@ -116,8 +119,6 @@ def _criticals(result: Response) -> FloatArray:
 
 def _with(result: Response, extra: FloatArray) -> Response | None:
     """The response at more speeds; None where the rotor cannot run at one of them (undamped, critical)."""
-    import fem
-
     omega = result.speeds
     # Speeds that differ by rounding alone would make summits of rounding.
     extra = np.unique(extra)
@@ -128,20 +129,18 @@ def _with(result: Response, extra: FloatArray) -> Response | None:
             np.abs(extra - omega[right - 1]), np.abs(omega[np.minimum(right, omega.size - 1)] - extra)
         )
         extra = extra[gaps > _FINEST / 2 * extra]
-    if not extra.size:
+    if not extra.size or result.solve is None:
         return result
     try:
-        more = fem.unbalance_response(result.rotor, result.unbalance, extra)
+        more = result.solve(extra)
     except ValueError:
         return None
     order = np.argsort(np.concatenate((omega, extra)), kind="stable")
 
-    def both(name: str) -> AnyArray:
-        return np.asarray(np.concatenate((getattr(result, name), getattr(more, name)))[order])
-
-    return dataclasses.replace(
-        result, speeds=both("speeds"), amplitudes=both("amplitudes"), backward=both("backward")
-    )
+    both: dict[str, Any] = {
+        name: np.concatenate((getattr(result, name), getattr(more, name)))[order] for name in _OVER_SPEED
+    }
+    return dataclasses.replace(result, **both)
 
 
 def _closer(omega: FloatArray, A: FloatArray) -> list[float]:
@@ -158,9 +157,4 @@ def _closer(omega: FloatArray, A: FloatArray) -> list[float]:
 
 
 def _at(result: Response, keep: BoolArray) -> Response:
-    return dataclasses.replace(
-        result,
-        speeds=result.speeds[keep],
-        amplitudes=result.amplitudes[keep],
-        backward=result.backward[keep],
-    )
+    return dataclasses.replace(result, **{name: getattr(result, name)[keep] for name in _OVER_SPEED})

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from rotorid.base.arrays import FloatArray
 from rotorid.base.units import RPM
 from rotorid.cli.commands.refine import refine, response_from_rest, settle
 from rotorid.cli.common import (
@@ -87,7 +88,8 @@ def response(
     --sensors "probe DE:45,probe NDE:45" --operating 5300:6500rpm --plot bode.png
     """
     import fem
-    from fem.model.sensors import label
+    from fem.model.sensors import as_sensor, label
+    from fem.response import judged
     from rotorid.tables import read_rotor, read_unbalance, rotor_files
 
     check_targets(plot, output, report=report)
@@ -96,19 +98,18 @@ def response(
     places = _places(model, sensors)
     omega = rising_speeds(speed)
     mounted = read_unbalance(unbalance, model)
+    nodes = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
+    nodes |= dict.fromkeys(support.node for support in model.supports)
     with busy(f"response at {len(omega)} speeds"):
-        result = response_from_rest(model, mounted, omega)
+        result = response_from_rest(model, mounted, omega, [*nodes])
     labels = [str(label(place)) for place in places]
     finer, peaks = result, []
     if np.count_nonzero(result.speeds) >= 3:  # rest is no part of a peak
         with busy("peaks"):
-            finer = refine(result, places)
-            moving = finer.speeds > 0
-            peaks = [
-                fem.find_peaks(finer.speeds[moving], np.abs(finer.at(place))[moving], operating=service)
-                for place in places
-            ]
+            finer = judged(refine(result, places))
+            peaks = [fem.response_peaks(finer, place, operating=service) for place in places]
             finer = settle(finer, peaks, result.speeds)
+            result = dataclasses.replace(result, windows=finer.windows, warnings=finer.warnings)
     if any(peak.undamped for found in peaks for peak in found.peaks):
         text = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
         result, finer = (dataclasses.replace(r, warnings=(*r.warnings, text)) for r in (result, finer))
@@ -158,7 +159,7 @@ def _orbit_data(result: Response, places: list[SensorLike]) -> dict[str, Any]:
     from fem.model.sensors import as_sensor
 
     nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in places]
-    index = [node - 1 for node in nodes]
+    index = [result.column(node) for node in nodes]
     ellipses = fem.orbits(result.x[:, index], result.y[:, index])
     names = {1: "forward", -1: "backward", 0: "straight"}
     return {
@@ -176,19 +177,20 @@ def _document(
     """At the speeds asked for; what is largest, and the peaks, with the speeds between them."""
     document = result.to_dict(places)
     warnings = document.pop("warnings")
-    sizes = [np.abs(finer.at(place)) for place in places]
-    forces = finer.bearing_forces().largest
+    forces = finer.bearing_forces().largest.T
+    at_sensor = [_largest(finer, np.abs(finer.at(place))) for place in places]
+    at_support = [_largest(finer, force) for force in forces]
     return {
         **document,
         "orbits": _orbit_data(result, places),
         "largest": [
-            {"sensor": name, "amplitude_m": float(A.max()), "speed_rad_s": float(finer.speeds[A.argmax()])}
-            for name, A in zip(labels, sizes, strict=True)
+            {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
+            for name, (size, speed) in zip(labels, at_sensor, strict=True)
         ],
         "bearing_forces": {
             **result.bearing_forces().to_dict(),
-            "largest_N": forces.max(axis=0).tolist(),
-            "largest_at_rad_s": finer.speeds[forces.argmax(axis=0)].tolist(),
+            "largest_N": [size for size, _ in at_support],
+            "largest_at_rad_s": [speed for _, speed in at_support],
         },
         "peaks": [
             {"sensor": label, **peak}
@@ -197,6 +199,14 @@ def _document(
         ],
         "warnings": warnings,
     }
+
+
+def _largest(result: Response, size: FloatArray) -> tuple[float | None, float | None]:
+    """The largest of a size over speed where a steady response exists, and its speed, rad/s."""
+    from fem.vibration import largest_at
+
+    k = largest_at(size, result.steady)
+    return (None, None) if k is None else (float(size[k]), float(result.speeds[k]))
 
 
 def _summary(
@@ -210,9 +220,11 @@ def _summary(
         f"{'sensor':>20} {'largest, µm':>14} {'at rpm':>11}",
     ]
     for k, label in enumerate(labels):
-        size = np.abs(Z[:, k])
-        i = int(np.argmax(size))
-        lines.append(f"{label:>20} {1e6 * size[i]:14.4g} {finer.speeds[i] * RPM:11.1f}")
+        size, speed = _largest(finer, np.abs(Z[:, k]))
+        if size is None or speed is None:
+            lines.append(f"{label:>20} {'none':>14} {'-':>11}")
+        else:
+            lines.append(f"{label:>20} {1e6 * size:14.4g} {speed * RPM:11.1f}")
     if result.rotor.supports:
         lines += ["", finer.bearing_forces().summary()]
     for label, found in zip(labels, peaks, strict=False):
@@ -254,11 +266,13 @@ def _bode(
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     marks = []
     if peaks:
-        loudest = int(np.argmax(np.abs(Z).max(axis=0)))
+        loudest = int(np.argmax(np.abs(Z[result.steady]).max(axis=0, initial=0.0)))
         for peak in peaks[loudest].peaks:
             factor = "" if peak.amplification is None else f", AF {peak.amplification:.1f}"
             marks.append((peak.speed, f"{peak.speed * RPM:.0f} rpm{factor}"))
-    draw_bode(result.speeds, Z, labels, (above, below), peaks=marks, operating=operating)
+    draw_bode(
+        result.speeds, Z, labels, (above, below), peaks=marks, operating=operating, windows=result.windows
+    )
     return figure
 
 
@@ -268,7 +282,7 @@ def _polar(result: Response, Z: np.ndarray[Any, Any], labels: list[str]) -> Figu
     from fem.plots import draw_polar
 
     figure = Figure(figsize=(7.5, 7.5), layout="constrained")
-    draw_polar(result.speeds, Z, labels, figure.add_subplot(projection="polar"))
+    draw_polar(result.speeds, Z, labels, figure.add_subplot(projection="polar"), windows=result.windows)
     return figure
 
 
@@ -281,10 +295,13 @@ def _orbits(
 ) -> object:
     from fem.model.sensors import as_sensor
     from fem.plots import draw_orbits
+    from fem.vibration import largest_at
 
-    k = _index(result, at) if at is not None else int(np.argmax(np.abs(Z).max(axis=1)))
+    k = largest_at(np.abs(Z).max(axis=1), result.steady) if at is None else _index(result, at)
+    if k is None:
+        raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
     names = list(dict.fromkeys(as_sensor(place, result.rotor).node for place in places))
-    index = [result.rotor.node(name) - 1 for name in names]
+    index = [result.column(name) for name in names]
     labels = [f"node {name}" if isinstance(name, int) else name for name in names]
     title = f"{result.speeds[k] * RPM:.0f} rpm = {result.speeds[k]:.5g} rad/s"
     return draw_orbits(result.x[k, index], result.y[k, index], labels, ax, title=title)
@@ -296,4 +313,7 @@ def _index(result: Response, at: str) -> int:
     low, high = result.speeds[0], result.speeds[-1]
     if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
         raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
-    return int(np.argmin(np.abs(result.speeds - wanted)))
+    k = int(np.argmin(np.abs(result.speeds - wanted)))
+    if not result.steady[k]:
+        raise ValueError(f"--at {at}: there is no steady response, so no orbit to draw; take another speed")
+    return k

@@ -10,8 +10,9 @@ import numpy as np
 import fem
 from fem.campbell import runs_away
 from fem.matrices.lateral_planes import both_planes
+from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
-from fem.whirl import DIRECTION_NAMES, available_modes, checked_number
+from fem.whirl import available_modes, checked_number
 from rotorid.base.json import floats
 from rotorid.reduction.dynamics.running import without_modal_damping
 from rotorid.reduction.dynamics.threshold import STEPS, grid, searched, stability_threshold

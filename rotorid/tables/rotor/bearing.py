@@ -28,6 +28,7 @@ ENTRIES = {
 }
 DIAGONAL = ("kxx", "kyy", "cxx", "cyy")
 """What pushes back, or brakes, in a bearing; the others may have either sign."""
+OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
 TILTING = "tilting_stiffness_N_m_per_rad"
 PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_N_s_per_m")
 _STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)
@@ -140,7 +141,7 @@ def _coefficients(section: Section, folder: Path, kind: Kind, problems: Problems
         problems.add(table.source, table.header_row, COLUMNS[1].names[0], None, expected)
         return None
     for name in (*SCALARS, *DIAGONAL):
-        must_be(table, name, table.numbers(name) >= low, "0 or more", problems)
+        must_be(table, name, table.numbers(name) >= low, OUTWARDS, problems)
     if len(table) == 1:
         table.complain(problems, 0, "speed", "two speeds at least: a table says how coefficients change")
     for name in present:
@@ -165,7 +166,9 @@ def _take(
 ) -> None:
     """One constant; `kxx` alone is `kxx_N_per_m`."""
     for key in keys:
-        value = section.number(key, low=low)
+        value = section.number(key)
+        if value is not None and value < low:
+            section.complain(key, OUTWARDS)
         if value is None:
             continue
         if name in values:

@@ -12,6 +12,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.rotor.bearing import bearing_tables, read_support
+from rotorid.tables.rotor.plausible import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
 
 _TINY = sys.float_info.min
@@ -27,7 +28,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     shaft_name = top.text("shaft")
     if "shaft" not in top:
         top.missing("shaft", 'the file of the shaft, shaft = "shaft.csv"')
-    material = _material(top.section("material"))
+    material = _material(top.section("material"), str(path))
     model = _model(top.section("model"))
     discs, stations = top.sections("disc"), top.sections("station")
     bearings, seals = top.sections("bearing"), top.sections("seal")
@@ -76,7 +77,7 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     return (path, *(path.parent / table for table in [*tables, *bearing_tables(data)]))
 
 
-def _material(section: Section | None) -> Material:
+def _material(section: Section | None, source: str) -> Material:
     default = Material()
     if section is None:
         return default
@@ -85,6 +86,12 @@ def _material(section: Section | None) -> Material:
     poisson = section.number("poisson_ratio", default.poisson_ratio, low=-1.0 + 1e-9, high=0.5)
     damping = section.number("material_damping_s", default.material_damping, low=0.0)
     section.finish()
+    for stem, key, value in (
+        ("youngs_modulus", "youngs_modulus_Pa", modulus),
+        ("density", "density_kg_per_m3", density),
+    ):
+        if value is not None:
+            warn_of_value(source, f"[material] {key}", stem, value)
     return Material(
         *(
             getattr(default, field.name) if value is None else value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +12,9 @@ from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Su
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, must_be, read_table
-from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
+from rotorid.tables.rotor.plausible import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)
 _INERTIA = one_of(units.INERTIA)
@@ -41,14 +41,6 @@ COLUMNS = (
     Column("material_damping", one_of(units.TIME), ("material_damping_s",), required=False, blank=True),
 )
 PLAIN = Model()
-USUAL = (
-    ("length", 0.0, 50.0, "m", "is this in mm?"),
-    ("diameter", 0.0, 10.0, "m", "is this in mm?"),
-    ("inner_diameter", 0.0, 10.0, "m", "is this in mm?"),
-    ("youngs_modulus", 1e9, 1e12, "Pa", "is this in another unit?"),
-    ("density", 100.0, 3e4, "kg/m³", "is this in another unit?"),
-)
-"""Stem, range and unit of what shafts are; outside a warning asks."""
 OF_ELEMENTS = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
 
 
@@ -99,7 +91,7 @@ def read_rotor(path: str | Path) -> Rotor:
     Warns
     -----
     TableWarning
-        About a guessed encoding, and sizes that no shaft has.
+        About a guessed encoding, and what no rotor is: sizes, materials, bearings in a wrong unit.
     """
     from rotorid.tables.rotor.rotor_file import read_rotor_file
 
@@ -148,7 +140,7 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
     for stem in ATTACHED:
         must_be(table, stem, table.numbers(stem) >= 0, "0 (nothing attached) or more", problems)
-    _warn_of_sizes(table, elements)
+    warn_of_table(table, elements)
     return Shaft(
         length[elements],
         diameter[elements],
@@ -161,27 +153,10 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     )
 
 
-def _warn_of_sizes(table: Table, elements: BoolArray) -> None:
-    """A millimetre taken for a metre gives a rotor that can be computed all the same."""
-    for stem, low, high, unit, question in USUAL:
-        if stem not in table:
-            continue
-        field, values = table.fields[stem], table.numbers(stem)
-        for row in np.flatnonzero(elements & (values > 0) & ((values < low) | (values > high)))[:1]:
-            others = int(np.sum(elements & (values > 0) & ((values < low) | (values > high)))) - 1
-            more = f" and {others} more row{'s' if others > 1 else ''}" if others else ""
-            warnings.warn(
-                f"{table.source}, row {table.rows[row]}{more}, column {field.name}: "
-                f"{table.shown(stem, int(row))} means {values[row]:.6g} {unit}; {question}",
-                TableWarning,
-                stacklevel=4,
-            )
-
-
 def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:
     """Make the rotor; what it refuses becomes a problem of the file."""
     try:
-        return Rotor(
+        rotor = Rotor(
             length=shaft.length,
             outer_diameter=shaft.outer_diameter,
             inner_diameter=shaft.inner_diameter,
@@ -198,6 +173,8 @@ def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problem
         problems.add(source, None, None, None, f"a possible rotor: {error}")
         problems.stop()
         raise
+    warn_of_rotor(source, rotor)
+    return rotor
 
 
 def _complain_about_blanks(table: Table, stem: str, elements: BoolArray, problems: Problems) -> None:

@@ -205,13 +205,15 @@ def test_a_negative_stiffness_is_for_seals(file):
     seal = the_support(file, 'table = "s.csv"', kind="seal")
     assert seal.stiffness == (-1e5, -2e5)
     problems = complaints(file, bearing('table = "s.csv"'))
-    assert [(p.row, p.expected) for p in problems] == [(2, "0 or more"), (3, "0 or more")]
+    assert [p.row for p in problems] == [2, 3]
+    assert all("[[seal]]" in p.expected for p in problems)
     write_csv(
         file.folder / "s.csv", [["speed_Hz", "kxx_N_per_m", "kyy_N_per_m"], [1, 1e5, 1e5], [2, 1e5, -1]]
     )
     assert the_support(file, 'table = "s.csv"', kind="seal").stiffness == (1e5, ((1e5, 0.0), (0.0, -1.0)))
     (problem,) = complaints(file, bearing('table = "s.csv"'))
-    assert (problem.row, problem.column, problem.expected) == (3, "kyy_N_per_m", "0 or more")
+    assert (problem.row, problem.column) == (3, "kyy_N_per_m")
+    assert "[[seal]]" in problem.expected
     assert the_support(file, "kxx = -1", "kyy = -2", kind="seal").stiffness == ((-1.0, 0.0), (0.0, -2.0))
 
 

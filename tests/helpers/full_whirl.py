@@ -9,6 +9,7 @@ import numpy as np
 
 from fem.matrices.lateral_planes import Planes, project
 from fem.solvers.quadratic import solve
+from fem.solvers.whirl_basis import reference
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 _DENSE = 400  # unknowns of both planes up to which all eigenvalues are computed
@@ -27,8 +28,8 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
     still
         Number of rigid-body motions.
     """
-    scale = _scale(P)
     speeds = np.array([speed])
+    scale = reference(P, speeds, 2).scale
     if P.planes * P.A.size <= _DENSE:
         Q = project(P, np.eye(P.A.size))
         found = solve(Q, speeds, n, scale)
@@ -40,14 +41,6 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
             int(found.still[0]),
         )
     return _arnoldi(P, speed, n, scale)
-
-
-def _scale(P: Planes) -> float:
-    """A frequency of the order of the first bending mode, rad/s."""
-    rotor = P.rotor
-    span = float(rotor.length.sum())
-    bending = float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / span
-    return float(np.sqrt(100.0 * bending / (rotor.total_mass * span**3)))
 
 
 def _arnoldi(
@@ -128,7 +121,7 @@ def _sparse(P: Planes, speed: float) -> tuple[Any, Any, Any]:
     return out[0], out[1], out[2]
 
 
-def _full(band: FloatArray) -> Any:  # noqa: ANN401 - scipy's sparse arrays have no types
+def _full(band: FloatArray) -> Any:
     """Sparse symmetric matrix of an upper band."""
     from scipy.sparse import diags_array
 

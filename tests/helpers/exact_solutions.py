@@ -1,0 +1,37 @@
+"""Responses and whirl of the full model at one speed after another: slow, the check of the fast ways."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from full_whirl import exact_modes
+
+import fem
+import fem.response
+from fem.matrices.lateral_planes import both_planes
+from fem.whirl import WhirlModes, in_both_planes, told
+
+
+def exactly(function, *arguments, **named):
+    """`fem.influence` or `fem.unbalance_response` with the banded equations solved at every speed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fem.response, "prepare", partial(fem.response.prepare, exact=True))
+        return function(*arguments, **named)
+
+
+def fast(function, *arguments, **named):
+    """As it is."""
+    return function(*arguments, **named)
+
+
+SOLVERS = {"fast": fast, "exact": exactly}
+
+
+def whirl_exactly(rotor, speed, n=6):
+    """`fem.whirl_modes` without a reduced basis."""
+    P = both_planes(rotor)
+    values, vectors, real, still = exact_modes(P, float(speed), n)
+    lam, x, y = in_both_planes(values, vectors[:, :, :: P.A.stride])
+    size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
+    said = told(P.planes, real, still, lam.size, n)
+    return WhirlModes(float(speed), lam, x.T / size, y.T / size, real, 0.0, rotor, said)
