@@ -119,7 +119,8 @@ def _complain(problem: Exception) -> int:
     text = str(problem)
     if isinstance(problem, OSError) and problem.strerror:
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
-    print(f"rotorid: {_safe(text)}", file=sys.stderr)
+    with contextlib.suppress(BrokenPipeError):
+        print(f"rotorid: {_safe(text)}", file=sys.stderr)
     return 2
 
 

@@ -56,12 +56,13 @@ STATE_SPACES = (".json", ".npz", ".mat")
 def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str, Any]:
     """Program version, input files with their hashes, date and options of a result."""
     from rotorid import __version__
+    from rotorid.tables.reader.input_file import file_content
 
     return {
         "program": "rotorid",
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "inputs": [{"file": str(f), "sha256": hashlib.sha256(f.read_bytes()).hexdigest()} for f in files],
+        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
         "options": {
             k: str(v) if isinstance(v, Path) else v
             for k, v in options.items()
@@ -93,6 +94,8 @@ def check_targets(
             raise ValueError(f"{path}: the folder {path.parent} does not exist")
         if path.is_dir():
             raise ValueError(f"{path}: cannot be written, it is a folder")
+        if path.exists() and not path.is_file():
+            raise ValueError(f"{path}: cannot be written, it is no regular file")
         if not os.access(path if path.exists() else path.parent, os.W_OK):
             raise ValueError(f"{path}: cannot be written, permission denied")
         twin = next((other for other in asked if _same_file(path, other)), None)

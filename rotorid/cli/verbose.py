@@ -87,8 +87,15 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapper(*args: Any, verbose: bool = False, **kwargs: Any) -> None:  # noqa: ANN401 - any command
-        if not verbose:
-            return command(*args, **kwargs)
+        from rotorid.tables.reader.input_file import each_file_once
+
+        with each_file_once():
+            if verbose:
+                with_notes(*args, **kwargs)
+            else:
+                command(*args, **kwargs)
+
+    def with_notes(*args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - any command
         notes = Notes(time.perf_counter())
         token = _NOTES.set(notes)
         try:
@@ -100,7 +107,6 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
             _tell(notes)
         finally:
             _NOTES.reset(token)
-        return None
 
     hints = {**get_type_hints(command, include_extras=True), "verbose": VerboseOption}
     signature = inspect.signature(command)

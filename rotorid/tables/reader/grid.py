@@ -12,6 +12,9 @@ from rotorid.tables.reader.problems import Problems
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
 
+MOST_CELLS = 5_000_000
+"""Of a file."""
+
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])")
 """#N/A, #DIV/0!, #ИМЯ?"""
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}

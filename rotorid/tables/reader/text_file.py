@@ -9,7 +9,8 @@ import warnings
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import CommentLine, Grid, Row, begins_comment, clean, make_grid
+from rotorid.tables.reader.grid import MOST_CELLS, CommentLine, Grid, Row, begins_comment, clean, make_grid
+from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import Problems, TableWarning
 
 _SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
@@ -20,7 +21,7 @@ _NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
 def read_bytes(path: Path, problems: Problems) -> bytes | None:
     """The content of a file, or None and a problem."""
     try:
-        return path.read_bytes()
+        return file_content(path)
     except FileNotFoundError:
         problems.add(str(path), None, None, None, f"a file that exists{_neighbour(path)}")
     except IsADirectoryError:
@@ -109,6 +110,9 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             return None
     else:
         separator = _separator(lines)
+    if len(lines) + text.count(separator) > MOST_CELLS:
+        problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
+        return None
     rows: list[Row] = []
     complete, below_header = True, False
     for number, line in enumerate(lines, start=1):

@@ -7,6 +7,7 @@ import io
 import math
 import os
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,19 +82,30 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     InputError
         If one cannot be written; where that shows before the first is replaced, all stay as they were.
     """
-    waiting = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
     if not files:
         return
     path = next(iter(files))
+    # behind a link, the file that it names
+    targets = {path: Path(os.path.realpath(path)) for path in files}
+    waiting = {
+        path: target.with_name(f".{target.name[:80]}.{number}.{os.getpid()}.tmp")
+        for number, (path, target) in enumerate(targets.items())
+    }
     try:
         for path in files:
             if path.is_dir():
                 raise IsADirectoryError(21, "it is a folder", str(path))
+            if path.exists() and not path.is_file():
+                raise OSError(22, "it is no regular file", str(path))
         for path, data in files.items():
             with waiting[path].open("xb") as stream:
                 stream.write(data)
+                if targets[path].exists():
+                    waiting[path].chmod(stat.S_IMODE(targets[path].stat().st_mode))
+                stream.flush()
+                os.fsync(stream.fileno())
         for path, temporary in waiting.items():
-            temporary.replace(path)
+            temporary.replace(targets[path])
     except OSError as error:
         expected = f"a file that can be written ({error.strerror or error})"
         raise InputError([Problem(str(path), None, None, None, expected)]) from error
