@@ -48,6 +48,8 @@ OperatingOption = Annotated[
     typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
 ]
 
+FASTEST = 1e9
+"""rad/s; no rotor turns so fast, and squares of larger numbers may overflow."""
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
 STATE_SPACES = (".json", ".npz", ".mat")
@@ -239,7 +241,7 @@ def band(text: str | None) -> tuple[float, float] | None:
         low, high = (float(part) for part in body.split(":"))
     except ValueError:
         low = high = -1.0
-    if not 0 <= low < high < 1e9:
+    if not 0 <= low < high <= FASTEST / factor:
         raise ValueError(
             f"--operating {text!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
         )
@@ -318,9 +320,10 @@ def speeds(text: str, unit: str = "rad_s", what: str = "--speeds") -> list[float
             raise ValueError(f"{what} {text!r} has more than a million speeds")
         values = list(first + step * np.arange(int(np.floor((last - first) / step * (1 + 1e-12) + 1e-9)) + 1))
         factors = [factors[0]] * len(values)
-    if min(values) < 0:
-        raise ValueError(f"{what} {text!r}: speeds must be finite and not negative")
-    return [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+    found = [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+    if min(found) < 0 or max(found) > FASTEST:
+        raise ValueError(f"{what} {text!r}: speeds must be from 0 to {FASTEST:g} rad/s")
+    return found
 
 
 def rising_speeds(text: str, what: str = "--speeds") -> list[float]:

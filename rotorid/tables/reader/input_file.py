@@ -46,7 +46,9 @@ def _load(path: Path) -> bytes:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
     if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, "it is no regular file; a table may come from standard input, -", str(path))
+        raise OSError(
+            errno.EINVAL, "it is no regular file; a table may come from standard input, -", str(path)
+        )
     with path.open("rb") as stream:
         return _within_limit(path, stream.read(MOST_BYTES + 1))
 

@@ -15,6 +15,7 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 
 MOST_BYTES = 20_000_000
+MOST_NAMES = 1_000
 
 
 def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
@@ -182,6 +183,12 @@ class Section:
             return {}
         inner = {name: outer.section(name) for name in outer._data}
         return {name: section for name, section in inner.items() if section is not None}
+
+    def limit_names(self) -> None:
+        """Complain about every list and table of a model with more names than can be worked with."""
+        for key, value in self._data.items():
+            if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
+                self.complain(key, f"at most {MOST_NAMES:,} names; these are {len(value):,}", value=False)
 
     def missing(self, key: str, expected: str) -> None:
         """Note that a key is missing."""
