@@ -14,8 +14,8 @@ from pathlib import Path
 
 from fuzz.examining import CHANGED, FINDING, Outcome, examine
 
-PATIENCE = 60
-"""Seconds after which a process that says nothing hangs: a mutant is run at most four times."""
+PATIENCE = 300
+"""Seconds after which a process that says nothing waits for something: what computes ends itself."""
 MOST_MB = 1000
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import rotorid.cli
 
 SECONDS = 10
-"""Longest time that any file may take."""
+"""Longest time of one core that any file may take."""
 CLOSE = 1e-7
 """Relative difference of numbers that are the same: iterations end at other last digits."""
 
@@ -40,8 +40,8 @@ def answer(words, *, seconds=SECONDS, check=True):
     """Run `rotorid WORDS --json`; never raises."""
     out, err = io.StringIO(), io.StringIO()
     previous_words, sys.argv = sys.argv, ["rotorid", *words, "--json"]
-    previous = signal.signal(signal.SIGALRM, _stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    previous = signal.signal(signal.SIGPROF, _stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     status, broken = 0, ""
     try:
         with (
@@ -54,13 +54,13 @@ def answer(words, *, seconds=SECONDS, check=True):
     except SystemExit as stop:
         status = stop.code or 0
     except TooLong:
-        broken = f"still running after {seconds} s"
+        broken = f"still computing after {seconds} s"
     except BaseException as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         broken = f"{type(error).__name__}: {error} ({frame.filename.rpartition('/')[2]}:{frame.lineno})"[:300]
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, previous)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, previous)
         sys.argv = previous_words
     if broken or status:
         if check and not broken and (status not in (1, 2) or not err.getvalue().startswith("rotorid: ")):

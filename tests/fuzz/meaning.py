@@ -64,7 +64,7 @@ def table(text):
 
 
 def table_sense(read):
-    """What must stay the same for the answer to stay: cells by column, numbers as numbers and their digits."""
+    """What must stay the same for the answer to stay: cells by column, numbers as numbers."""
     comments, header, rows = read
     order = sorted(range(len(header)), key=lambda i: header[i])
     return (

@@ -10,17 +10,68 @@ import openpyxl
 
 NUMBER = re.compile(r"(?<![\w.])[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?(?![\w.])")
 WORDS = (
-    "nan", "inf", "-inf", "1e400", "1e300", "-1e300", "1e-320", "0", "-0", "-1", "1e30", "1e15", "0x10", "1_000", "١٢", "−3", "#N/A", "#DIV/0!",
-    "#12", "", " ", "TRUE", "01.02.2024", "1.234,5", "1 234", "1'234", "1.234", "1,5", "5 mm", "50%", "NULL", "-", "?", "1.2.3", "+5", ".5",
-    "5.", "1e3", "1E+03", "007", "=1+1", "@A1", "'5", "1/2", "1e", "--5", "½", "9" * 400, "a" * 5000, "\u200b5", "5\u200b", "\u202e5",
-)  # fmt: skip
+    "nan",
+    "inf",
+    "-inf",
+    "1e400",
+    "1e300",
+    "-1e300",
+    "1e-320",
+    "0",
+    "-0",
+    "-1",
+    "1e30",
+    "1e15",
+    "0x10",
+    "1_000",
+    "١٢",
+    "−3",
+    "#N/A",
+    "#DIV/0!",
+    "#12",
+    "",
+    " ",
+    "TRUE",
+    "01.02.2024",
+    "1.234,5",
+    "1 234",
+    "1'234",
+    "1.234",
+    "1,5",
+    "5 mm",
+    "50%",
+    "NULL",
+    "-",
+    "?",
+    "1.2.3",
+    "+5",
+    ".5",
+    "5.",
+    "1e3",
+    "1E+03",
+    "007",
+    "=1+1",
+    "@A1",
+    "'5",
+    "1/2",
+    "1e",
+    "--5",
+    "½",
+    "9" * 400,
+    "a" * 5000,
+    "\u200b5",
+    "5\u200b",
+    "\u202e5",
+)
 
 
 def mutate(rng, kind, data):
     """(what was done, the mutated file, its text where that is known and not plain UTF-8)."""
     if kind == "workbook":
         return _workbook(rng, data)
-    group = rng.choice((BYTES, LINES, NUMBERS, NUMBERS, *((COLUMNS, EXCEL, ENCODINGS) if kind == "table" else (SETTINGS,))))
+    group = rng.choice(
+        (BYTES, LINES, NUMBERS, NUMBERS, *((COLUMNS, EXCEL, ENCODINGS) if kind == "table" else (SETTINGS,)))
+    )
     done = rng.choice(group)
     changed = done(rng, data)
     text = None
@@ -42,7 +93,31 @@ def delete_bytes(rng, data):
 
 def insert_bytes(rng, data):
     at = rng.randrange(len(data) + 1)
-    more = rng.choice((b"\x00", b"\xff", b"\n", b"\r", b'"', b",", b";", b"\t", b"#", b"=", b"-", b"0", b"9", b".", b" ", b"\xc2\xa0", b"\xef\xbb\xbf", b"\x1a", b"[", b"]", b"e"))
+    more = rng.choice(
+        (
+            b"\x00",
+            b"\xff",
+            b"\n",
+            b"\r",
+            b'"',
+            b",",
+            b";",
+            b"\t",
+            b"#",
+            b"=",
+            b"-",
+            b"0",
+            b"9",
+            b".",
+            b" ",
+            b"\xc2\xa0",
+            b"\xef\xbb\xbf",
+            b"\x1a",
+            b"[",
+            b"]",
+            b"e",
+        )
+    )
     return data[:at] + more + data[at:]
 
 
@@ -91,7 +166,24 @@ def swap_lines(rng, lines):
 
 @_lines
 def insert_line(rng, lines):
-    more = ("", "# a remark", "#12 coupling", "#12,1,2,3,4", "# a, b", '"# a, b"', ";;;", ",,,", '"', "Title", "x" * 100_000, "#N/A", "-----", "===", " # x", "#")
+    more = (
+        "",
+        "# a remark",
+        "#12 coupling",
+        "#12,1,2,3,4",
+        "# a, b",
+        '"# a, b"',
+        ";;;",
+        ",,,",
+        '"',
+        "Title",
+        "x" * 100_000,
+        "#N/A",
+        "-----",
+        "===",
+        " # x",
+        "#",
+    )
     lines.insert(rng.randrange(len(lines)), rng.choice(more))
 
 
@@ -138,7 +230,13 @@ def rewrite_number(rng, data):
         return data
     m = rng.choice(found)
     number = float(m[0])
-    forms = [f"{number!r}", f"{number:e}", f"{number:.17g}", f" {m[0]} ", f"{m[0]}0" if "." in m[0] and "e" not in m[0].lower() else m[0]]
+    forms = [
+        f"{number!r}",
+        f"{number:e}",
+        f"{number:.17g}",
+        f" {m[0]} ",
+        f"{m[0]}0" if "." in m[0] and "e" not in m[0].lower() else m[0],
+    ]
     return (text[: m.start()] + rng.choice(forms) + text[m.end() :]).encode()
 
 
@@ -194,7 +292,10 @@ def repeat_column(rng, rows):
 
 @_columns
 def add_column(rng, rows):
-    at, name, value = rng.randrange(len(rows[0]) + 1), *rng.choice((("", ""), ("note", "x"), ("", "x"), ("mass_kg", "1"), ("note", "#N/A")))
+    at, name, value = (
+        rng.randrange(len(rows[0]) + 1),
+        *rng.choice((("", ""), ("note", "x"), ("", "x"), ("mass_kg", "1"), ("note", "#N/A"))),
+    )
     for number, row in enumerate(rows):
         row.insert(at, value if number else name)
 
@@ -203,7 +304,19 @@ def add_column(rng, rows):
 def rename_column(rng, rows):
     at = rng.randrange(len(rows[0]))
     name = rows[0][at]
-    rows[0][at] = rng.choice((name.upper(), name.title(), name[:-1], f" {name} ", f'"{name}"', name.replace("_", " "), name + "s", name.rpartition("_")[0] or name, "#" + name))
+    rows[0][at] = rng.choice(
+        (
+            name.upper(),
+            name.title(),
+            name[:-1],
+            f" {name} ",
+            f'"{name}"',
+            name.replace("_", " "),
+            name + "s",
+            name.rpartition("_")[0] or name,
+            "#" + name,
+        )
+    )
 
 
 @_columns
@@ -226,7 +339,10 @@ def _dress(change):
 
 
 def _semicolons(text):
-    return "\n".join(line if line.startswith("#") else line.replace(",", ";").replace(".", ",") for line in text.split("\n"))
+    return "\n".join(
+        line if line.startswith("#") else line.replace(",", ";").replace(".", ",")
+        for line in text.split("\n")
+    )
 
 
 EXCEL = [
@@ -238,9 +354,15 @@ EXCEL = [
         lambda _r, t: t.replace("\n", "\r").encode(),
         lambda _r, t: "\n".join(x if x.startswith("#") else x and x + ",,," for x in t.split("\n")).encode(),
         lambda _r, t: (t + ",,,\n,,,\n\n").encode(),
-        lambda _r, t: "\n".join(x if x.startswith("#") else x and '"' + x.replace(",", '","') + '"' for x in t.split("\n")).encode(),
-        lambda _r, t: "\n".join(x if x.startswith("#") else x.replace(",", "\t") for x in t.split("\n")).encode(),
-        lambda _r, t: "\n".join(x if x.startswith("#") else x.replace(",", "\u00a0, ") for x in t.split("\n")).encode(),
+        lambda _r, t: "\n".join(
+            x if x.startswith("#") else x and '"' + x.replace(",", '","') + '"' for x in t.split("\n")
+        ).encode(),
+        lambda _r, t: "\n".join(
+            x if x.startswith("#") else x.replace(",", "\t") for x in t.split("\n")
+        ).encode(),
+        lambda _r, t: "\n".join(
+            x if x.startswith("#") else x.replace(",", "\u00a0, ") for x in t.split("\n")
+        ).encode(),
         lambda r, t: re.sub(NUMBER, lambda m: f"{float(m[0]):.2E}" if r.random() < 0.3 else m[0], t).encode(),
         lambda r, t: re.sub(NUMBER, lambda m: f"{float(m[0]):.2f}" if r.random() < 0.3 else m[0], t).encode(),
         lambda _r, t: re.sub(r"(?<=,)(\d{4})(?=[,\n])", r"\1.000", t).encode(),
@@ -255,8 +377,14 @@ for _i, _f in enumerate(EXCEL):
 def encode(rng, data):
     text = data.decode("utf-8-sig")
     if rng.random() < 0.5:  # a name with a letter that tells encodings apart
-        text = re.sub(r"\b(left|right|A|B|S|1x|V1)\b", lambda m: rng.choice(("Lager süd", "Опора", "°", "µ", m[0])), text)
-    encoding = rng.choice(("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1251", "cp1252", "utf-32", "utf-7"))
+        text = re.sub(
+            r"\b(left|right|A|B|S|1x|V1)\b",
+            lambda m: rng.choice(("Lager süd", "Опора", "°", "µ", m[0])),
+            text,
+        )
+    encoding = rng.choice(
+        ("utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1251", "cp1252", "utf-32", "utf-7")
+    )
     try:
         return text.encode(encoding), text
     except UnicodeError:
@@ -265,7 +393,16 @@ def encode(rng, data):
 
 ENCODINGS = (encode,)
 BYTES = (flip_bit, delete_bytes, insert_bytes, swap_bytes, truncate, repeat_bytes)
-LINES = (delete_line, repeat_line, swap_lines, insert_line, insert_line, comment_line_out, join_lines, repeat_everything)
+LINES = (
+    delete_line,
+    repeat_line,
+    swap_lines,
+    insert_line,
+    insert_line,
+    comment_line_out,
+    join_lines,
+    repeat_everything,
+)
 NUMBERS = (change_digit, change_number, change_number, rewrite_number, scale_number)
 COLUMNS = (swap_columns, swap_names, delete_column, repeat_column, add_column, rename_column, label_with_sign)
 
@@ -277,7 +414,28 @@ def change_value(rng, data):
     if not found:
         return data
     m = rng.choice(found)
-    new = rng.choice(("true", '"x"', "[]", "{}", "[1, 2]", "1979-05-27", '""', "1e400", "nan", "-inf", "0x10", "[[1]]", '"' + "(" * 500 + '"', '"a**b**c"', '"1/0"', '"x**99999999"', "9" * 5000, "[" * 3000))
+    new = rng.choice(
+        (
+            "true",
+            '"x"',
+            "[]",
+            "{}",
+            "[1, 2]",
+            "1979-05-27",
+            '""',
+            "1e400",
+            "nan",
+            "-inf",
+            "0x10",
+            "[[1]]",
+            '"' + "(" * 500 + '"',
+            '"a**b**c"',
+            '"1/0"',
+            '"x**99999999"',
+            "9" * 5000,
+            "[" * 3000,
+        )
+    )
     return (text[: m.start(1)] + new + text[m.end(1) :]).encode()
 
 
@@ -324,7 +482,26 @@ def _set(change):
 def cell_value(rng, cell):
     import datetime
 
-    values = (None, "", " ", "x", "#1", "#N/A", True, 0, -1, 1e300, datetime.datetime(2024, 5, 1), "7,2", "1.234,5", "'5", "\n", "a\nb", "_x000D_", 10**20)
+    values = (
+        None,
+        "",
+        " ",
+        "x",
+        "#1",
+        "#N/A",
+        True,
+        0,
+        -1,
+        1e300,
+        datetime.datetime(2024, 5, 1),
+        "7,2",
+        "1.234,5",
+        "'5",
+        "\n",
+        "a\nb",
+        "_x000D_",
+        10**20,
+    )
     cell.value = rng.choice(values)
 
 
@@ -341,7 +518,9 @@ def cell_decimal_comma(_rng, cell):
 
 @_set
 def cell_format(rng, cell):
-    cell.number_format = rng.choice(("0.00", "0%", "0.00E+00", "dd.mm.yyyy", "@", "#,##0.000", "General", "[h]:mm"))
+    cell.number_format = rng.choice(
+        ("0.00", "0%", "0.00E+00", "dd.mm.yyyy", "@", "#,##0.000", "General", "[h]:mm")
+    )
 
 
 @_set
@@ -386,7 +565,9 @@ def delete_a_column(rng, _book, sheet):
 
 def merge(rng, _book, sheet):
     a = rng.randrange(1, sheet.max_row + 1)
-    sheet.merge_cells(start_row=a, end_row=a + rng.randrange(1, 3), start_column=1, end_column=rng.randrange(1, 3))
+    sheet.merge_cells(
+        start_row=a, end_row=a + rng.randrange(1, 3), start_column=1, end_column=rng.randrange(1, 3)
+    )
 
 
 def rename_sheet(rng, _book, sheet):
@@ -408,9 +589,26 @@ def delete_sheet(_rng, book, sheet):
 
 
 CELLS = (
-    cell_value, cell_value, cell_value, cell_text, cell_decimal_comma, cell_format, cell_formula, cell_error, cell_scale, stray_format, insert_row,
-    delete_row, insert_blank_column, delete_a_column, merge, rename_sheet, add_sheet, hide_sheet, delete_sheet,
-)  # fmt: skip
+    cell_value,
+    cell_value,
+    cell_value,
+    cell_text,
+    cell_decimal_comma,
+    cell_format,
+    cell_formula,
+    cell_error,
+    cell_scale,
+    stray_format,
+    insert_row,
+    delete_row,
+    insert_blank_column,
+    delete_a_column,
+    merge,
+    rename_sheet,
+    add_sheet,
+    hide_sheet,
+    delete_sheet,
+)
 
 
 def generator(seed, number):

@@ -66,7 +66,12 @@ def _workbook(folder):
             sheet.append([_cell(text) for text in line.split(",")])
     sheets = {
         "planes": [["plane", "max_mass_g"], ["1", 6.5], ["2", 7.5]],
-        "settings": [["key", "value"], ["phase", "lag"], ["angles", "with rotation"], ["errors.phase_deg", 2]],
+        "settings": [
+            ["key", "value"],
+            ["phase", "lag"],
+            ["angles", "with rotation"],
+            ["errors.phase_deg", 2],
+        ],
     }
     for name, lines in sheets.items():
         sheet = book.create_sheet(name)
@@ -84,6 +89,7 @@ def _cell(text):
 
 MADE = {"influence.csv": _influence, "job.xlsx": _workbook}
 
+RESPONSE = "response rotor.toml --unbalance unbalance.csv --speeds 500:700:100"
 SUBJECTS = (
     Subject("bk_two_plane", "runs.csv", "balance runs.csv weights.csv", 4),
     Subject("bk_two_plane", "weights.csv", "balance runs.csv weights.csv", 3),
@@ -94,11 +100,11 @@ SUBJECTS = (
     Subject("compressor", "rotor.toml", "critical rotor.toml -n 2", 3),
     Subject("compressor", "shaft.csv", "critical rotor.toml -n 2"),
     Subject("compressor", "bearing.csv", "critical rotor.toml -n 2"),
-    Subject("compressor", "unbalance.csv", "response rotor.toml --unbalance unbalance.csv --speeds 500:700:100", 1),
+    Subject("compressor", "unbalance.csv", RESPONSE, 1),
     Subject("book_task_9", "modes.csv", "reduce --measured modes.csv --compliance compliance.csv"),
     Subject("book_task_9", "compliance.csv", "reduce --measured modes.csv --compliance compliance.csv"),
     Subject("identify/task_1_1", "data.csv", "identify model.toml data.csv", 3),
     Subject("identify/task_1_1", "model.toml", "identify model.toml data.csv"),
     Subject("fit/run_down", "record.csv", "fit model.toml record.csv", 1),
     Subject("fit/run_down", "model.toml", "fit model.toml record.csv", 1),
-)  # fmt: skip
+)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import os
@@ -127,14 +126,9 @@ def _plain(value: object) -> Value:
 
 def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
     """A CSV file: comment lines, names of the columns, rows; numbers with all their digits."""
-    stream = io.StringIO()
-    for comment in comments:
-        stream.write(f"# {_one_line(comment)}\n")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([_text(name) for name in names])
-    for row in rows:
-        writer.writerow([_csv_cell(value) for value in row])
-    text = stream.getvalue()
+    lines = [f"# {_one_line(comment)}" for comment in comments]
+    lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
+    text = "\n".join([*lines, ""])
     # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.
     return text.encode("utf-8" if text.isascii() else "utf-8-sig")
 
@@ -144,7 +138,9 @@ def _csv_cell(value: Value) -> str:
         return "true" if value else "false"
     if isinstance(value, (int, float)):
         return repr(value)
-    return "" if value is None else _text(value)
+    text = "" if value is None else _text(value)
+    # any sign that could separate columns: a reader looks for one in the header
+    return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
 
 
 def _text(text: str) -> str:
