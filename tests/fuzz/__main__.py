@@ -81,7 +81,7 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="number of the first mutant")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--minutes", type=float, default=60.0, help="in all, at most")
     chosen = parser.parse_args()
     numbers = range(chosen.first, chosen.first + chosen.mutants)
     begun = time.monotonic()

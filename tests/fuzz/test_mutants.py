@@ -7,7 +7,7 @@ from fuzz.examining import CHANGED, FINDING, REFUSED, SAME, bench, examine, judg
 from fuzz.mutations import generator, mutate
 from fuzz.subjects import SUBJECTS
 
-MUTANTS = 500 if FULL else 125
+MUTANTS = 500 if FULL else 90
 
 
 @pytest.fixture(scope="module")
