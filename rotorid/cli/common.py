@@ -94,10 +94,9 @@ def check_targets(
             )
         if not path.parent.is_dir():
             raise ValueError(f"{path}: the folder {path.parent} does not exist")
-        if path.is_dir():
-            raise ValueError(f"{path}: cannot be written, it is a folder")
         if path.exists() and not path.is_file():
-            raise ValueError(f"{path}: cannot be written, it is no regular file")
+            what = "a folder" if path.is_dir() else "no regular file"
+            raise ValueError(f"{path}: cannot be written, it is {what}")
         if not os.access(path if path.exists() else path.parent, os.W_OK):
             raise ValueError(f"{path}: cannot be written, permission denied")
         twin = next((other for other in asked if _same_file(path, other)), None)

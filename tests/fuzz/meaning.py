@@ -9,6 +9,7 @@ import csv
 import io
 import re
 import tomllib
+from decimal import Decimal
 
 import openpyxl
 
@@ -64,7 +65,7 @@ def table(text):
 
 
 def table_sense(read):
-    """What must stay the same for the answer to stay: cells by column, numbers as numbers."""
+    """What must stay the same for the answer to stay: cells by column, numbers with their digits."""
     comments, header, rows = read
     order = sorted(range(len(header)), key=lambda i: header[i])
     return (
@@ -75,7 +76,8 @@ def table_sense(read):
 
 
 def _number(cell):
-    return float(cell) if PLAIN.fullmatch(cell) else cell
+    """A number and the place of its last digit, which is its resolution."""
+    return (float(cell), Decimal(cell).as_tuple().exponent) if PLAIN.fullmatch(cell) else cell
 
 
 def table_file(read):

@@ -34,32 +34,20 @@ def file_content(path: Path) -> bytes:
         If it cannot be read, is larger than 200 MB, or no regular file (a pipe could go on for ever).
     """
     seen = _read.get()
-    if seen is None:
-        return _load(path)
-    if path not in seen:
-        seen[path] = _standard_input(path) if str(path) == STANDARD_INPUT else _load(path)
-    return seen[path]
-
-
-def _load(path: Path) -> bytes:
-    mode = path.stat().st_mode
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
-    if not stat.S_ISREG(mode):
-        raise OSError(
-            errno.EINVAL, "it is no regular file; a table may come from standard input, -", str(path)
-        )
-    with path.open("rb") as stream:
-        return _within_limit(path, stream.read(MOST_BYTES + 1))
-
-
-def _standard_input(path: Path) -> bytes:
-    if sys.stdin is None:
-        raise OSError(errno.EBADF, "it is closed", str(path))
-    return _within_limit(path, sys.stdin.buffer.read(MOST_BYTES + 1))
-
-
-def _within_limit(path: Path, data: bytes) -> bytes:
+    if seen is not None and path in seen:
+        return seen[path]
+    if seen is not None and str(path) == STANDARD_INPUT:
+        if sys.stdin is None:
+            raise OSError(errno.EBADF, "it is closed", str(path))
+        data = sys.stdin.buffer.read(MOST_BYTES + 1)
+    else:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise OSError(errno.EINVAL, "it is no regular file; - is standard input", str(path))
+        with path.open("rb") as stream:
+            data = stream.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
+    if seen is not None:
+        seen[path] = data
     return data

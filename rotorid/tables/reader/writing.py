@@ -92,10 +92,8 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     }
     try:
         for path in files:
-            if path.is_dir():
-                raise IsADirectoryError(21, "it is a folder", str(path))
             if path.exists() and not path.is_file():
-                raise OSError(22, "it is no regular file", str(path))
+                raise OSError(22, "it is a folder" if path.is_dir() else "it is no regular file", str(path))
         for path, data in files.items():
             with waiting[path].open("xb") as stream:
                 stream.write(data)

@@ -40,13 +40,6 @@ def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
     assert expected in words(book)
 
 
-def test_cells_are_counted_before_they_are_read(book, monkeypatch):
-    monkeypatch.setattr(workbook, "_SMALL", 0)
-    monkeypatch.setattr(workbook, "MOST_CELLS", 40)
-    monkeypatch.setattr(workbook, "_sheets", lambda *_: pytest.fail("read"))
-    assert "at most 40 cells" in words(book)
-
-
 def test_a_bomb_is_not_unpacked(book, monkeypatch):
     stream = io.BytesIO(book.read_bytes())
     with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
