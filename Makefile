@@ -20,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-latest test-lowest mutants golden golden-exact lint docs format bench build constraints clean
+.PHONY: demo test test-full test-latest test-lowest mutants fuzz golden golden-exact lint docs format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -47,6 +47,12 @@ MINUTES ?= 15
 JOBS ?= 2
 mutants: $(VENV)/.dev
 	$(BIN)/python tests/mutants/mutants.py --seed $(SEED) --number $(N) --minutes $(MINUTES) --jobs $(JOBS)
+
+# MUTANTS of the samples through the commands that read them, drawn by SEED: no traceback, none over 10 s or 1 GB, no
+# other answer than the same content written plainly gives; legitimate changes are listed.
+MUTANTS ?= 5000
+fuzz: $(VENV)/.dev
+	PYTHONPATH=tests:. $(BIN)/python -m fuzz --seed $(SEED) --mutants $(MUTANTS) --jobs $(JOBS)
 
 # Stored outputs of every command on every sample (tests/golden): after a change that is meant to change them.
 golden: $(VENV)/.dev

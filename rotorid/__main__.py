@@ -1,6 +1,20 @@
-"""`python -m rotorid`."""
+"""`python -m rotorid`, and the command `rotorid`."""
 
-from rotorid.cli import main
+import signal
+from types import FrameType
+
+
+def _end(_signal: int, _frame: FrameType | None) -> None:
+    raise SystemExit(130)
+
+
+def run() -> None:
+    """Run the command line; Ctrl-C while it is still being loaded ends it quietly, too."""
+    signal.signal(signal.SIGINT, _end)
+    from rotorid.cli import main
+
+    main()
+
 
 if __name__ == "__main__":
-    main()
+    run()

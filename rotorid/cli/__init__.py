@@ -95,6 +95,11 @@ def main() -> None:
                 app()
             finally:
                 sys.stdout.flush()
+    except (ArithmeticError, MemoryError) as problem:
+        reason = f"numbers too large or too small to compute with: {problem}"
+        sys.exit(
+            _complain(ValueError(reason if isinstance(problem, ArithmeticError) else "not enough memory"))
+        )
     except (ValueError, OSError) as problem:
         # ValueError covers InputError (files) and everything the library refuses with one clear sentence
         if isinstance(problem, BrokenPipeError):
@@ -119,7 +124,8 @@ def _complain(problem: Exception) -> int:
     text = str(problem)
     if isinstance(problem, OSError) and problem.strerror:
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
-    print(f"rotorid: {_safe(text)}", file=sys.stderr)
+    with contextlib.suppress(BrokenPipeError):
+        print(f"rotorid: {_safe(text)}", file=sys.stderr)
     return 2
 
 

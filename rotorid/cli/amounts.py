@@ -10,7 +10,7 @@ from balancing.data.conventions import Labels
 from rotorid.base.text import listing
 from rotorid.tables.job.quantity import Quantity, to_job_weight
 from rotorid.tables.reader import units
-from rotorid.tables.reader.number import NotANumber, check_size, parse_number
+from rotorid.tables.reader.number import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.runs.conventions import ANGLES, as_angles, polar
 
@@ -31,7 +31,7 @@ def amount(text: str, what: str, example: str) -> tuple[float, str]:
         if match is None:
             raise NotANumber("a number with a unit")
         value = parse_number(match[1])
-        check_size(value)
+        check_size(value, LARGEST_STATED)
     except NotANumber as error:
         raise ValueError(f"{what} {text.strip()!r}: expected {error}, such as {example}") from None
     return value, (match[2] or "").strip()

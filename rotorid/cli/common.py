@@ -48,6 +48,8 @@ OperatingOption = Annotated[
     typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
 ]
 
+FASTEST = 1e9
+"""rad/s; no rotor turns so fast, and squares of larger numbers may overflow."""
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
 STATE_SPACES = (".json", ".npz", ".mat")
@@ -56,12 +58,13 @@ STATE_SPACES = (".json", ".npz", ".mat")
 def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str, Any]:
     """Program version, input files with their hashes, date and options of a result."""
     from rotorid import __version__
+    from rotorid.tables.reader.input_file import file_content
 
     return {
         "program": "rotorid",
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "inputs": [{"file": str(f), "sha256": hashlib.sha256(f.read_bytes()).hexdigest()} for f in files],
+        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
         "options": {
             k: str(v) if isinstance(v, Path) else v
             for k, v in options.items()
@@ -91,8 +94,9 @@ def check_targets(
             )
         if not path.parent.is_dir():
             raise ValueError(f"{path}: the folder {path.parent} does not exist")
-        if path.is_dir():
-            raise ValueError(f"{path}: cannot be written, it is a folder")
+        if path.exists() and not path.is_file():
+            what = "a folder" if path.is_dir() else "no regular file"
+            raise ValueError(f"{path}: cannot be written, it is {what}")
         if not os.access(path if path.exists() else path.parent, os.W_OK):
             raise ValueError(f"{path}: cannot be written, permission denied")
         twin = next((other for other in asked if _same_file(path, other)), None)
@@ -236,7 +240,7 @@ def band(text: str | None) -> tuple[float, float] | None:
         low, high = (float(part) for part in body.split(":"))
     except ValueError:
         low = high = -1.0
-    if not 0 <= low < high < 1e9:
+    if not 0 <= low < high <= FASTEST / factor:
         raise ValueError(
             f"--operating {text!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
         )
@@ -315,9 +319,10 @@ def speeds(text: str, unit: str = "rad_s", what: str = "--speeds") -> list[float
             raise ValueError(f"{what} {text!r} has more than a million speeds")
         values = list(first + step * np.arange(int(np.floor((last - first) / step * (1 + 1e-12) + 1e-9)) + 1))
         factors = [factors[0]] * len(values)
-    if min(values) < 0:
-        raise ValueError(f"{what} {text!r}: speeds must be finite and not negative")
-    return [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+    found = [float(v) * factor for v, factor in zip(values, factors, strict=True)]
+    if min(found) < 0 or max(found) > FASTEST:
+        raise ValueError(f"{what} {text!r}: speeds must be from 0 to {FASTEST:g} rad/s")
+    return found
 
 
 def rising_speeds(text: str, what: str = "--speeds") -> list[float]:

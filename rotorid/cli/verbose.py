@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -87,8 +88,20 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapper(*args: Any, verbose: bool = False, **kwargs: Any) -> None:  # noqa: ANN401 - any command
-        if not verbose:
-            return command(*args, **kwargs)
+        from rotorid.tables.reader.input_file import each_file_once
+        from rotorid.tables.reader.number import LARGEST_STATED
+
+        for option, value in kwargs.items():
+            if isinstance(value, float) and LARGEST_STATED < abs(value) < math.inf:
+                name = option.replace("_", "-")
+                raise ValueError(f"--{name} takes a number up to {LARGEST_STATED:g} in size, not {value:g}")
+        with each_file_once():
+            if verbose:
+                with_notes(*args, **kwargs)
+            else:
+                command(*args, **kwargs)
+
+    def with_notes(*args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - any command
         notes = Notes(time.perf_counter())
         token = _NOTES.set(notes)
         try:
@@ -100,7 +113,6 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
             _tell(notes)
         finally:
             _NOTES.reset(token)
-        return None
 
     hints = {**get_type_hints(command, include_extras=True), "verbose": VerboseOption}
     signature = inspect.signature(command)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from rotorid.base.text import sentence
+from rotorid.base.text import listing, sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row
 
 if TYPE_CHECKING:
@@ -41,11 +41,14 @@ class Group:
         In one word, and in words.
     rows
         In the order of their source.
+    failure
+        Why they could not be computed; empty if they were.
     """
 
     name: str
     title: str
     rows: tuple[Row, ...]
+    failure: str = ""
 
     def sources(self) -> dict[str, list[Row]]:
         """Rows by where they are printed."""
@@ -76,14 +79,17 @@ class Validation:
 
     @property
     def holds(self) -> bool:
-        """Whether no row differs."""
-        return not self.counts[DIFFERS]
+        """Whether no row differs and no group failed."""
+        return not self.counts[DIFFERS] and not any(group.failure for group in self.groups)
 
     @property
     def last_line(self) -> str:
         """The result in one line."""
         n = self.counts
-        return f"{len(self.rows)} numbers: {n[AGREES]} agree, {n[ERRATUM]} errata, {n[DIFFERS]} differ"
+        failed = listing([repr(group.name) for group in self.groups if group.failure], "and")
+        return f"{len(self.rows)} numbers: {n[AGREES]} agree, {n[ERRATUM]} errata, {n[DIFFERS]} differ" + (
+            f"; not computed: {failed}" if failed else ""
+        )
 
     def summary(self, *, every: bool = False) -> str:
         """Text: a line for each source, then what differs, errata and wide tolerances with their reasons.
@@ -98,6 +104,8 @@ class Validation:
         lines = [head]
         for group in self.groups:
             lines.append(group.title)
+            if group.failure:
+                lines.append(f"  FAILED, none of its numbers was computed: {group.failure}")
             for source, rows in group.sources().items():
                 lines.append(_source_line(source, rows, width))
                 if every:
@@ -123,7 +131,13 @@ class Validation:
         return {
             "rows": [{"group": g.name, **r.to_dict()} for g in self.groups for r in g.rows],
             "groups": [
-                {"group": g.name, "title": g.title, "numbers": len(g.rows), **_counts(g.rows)}
+                {
+                    "group": g.name,
+                    "title": g.title,
+                    "numbers": len(g.rows),
+                    **_counts(g.rows),
+                    **({"failure": g.failure} if g.failure else {}),
+                }
                 for g in self.groups
             ],
             "counts": {"numbers": len(self.rows), **self.counts},
@@ -163,7 +177,15 @@ def validate(groups: Iterable[str] | None = None) -> Validation:
         "time_records": time_records.rows,
         "balancing": balancing.rows,
     }
-    return Validation(tuple(Group(name, PROVIDERS[name], tuple(rows[name]())) for name in chosen))
+    return Validation(tuple(_group(name, rows[name]) for name in chosen))
+
+
+def _group(name: str, provider: Callable[[], Iterable[Row]]) -> Group:
+    """What a provider computes; where it fails, the others are still to be shown."""
+    try:
+        return Group(name, PROVIDERS[name], tuple(provider()))
+    except Exception as error:  # a failure of any kind is a result of the proof
+        return Group(name, PROVIDERS[name], (), f"{type(error).__name__}: {error}")
 
 
 def _counts(rows: Sequence[Row]) -> dict[Status, int]:

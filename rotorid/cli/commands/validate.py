@@ -22,7 +22,8 @@ def validate(
     Example: rotorid validate --output numbers.csv
 
     A number agrees within half a unit of its last printed digit, or within a stated tolerance that has its
-    reason; an erratum of the print has its reason, too. Exit status 0 if no number differs, 1 if one does.
+    reason; an erratum of the print has its reason, too. A group that fails is said, the others are
+    shown. Exit status 0 if no number differs and no group fails, else 1.
     """
     from rotorid.validation import validate as prove
     from rotorid.validation.row import tables

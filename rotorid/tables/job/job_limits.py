@@ -18,7 +18,7 @@ from rotorid.base.text import listing
 from rotorid.tables.job.keys import Pair, PlaneKeys, SensorKeys
 from rotorid.tables.job.quantity import Quantity, to_job_weight
 from rotorid.tables.reader import units
-from rotorid.tables.reader.number import NotANumber, check_size, parse_number
+from rotorid.tables.reader.number import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.runs.speeds import same_speed, show_speed
@@ -277,7 +277,7 @@ def _split(text: str, what: str, example: str) -> tuple[float, str]:
     match = _WORD.fullmatch(text)
     try:
         value = parse_number(match[1] if match else text)
-        check_size(value)
+        check_size(value, LARGEST_STATED)
     except NotANumber as error:
         raise ValueError(f"{what}: expected {error}, such as {example}") from None
     if value <= 0:

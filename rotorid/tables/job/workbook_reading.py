@@ -13,7 +13,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.job.keys import Columns
 from rotorid.tables.reader.columns import REMARKS, sheet_source
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, make_grid, show
+from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
 from rotorid.tables.reader.number import NotANumber, decimal_comma, parse_number
 from rotorid.tables.reader.problems import Problems
 
@@ -129,8 +129,11 @@ def _holds_cells(rows: Sequence[Row]) -> bool:
 
 def _is_a_form(rows: Sequence[Row]) -> bool:
     """Whether nothing is filled in below the header of the sheet runs."""
-    filled = [cells for _, cells in rows if any(show(cell) for cell in cells) and show(cells[0])[:1] != "#"]
-    return len(filled) == 1 and "run" in map(show, filled[0])
+    filled = [cells for _, cells in rows if any(show(cell) for cell in cells)]
+    while filled and is_comment(filled[0], in_sheet=True, below_header=False):
+        filled = filled[1:]
+    below = [cells for cells in filled[1:] if not is_comment(cells, in_sheet=True, below_header=True)]
+    return not below and bool(filled) and "run" in map(show, filled[0])
 
 
 def _check_prepared(grid: Grid, key: str, columns: Columns, problems: Problems) -> None:

@@ -94,6 +94,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         problems.stop()
         raise AssertionError("no file and no problem")
     section = Section(str(path), data, problems)
+    section.limit_names()
+    problems.stop()
     if "equations" not in section and any(key in section for key in _IN_TIME):
         return _from_time(section, path, problems)
     equations = _equations(section)

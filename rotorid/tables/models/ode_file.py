@@ -116,6 +116,8 @@ def read_ode_model(path: str | Path) -> OdeModel:
         problems.stop()
         raise AssertionError("no file and no problem")
     section = Section(str(path), data, problems)
+    section.limit_names()
+    problems.stop()
     form = read_time_form(section, problems)
     model = None
     if not len(problems):

@@ -14,7 +14,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
 from rotorid.tables.reader.digits import written_steps
-from rotorid.tables.reader.grid import BadCell, Cell, Grid, make_grid, show
+from rotorid.tables.reader.grid import BadCell, Cell, Grid, is_spreadsheet_error, make_grid, show
 from rotorid.tables.reader.number import (
     NotANumber,
     check_size,
@@ -252,10 +252,11 @@ def _match(grid: Grid, columns: Sequence[Column], problems: Problems) -> dict[st
 
 def _complain_about_header(grid: Grid, columns: Sequence[Column], problems: Problems) -> None:
     expected = f"a header row with the names of columns, separated by , or ; or tabs: {_known(columns)}"
-    shown = (grid.separator or " ").join(name for name in grid.header if name)
+    shown = None  # who knows what stands in a file that is no table
     later = _header_below(grid, columns)
+    problems.withdraw(grid.source)  # that rows are longer than a title is no news
     if later is not None:
-        problems.withdraw(grid.source)  # that rows are longer than a title is no news
+        shown = (grid.separator or " ").join(name for name in grid.header if name)
         expected = (
             f"the header in the first row, and it seems to be row {later}: "
             "delete what stands above it, or begin those rows with #"
@@ -368,6 +369,8 @@ def _name(text: str) -> str:
         raise NotANumber("a name")
     if text[0] in "=@":
         raise NotANumber("a name; one that begins with = or @ would be a formula in a spreadsheet")
+    if is_spreadsheet_error(text) or not text.strip("#"):
+        raise NotANumber("a name, not an error of the spreadsheet")
     if not text.isprintable():
         raise NotANumber("a name without line breaks and control characters")
     return text

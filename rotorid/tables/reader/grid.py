@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -11,6 +12,11 @@ from rotorid.tables.reader.problems import Problems
 LOOKED_AT = 10
 """A header that is not the first row stands among so many."""
 
+MOST_CELLS = 5_000_000
+"""Of a file."""
+
+_SPREADSHEET_ERROR = re.compile(r"#(?:N/A|N/D|NV|Н/Д|[A-ZА-Я]+(?:/0)?[!?])")
+"""#N/A, #DIV/0!, #ИМЯ?"""
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u202f\u2007\u2009"), " ") | {0xFEFF: None}
 
 
@@ -32,6 +38,12 @@ class Shown(float):
         self = super().__new__(cls, value)
         self.text = text
         return self
+
+
+class CommentLine(str):
+    """A line of a text file that is a comment."""
+
+    __slots__ = ()
 
 
 Cell = str | int | float | BadCell
@@ -88,6 +100,27 @@ def show(cell: Cell) -> str:
     return cell if isinstance(cell, str) else repr(cell)
 
 
+def is_comment(cells: tuple[Cell, ...], *, in_sheet: bool, below_header: bool) -> bool:
+    """Whether a row is a comment; below the header of a sheet one stands alone in its row.
+
+    A row of a text file is one if its reader has found so: labels such as "#12 coupling" begin with `#`, too.
+    """
+    first = cells[0] if cells else ""
+    if not in_sheet or not isinstance(first, str):
+        return isinstance(first, CommentLine)
+    return begins_comment(first) and not (below_header and any(cell != "" for cell in cells[1:]))
+
+
+def begins_comment(text: str) -> bool:
+    """Whether text begins with `#`, not with an error of a spreadsheet."""
+    return text.startswith("#") and not is_spreadsheet_error(re.split("[,;\t]", text)[0].strip())
+
+
+def is_spreadsheet_error(cell: str) -> bool:
+    """Whether a cell holds what a spreadsheet shows for an error, in English or another language."""
+    return _SPREADSHEET_ERROR.fullmatch(cell) is not None
+
+
 def make_grid(
     source: str,
     rows: Iterable[Row],
@@ -116,8 +149,7 @@ def make_grid(
     comments: list[str] = []
     filled: list[Row] = []
     for number, cells in rows:
-        first = cells[0] if cells else ""
-        if isinstance(first, str) and first.startswith("#"):
+        if is_comment(cells, in_sheet=not separator, below_header=bool(filled)):
             comments.append(_comment(cells, separator))
         elif not all(cell == "" for cell in cells):
             filled.append((number, cells))
@@ -157,6 +189,8 @@ def _fit(source: str, header: list[str], row: Row, separator: str, problems: Pro
         found = len(cells)
         while not show(cells[found - 1]):
             found -= 1
+        if show(cells[0]).startswith("#"):
+            hint = f"; a comment below the header is a line that begins with # and has no {separator} in it"
         problems.add(
             source,
             number,

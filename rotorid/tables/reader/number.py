@@ -15,6 +15,8 @@ _WITH_UNIT = re.compile(r"([+-]?[0-9][0-9.,]*(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]|[
 _NOT_FINITE = {"nan", "inf", "infinity", "-nan", "ind", "1.#qnan", "1.#inf", "-1.#ind", "1.#ind", "-1.#inf"}
 SMALLEST, LARGEST = 1e-30, 1e30
 """Sizes outside occur in no table of this project, but squares of them overflow."""
+LARGEST_STATED = 1e12
+"""Of an option."""
 
 _MISSING = {"na", "n/a", "#n/a", "null", "none", "-", "--", "?"}
 
@@ -56,18 +58,18 @@ def thousands_or_decimals(cells: Iterable[str], name: str) -> set[str]:
     return doubtful if not decimals and (whole or name.casefold().endswith("_rpm")) else set()
 
 
-def check_size(value: float) -> None:
+def check_size(value: float, largest: float = LARGEST) -> None:
     """Refuse a number that no instrument shows.
 
     Raises
     ------
     NotANumber
-        For one that is not finite, or not zero and outside 1e-30 … 1e30.
+        For one that is not finite, or not zero and outside 1e-30 … `largest`.
     """
     if not math.isfinite(value):
         raise NotANumber("a finite number")
-    if value and not SMALLEST <= abs(value) <= LARGEST:
-        raise NotANumber(f"0 or a number between {SMALLEST:g} and {LARGEST:g} in size")
+    if value and not SMALLEST <= abs(value) <= largest:
+        raise NotANumber(f"0 or a number between {SMALLEST:g} and {largest:g} in size")
 
 
 def parse_number(text: str, *, comma: bool = False, separator: str = "") -> float:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rotorid.base.suggestions import suggest
+from rotorid.tables.reader.input_file import STANDARD_INPUT
 
 __all__ = ["InputError", "Problem", "Problems", "TableWarning"]
 __all__ += ["printable", "quote", "suggest"]
@@ -120,7 +121,8 @@ def _message(problems: tuple[Problem, ...]) -> str:
 
 
 def _line(problem: Problem, rows: str, values: tuple[str, ...]) -> str:
-    place = [printable(problem.file), *([rows] if rows else [])]
+    file = "standard input" if problem.file == STANDARD_INPUT else problem.file
+    place = [printable(file), *([rows] if rows else [])]
     if problem.column is not None:
         what = "key" if problem.file.endswith(".toml") else "column"
         place.append(f"{what} {printable(problem.column)}")

@@ -9,7 +9,8 @@ import warnings
 from pathlib import Path
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.grid import Grid, Row, clean, make_grid
+from rotorid.tables.reader.grid import MOST_CELLS, CommentLine, Grid, Row, begins_comment, clean, make_grid
+from rotorid.tables.reader.input_file import file_content
 from rotorid.tables.reader.problems import Problems, TableWarning
 
 _SEP_LINE = re.compile(r'"?sep=(.)"?[;,\t]*', re.IGNORECASE | re.DOTALL)
@@ -20,7 +21,7 @@ _NAMES = {";": "semicolon", ",": "comma", "\t": "tab"}
 def read_bytes(path: Path, problems: Problems) -> bytes | None:
     """The content of a file, or None and a problem."""
     try:
-        return path.read_bytes()
+        return file_content(path)
     except FileNotFoundError:
         problems.add(str(path), None, None, None, f"a file that exists{_neighbour(path)}")
     except IsADirectoryError:
@@ -109,25 +110,35 @@ def parse_text(source: str, text: str, problems: Problems, *, may_be_empty: bool
             return None
     else:
         separator = _separator(lines)
+    if len(lines) + text.count(separator) > MOST_CELLS:
+        problems.add(source, None, None, None, f"a table of at most {MOST_CELLS:,} cells")
+        return None
     rows: list[Row] = []
-    complete = True
+    complete, below_header = True, False
     for number, line in enumerate(lines, start=1):
-        stripped = line.strip()
-        if stripped.startswith("#"):
-            rows.append((number, (clean(stripped),)))
-            continue
-        if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
-            rows.append((number, tuple(clean(cell) for cell in line.split(separator)) if line else ()))
+        stripped = clean(line)
+        if begins_comment(stripped) and not (below_header and separator in line):
+            rows.append((number, (CommentLine(stripped),)))
             continue
         try:
-            cells = next(csv.reader([line], delimiter=separator, strict=True), [])
+            cells = _cells(line, separator)
         except csv.Error as error:
             rule = "quotes that are closed on the same line (a cell cannot hold a line break)"
-            problems.add(source, number, None, stripped, f"{rule}: {error}")
+            problems.add(source, number, None, None, f"{rule}: {error}")
             complete = False
             continue
-        rows.append((number, tuple(clean(cell) for cell in cells)))
+        if not below_header and cells and begins_comment(cells[0]) and not any(cells[1:]):
+            cells = (CommentLine(cells[0]),)  # a comment with a separator in it, as a spreadsheet saves it
+        else:
+            below_header = below_header or any(cells)
+        rows.append((number, cells))
     return make_grid(source, rows, separator, problems, complete=complete, may_be_empty=may_be_empty)
+
+
+def _cells(line: str, separator: str) -> tuple[str, ...]:
+    if '"' not in line:  # a line at a time: an open quote must not swallow the rest of the file
+        return tuple(clean(cell) for cell in line.split(separator)) if line else ()
+    return tuple(clean(cell) for cell in next(csv.reader([line], delimiter=separator, strict=True), []))
 
 
 def _separator(lines: list[str]) -> str:

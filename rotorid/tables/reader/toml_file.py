@@ -14,11 +14,17 @@ from rotorid.tables.reader.number import LARGEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 
+MOST_BYTES = 20_000_000
+MOST_NAMES = 1_000
+
 
 def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
     """The content of a TOML file, or None and a problem."""
     data = read_bytes(path, problems)
     if data is None:
+        return None
+    if len(data) > MOST_BYTES:
+        problems.add(str(path), None, None, None, f"a TOML file of at most {MOST_BYTES // 10**6} MB")
         return None
     try:
         text = data.decode("utf-8-sig")
@@ -178,6 +184,12 @@ class Section:
         inner = {name: outer.section(name) for name in outer._data}
         return {name: section for name, section in inner.items() if section is not None}
 
+    def limit_names(self) -> None:
+        """Complain about every list and table of a model with more names than can be worked with."""
+        for key, value in self._data.items():
+            if isinstance(value, (list, dict)) and len(value) > MOST_NAMES:
+                self.complain(key, f"at most {MOST_NAMES:,} names; these are {len(value):,}", value=False)
+
     def missing(self, key: str, expected: str) -> None:
         """Note that a key is missing."""
         self.complain(key, expected, value=False)
@@ -192,7 +204,9 @@ class Section:
             if key not in self._known:
                 hint = did_you_mean(key, self._known)
                 known = listing(self._known, "and") or "none yet"
-                self.complain(key, f"a known key{hint}; known are {known}")
+                # nothing is printed of a file of something else
+                shown = bool(self._prefix or hint) or any(name in self._data for name in self._known)
+                self.complain(key, f"a known key{hint}; known are {known}", value=shown)
 
 
 def _finite(value: float) -> bool:

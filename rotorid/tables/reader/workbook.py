@@ -5,16 +5,22 @@ from __future__ import annotations
 import datetime
 import io
 import re
+import time
 import warnings
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from rotorid.tables.reader.grid import BadCell, Cell, Row, Shown, clean
+from rotorid.tables.reader.grid import MOST_CELLS, BadCell, Cell, Row, Shown, clean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 
 SUFFIXES = (".xlsx", ".xlsm")
+MOST_UNPACKED = 200_000_000
+"""Bytes of all parts of a workbook."""
+MOST_SECONDS = 60.0
+LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
 _DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
 """A number format with decimals or a power of ten."""
 
@@ -36,39 +42,87 @@ def read_workbook(path: Path, problems: Problems) -> dict[str, list[Row]] | None
         problems.add(str(path), None, None, None, "an Excel workbook, as the name says; this is none")
         return None
     try:
-        values, formulas = _load(data, values=True), _load(data, values=False)
-        return {
-            sheet.title: list(_rows(sheet, formulas[sheet.title]))
-            for sheet in values.worksheets
-            if sheet.title in formulas.sheetnames
-        }
+        _check_size(data)
+        return _sheets(data, time.monotonic() + MOST_SECONDS)
+    except _TooLarge as error:
+        problems.add(str(path), None, None, None, str(error))
     except Exception as error:  # openpyxl lets errors of zip, XML and its own through, of any class
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         problems.add(str(path), None, None, None, f"an intact Excel workbook (reading it failed: {reason})")
-        return None
+    return None
 
 
-def _load(data: bytes, *, values: bool) -> Any:  # noqa: ANN401  openpyxl has no types
+class _TooLarge(ValueError):
+    """The message says what was expected instead."""
+
+
+def _check_size(data: bytes) -> None:
+    """Refuse a workbook that unpacks to too much, before it is unpacked."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = sum(part.file_size for part in archive.infolist())
+    if size > MOST_UNPACKED:
+        most = MOST_UNPACKED / 1e6
+        raise _TooLarge(f"a workbook of at most {most:.0f} MB unpacked; this one has {size / 1e6:.0f} MB")
+
+
+def _sheets(data: bytes, deadline: float) -> dict[str, list[Row]]:
     import openpyxl
+    from openpyxl.cell.read_only import ReadOnlyCell
+    from openpyxl.worksheet._reader import FORMULA_TAG, WorkSheetParser
+
+    class Parser(WorkSheetParser):  # type: ignore[misc]
+        """Stored values as openpyxl reads them, and formulas that have none."""
+
+        def parse_cell(self, element: Any) -> Any:  # noqa: ANN401
+            cell = super().parse_cell(element)
+            if cell["value"] is None and element.find(FORMULA_TAG) is not None:
+                cell |= {"value": self.parse_formula(element), "data_type": "f"}
+            return cell
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # about styles and validation rules, which do not concern us
-        return openpyxl.load_workbook(io.BytesIO(data), data_only=values)
+        book = openpyxl.load_workbook(io.BytesIO(data), data_only=True, read_only=True)
+        found: dict[str, list[Row]] = {}
+        for sheet in book.worksheets:
+            # not its iter_rows, which fills gaps up to the last format and drops rows that are not in order
+            with sheet._get_source() as source:
+                rows = Parser(
+                    source,
+                    sheet._shared_strings,
+                    data_only=True,
+                    epoch=book.epoch,
+                    date_formats=book._date_formats,
+                    timedelta_formats=book._timedelta_formats,
+                ).parse()
+                made = ((number, [ReadOnlyCell(sheet, **cell) for cell in cells]) for number, cells in rows)
+                found[sheet.title] = sorted(_rows(made, deadline), key=lambda row: row[0])
+    return found
 
 
-def _rows(values: Any, formulas: Any) -> Iterator[Row]:  # noqa: ANN401
-    for row, written in zip(values.iter_rows(), formulas.iter_rows(), strict=True):
-        if row:
-            yield row[0].row, tuple(_cell(cell, source) for cell, source in zip(row, written, strict=True))
+def _rows(rows: Iterable[tuple[int, list[Any]]], deadline: float) -> Iterator[Row]:
+    """The rows that hold something, without blanks at their ends."""
+    total = 0
+    for number, written in rows:
+        if time.monotonic() > deadline:
+            raise _TooLarge(f"a workbook that can be read in {MOST_SECONDS:.0f} seconds")
+        cells = {cell.column: value for cell in written if (value := _cell(cell)) != ""}
+        if not cells:
+            continue
+        if number > LAST_ROW or max(cells) > LAST_COLUMN:
+            raise ValueError(f"a cell beyond row {LAST_ROW} or column {LAST_COLUMN}")
+        total += max(cells)
+        if total > MOST_CELLS:
+            raise _TooLarge(f"a workbook of at most {MOST_CELLS:,} cells; this one has more")
+        yield number, tuple(cells.get(column, "") for column in range(1, max(cells) + 1))
 
 
-def _cell(cell: Any, written: Any) -> Cell:  # noqa: ANN401
+def _cell(cell: Any) -> Cell:  # noqa: ANN401
     value = cell.value
     if value is None:
-        if written.data_type == "f":
-            formula = str(getattr(written.value, "text", written.value))
-            return BadCell(formula, "a formula with its stored value: open and save the file in Excel")
         return ""
+    if cell.data_type == "f":
+        formula = str(getattr(value, "text", value))
+        return BadCell(formula, "a formula with its stored value: open and save the file in Excel")
     if cell.data_type == "e":
         return BadCell(str(value), "a value, not an error of the spreadsheet")
     if isinstance(value, bool):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import os
 import re
+import stat
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,19 +81,28 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     InputError
         If one cannot be written; where that shows before the first is replaced, all stay as they were.
     """
-    waiting = {path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in files}
     if not files:
         return
     path = next(iter(files))
+    # behind a link, the file that it names
+    targets = {path: Path(os.path.realpath(path)) for path in files}
+    waiting = {
+        path: target.with_name(f".{target.name[:80]}.{number}.{os.getpid()}.tmp")
+        for number, (path, target) in enumerate(targets.items())
+    }
     try:
         for path in files:
-            if path.is_dir():
-                raise IsADirectoryError(21, "it is a folder", str(path))
+            if path.exists() and not path.is_file():
+                raise OSError(22, "it is a folder" if path.is_dir() else "it is no regular file", str(path))
         for path, data in files.items():
             with waiting[path].open("xb") as stream:
                 stream.write(data)
+                if targets[path].exists():
+                    waiting[path].chmod(stat.S_IMODE(targets[path].stat().st_mode))
+                stream.flush()
+                os.fsync(stream.fileno())
         for path, temporary in waiting.items():
-            temporary.replace(path)
+            temporary.replace(targets[path])
     except OSError as error:
         expected = f"a file that can be written ({error.strerror or error})"
         raise InputError([Problem(str(path), None, None, None, expected)]) from error
@@ -115,14 +124,9 @@ def _plain(value: object) -> Value:
 
 def csv_bytes(comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]]) -> bytes:
     """A CSV file: comment lines, names of the columns, rows; numbers with all their digits."""
-    stream = io.StringIO()
-    for comment in comments:
-        stream.write(f"# {_one_line(comment)}\n")
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([_text(name) for name in names])
-    for row in rows:
-        writer.writerow([_csv_cell(value) for value in row])
-    text = stream.getvalue()
+    lines = [f"# {_one_line(comment)}" for comment in comments]
+    lines += [",".join(map(_csv_cell, row)) for row in (names, *rows)]
+    text = "\n".join([*lines, ""])
     # Excel takes a file without the mark for its own 8-bit encoding; plain ASCII needs none.
     return text.encode("utf-8" if text.isascii() else "utf-8-sig")
 
@@ -132,7 +136,9 @@ def _csv_cell(value: Value) -> str:
         return "true" if value else "false"
     if isinstance(value, (int, float)):
         return repr(value)
-    return "" if value is None else _text(value)
+    text = "" if value is None else _text(value)
+    # any sign that could separate columns: a reader looks for one in the header
+    return '"' + text.replace('"', '""') + '"' if re.search('[,;\t"]|^#', text) else text
 
 
 def _text(text: str) -> str:

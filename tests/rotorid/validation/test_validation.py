@@ -355,3 +355,27 @@ def test_tables_of_printed_numbers_say_where_they_are_printed():
         assert first.startswith("# ")
         assert len(first.split()) >= 5
         assert len(printed_table(path.name)) >= 1
+
+
+def test_a_group_that_fails_is_said_and_the_others_are_shown(cli, monkeypatch):
+    import rotorid.validation
+    from rotorid.validation import balancing, lessons, masses, rotor, time_records
+
+    def broken():
+        raise KeyError("a table is gone")
+
+    for module in (balancing, lessons, time_records):
+        monkeypatch.setattr(module, "rows", list)
+    monkeypatch.setattr(masses, "rows", broken)
+    found = rotorid.validation.validate(["masses", "rotor"])
+    assert not found.holds
+    assert [group.failure for group in found.groups] == ["KeyError: 'a table is gone'", ""]
+    assert found.groups[1].rows == tuple(rotor.rows())
+    assert "FAILED, none of its numbers was computed: KeyError: 'a table is gone'" in found.summary()
+    assert found.last_line.endswith("differ; not computed: 'masses'")
+    outcome = cli("validate", "--json")
+    assert outcome.code == 1
+    groups = {group["group"]: group for group in outcome.json["groups"]}
+    assert groups["masses"]["failure"] == "KeyError: 'a table is gone'"
+    assert "failure" not in groups["rotor"]
+    assert groups["rotor"]["agrees"] == 75

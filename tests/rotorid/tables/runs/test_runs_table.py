@@ -334,4 +334,4 @@ def test_weights_are_checked_even_if_the_runs_cannot_be_read(bad):
 def test_no_header(bad):
     problems = bad(RUNS[1:])
     words = "a header row with the names of columns, separated by , or ; or tabs: run, speed_rpm"
-    the_only(problems, "runs.csv", 1, None, "initial,1000,A,7.2,238", words)
+    the_only(problems, "runs.csv", 1, None, None, words)

@@ -1,0 +1,53 @@
+"""Input files as bytes: a command reads each of them once, so that its hash is that of what was read."""
+
+from __future__ import annotations
+
+import errno
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+
+STANDARD_INPUT = "-"
+MOST_BYTES = 200_000_000
+_read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
+
+
+@contextmanager
+def each_file_once() -> Iterator[None]:
+    """While a command runs, a file that was read is not read again, and `-` is standard input."""
+    token = _read.set({})
+    try:
+        yield
+    finally:
+        _read.reset(token)
+
+
+def file_content(path: Path) -> bytes:
+    """What a file holds, or held when the command first read it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, is larger than 200 MB, or no regular file (a pipe could go on for ever).
+    """
+    seen = _read.get()
+    if seen is not None and path in seen:
+        return seen[path]
+    if seen is not None and str(path) == STANDARD_INPUT:
+        if sys.stdin is None:
+            raise OSError(errno.EBADF, "it is closed", str(path))
+        data = sys.stdin.buffer.read(MOST_BYTES + 1)
+    else:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise OSError(errno.EINVAL, "it is no regular file; - is standard input", str(path))
+        with path.open("rb") as stream:
+            data = stream.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"it has more than {MOST_BYTES // 10**6} MB", str(path))
+    if seen is not None:
+        seen[path] = data
+    return data

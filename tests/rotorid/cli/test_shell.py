@@ -1,0 +1,184 @@
+"""The command as shells use it: interrupts, pipes, standard input, files that stay what they are."""
+
+import hashlib
+import io
+import itertools
+import os
+import signal
+import stat
+import subprocess
+import sys
+
+import pytest
+
+from rotorid.samples import sample_data
+from rotorid.tables.reader.writing import write_files
+
+ROTOR = sample_data() / "rotor23.csv"
+BK = sample_data() / "bk_two_plane"
+
+
+def start(*words, **options):
+    command = [sys.executable, "-m", "rotorid", *map(str, words)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, **options)
+
+
+def test_ctrl_c_while_loading_ends_quietly(tmp_path):
+    # an interpreter that stops itself at the first import that takes long
+    (tmp_path / "typer.py").write_text(
+        "import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\ntime.sleep(9)\n", encoding="utf-8"
+    )
+    path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
+    process = start("critical", ROTOR, env={**os.environ, "PYTHONPATH": path})
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, b"", b"")
+
+
+def test_ctrl_c_while_it_reads_ends_quietly():
+    process = start("critical", "-", "--json")
+    process.stdin.write(b"length_m,")
+    process.stdin.flush()
+    while b"1" not in _pending(process):
+        pass
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (130, b"", b"")
+
+
+def _pending(process):
+    """Whether the process has loaded everything: it waits for its standard input."""
+    wchan = f"/proc/{process.pid}/wchan"
+    try:
+        with open(wchan, encoding="ascii") as stream:
+            return b"1" if "pipe" in stream.read() else b""
+    except OSError:
+        return b"1"
+
+
+def test_a_closed_pipe_ends_quietly():
+    process = start("critical", ROTOR)
+    for stream in (process.stdin, process.stdout, process.stderr):
+        stream.close()
+    assert process.wait(timeout=60) in (0, 1)
+
+
+def test_a_table_from_standard_input(cli, monkeypatch):
+    data = (BK / "runs.csv").read_bytes()
+    plain = cli("balance", BK / "runs.csv", BK / "weights.csv", "--json").json
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+    outcome = cli("balance", "-", BK / "weights.csv", "--json")
+    assert outcome.json["corrections"] == plain["corrections"]
+    source = outcome.json["provenance"]["inputs"][0]
+    assert source == {"file": "-", "sha256": hashlib.sha256(data).hexdigest()}
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+    outcome = cli("critical", "-")
+    assert outcome.code == 2
+    assert outcome.err.startswith("rotorid: standard input, row 2: expected a header row")
+    monkeypatch.setattr(sys, "stdin", None)
+    assert "standard input: expected a file that can be read (it is closed)" in cli("critical", "-").err
+
+
+def test_the_hash_is_that_of_what_was_read(cli, tmp_path, monkeypatch):
+    import fem
+
+    path = tmp_path / "rotor.csv"
+    path.write_bytes(ROTOR.read_bytes())
+    critical = fem.critical_speeds
+
+    def meanwhile(*words, **options):
+        path.write_bytes(b"another file")
+        return critical(*words, **options)
+
+    monkeypatch.setattr(fem, "critical_speeds", meanwhile)
+    outcome = cli("critical", path, "--json")
+    assert path.read_bytes() == b"another file"
+    expected = hashlib.sha256(ROTOR.read_bytes()).hexdigest()
+    assert outcome.json["provenance"]["inputs"][0]["sha256"] == expected
+
+
+def test_mode_and_link_of_a_file_stay(tmp_path):
+    (tmp_path / "sub").mkdir()
+    target, link = tmp_path / "sub" / "real.csv", tmp_path / "link.csv"
+    target.write_bytes(b"old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    dangling, new = tmp_path / "dangling.csv", tmp_path / "sub" / "new.csv"
+    dangling.symlink_to(new)
+    long = tmp_path / ("x" * 250 + ".csv")
+    write_files({link: b"1", dangling: b"2", long: b"3"})
+    assert link.is_symlink()
+    assert dangling.is_symlink()
+    assert [p.read_bytes() for p in (target, new, long)] == [b"1", b"2", b"3"]
+    assert stat.S_IMODE(target.stat().st_mode) == 0o640
+    assert len(list(tmp_path.rglob("*"))) == 6
+
+
+def test_what_is_written_is_on_the_disk_before_it_replaces(tmp_path, monkeypatch):
+    done = []
+    sync, replace = os.fsync, os.replace
+    monkeypatch.setattr(os, "fsync", lambda fd: (done.append("sync"), sync(fd))[1])
+    monkeypatch.setattr(os, "replace", lambda *a: (done.append("replace"), replace(*a))[1])
+    write_files({tmp_path / "a.csv": b"1", tmp_path / "b.csv": b"2"})
+    assert done == ["sync", "sync", "replace", "replace"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_a_pipe_is_no_target(cli, tmp_path):
+    os.mkfifo(tmp_path / "o.csv")
+    outcome = cli("critical", ROTOR, "--output", tmp_path / "o.csv")
+    assert outcome.code == 2
+    assert "no regular file" in outcome.err
+
+
+EXTREME = ("1e308", "-1e308", "1e400", "nan", "inf", "-inf", "1e-320", "9" * 25, "1e13", "", "abc")
+SPEEDS = (
+    *EXTREME,
+    "0:1e308:1e307",
+    "1e300:1e301:1e300",
+    "1e300rpm",
+    "1e308Hz",
+    "1e308:1.7e308:1e307",
+    "0:0:1",
+)
+OPTIONS = {
+    ("campbell", ROTOR): {"--speeds": SPEEDS, "--operating": SPEEDS},
+    ("influence", ROTOR, "--planes", "3", "--sensors", "5"): {"--speeds": SPEEDS},
+    ("critical", ROTOR): {"-n": EXTREME, "--operating": ("1:1e308", "1e308:1e309", "1e300rpm:1e301rpm")},
+    ("balance", BK / "job.toml"): {
+        "--amplitude-error": EXTREME,
+        "--phase-error": EXTREME,
+        "--run-error": EXTREME,
+        "--ridge": EXTREME,
+        "--max-mass": (*EXTREME, "1e30g", "1e-300g"),
+        "--speeds": SPEEDS,
+    },
+}
+
+
+def test_extreme_options_are_answered_or_refused(cli):
+    for words, options in OPTIONS.items():
+        for option, values in options.items():
+            for value in values if option != "--speeds" or words[0] != "balance" else values[::2]:
+                outcome = cli(
+                    *words,
+                    f"{option}={value}" if option.startswith("--") else option,
+                    *([] if option.startswith("--") else [value]),
+                )
+                what = (words[0], option, value, outcome.err[-300:])
+                assert outcome.code in (0, 2), what
+                printed = (outcome.out + outcome.err).replace(repr(value), "").replace(value or "-", "")
+                assert not any(f" {bad} " in printed for bad in ("inf", "nan", "-inf")), what
+                assert "encountered in" not in printed, what
+                assert "Traceback" not in printed, what
+
+
+def test_speeds_are_bounded():
+    from rotorid.cli.common import FASTEST, band, speeds
+
+    for text, unit in itertools.product(("1e9", "9e9", "1e300"), ("rpm", "Hz", "")):
+        if float(text) * {"rpm": 0.105, "Hz": 6.28, "": 1.0}[unit] > FASTEST:
+            with pytest.raises(ValueError, match="speeds must be from 0 to"):
+                speeds(text + unit)
+            with pytest.raises(ValueError, match="is not a range"):
+                band(f"1:{text}{unit}")

@@ -1,0 +1,140 @@
+"""Files that are too large, or no files: refused in a sentence before they cost time or memory."""
+
+import io
+import os
+import zipfile
+
+import openpyxl
+import pytest
+from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
+
+from rotorid.tables import read_harmonic_model, read_ode_model, read_rotor, read_trials
+from rotorid.tables.reader import grid, input_file, text_file, workbook
+from rotorid.tables.reader.input_file import each_file_once, file_content
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.workbook import read_workbook
+
+
+@pytest.fixture
+def book(tmp_path):
+    return write_book(tmp_path / "job.xlsx", {"runs": RUNS, "weights": WEIGHTS})
+
+
+def words(path):
+    problems = Problems()
+    assert read_workbook(path, problems) is None
+    (problem,) = problems.of(str(path))
+    return problem.expected
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "expected"),
+    [
+        ("MOST_CELLS", 30, "at most 30 cells"),
+        ("MOST_UNPACKED", 1000, "unpacked"),
+        ("MOST_SECONDS", -1.0, "can be read in"),
+    ],
+)
+def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
+    monkeypatch.setattr(workbook, limit, value)
+    assert expected in words(book)
+
+
+def test_a_bomb_is_not_unpacked(book, monkeypatch):
+    stream = io.BytesIO(book.read_bytes())
+    with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("xl/media/x.bin", b"\0" * 1_000_000)
+    book.write_bytes(stream.getvalue())
+    monkeypatch.setattr(workbook, "MOST_UNPACKED", 500_000)
+    monkeypatch.setattr(workbook, "_sheets", lambda *_: pytest.fail("read"))
+    assert "1 MB" in words(book)
+
+
+def test_rows_of_a_workbook_in_any_order_and_without_sizes(book):
+    def rewritten(change):
+        stream = io.BytesIO()
+        with zipfile.ZipFile(book) as old, zipfile.ZipFile(stream, "w") as new:
+            for part in old.infolist():
+                data = old.read(part)
+                new.writestr(part, change(data) if part.filename.endswith("sheet1.xml") else data)
+        return stream.getvalue()
+
+    def reversed_rows(data):
+        head, *rows = data.replace(b"</sheetData>", b"<row end").split(b"<row ")
+        rows, end = rows[:-1], rows[-1]
+        return (
+            head + b"".join(b"<row " + row for row in rows[::-1]) + b"</sheetData>" + end.removeprefix(b"end")
+        )
+
+    plain = read_workbook(book, Problems())
+    for change in (
+        reversed_rows,
+        lambda data: data.replace(b'<dimension ref="A1:E7"', b'<dimension ref="A1:B2"'),
+    ):
+        path = book.with_name("other.xlsx")
+        path.write_bytes(rewritten(change))
+        assert path.read_bytes() != book.read_bytes()
+        assert read_workbook(path, Problems()) == plain
+
+
+def test_a_formula_without_its_value_is_refused_and_one_with_it_is_read(tmp_path):
+    made = openpyxl.Workbook()
+    made.active.append(["x", "y"])
+    made.active.append(["=1+1", 2])
+    made.save(tmp_path / "f.xlsx")
+    (rows,) = read_workbook(tmp_path / "f.xlsx", Problems()).values()
+    assert rows[1][1][0] == grid.BadCell(
+        "=1+1", "a formula with its stored value: open and save the file in Excel"
+    )
+
+
+def test_a_text_table_beyond_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_file, "MOST_CELLS", 20)
+    path = write_csv(tmp_path / "runs.csv", RUNS)
+    (problem,) = complaints(read_trials, path, write_csv(tmp_path / "w.csv", WEIGHTS[:2]))
+    assert "at most 20 cells" in problem.expected
+
+
+def test_a_large_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(input_file, "MOST_BYTES", 10)
+    (problem,) = complaints(read_rotor, write_csv(tmp_path / "rotor.csv", RUNS))
+    assert "it has more than 0 MB" in problem.expected
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
+def test_pipes_and_devices_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    for name in ("pipe.csv", "zero.csv"):
+        (problem,) = complaints(read_rotor, tmp_path / name)
+        assert "no regular file" in problem.expected
+
+
+def test_a_command_reads_a_file_once(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"one")
+    with each_file_once():
+        assert file_content(path) == b"one"
+        path.write_bytes(b"two")
+        assert file_content(path) == b"one"
+    assert file_content(path) == b"two"
+
+
+NAMES = [f"k{i}" for i in range(5000)]
+VALUES = "".join(f"{name} = 1.0\n" for name in NAMES)
+MODELS = {
+    "estimate": (read_harmonic_model, f'equations = ["k0*X = F"]\nestimate = {NAMES}\n'.replace("'", '"')),
+    "known": (read_harmonic_model, f'equations = ["k0*X = F"]\nestimate = ["k0"]\n[known]\n{VALUES}'),
+    "states": (read_ode_model, "[states]\n" + VALUES.replace("1.0", '"x"') + "[estimate]\na = 1\n"),
+    "outputs": (read_ode_model, "[outputs]\n" + VALUES.replace("1.0", '"x"') + "[estimate]\na = 1\n"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("key", MODELS)
+def test_a_model_of_5000_names_is_refused(tmp_path, key):
+    read, text = MODELS[key]
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    (problem,) = complaints(read, path)
+    assert problem.column == key
+    assert "at most 1,000 names; these are 5,000" in problem.expected
