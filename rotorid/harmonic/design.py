@@ -258,6 +258,8 @@ def _sensitivities(
     for name in sensors:
         if name not in model.outputs:
             raise ValueError(f"{name} is no output; those are {', '.join(model.outputs)}")
+    if model.varying:
+        raise ValueError(f"a design needs {', '.join(model.varying)} known, not changing from row to row")
     lost = [name for name in model.inputs if name not in inputs]
     if lost or not sensors:
         raise ValueError(f"give the amplitude of {', '.join(lost)}" if lost else "no output has a sensor")

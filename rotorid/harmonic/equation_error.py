@@ -280,7 +280,7 @@ def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recover
         return {}
     part = experiments.take(driven)
     try:
-        found = model.predict(recovery.solutions[0], part.frequencies, part.signals)
+        found = model.predict(recovery.solutions[0], part.frequencies, part.signals, part.varying)
     except (np.linalg.LinAlgError, ValueError):
         return {}
     out = {}

@@ -13,7 +13,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, degree, times
 
 P = "p"
@@ -33,6 +33,8 @@ class Feature:
         Coefficient of each monomial of the parameters, known numbers inserted.
     symbolic
         The same with the names of the known.
+    varying
+        Product of known quantities that change from row to row, such as a speed: [S] (4).
     """
 
     equation: int
@@ -40,17 +42,7 @@ class Feature:
     signal: str
     exact: dict[Monomial, Fraction]
     symbolic: dict[Monomial, Polynomial]
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """All terms coefficient · monomial(θ) · p^power · signal of all equations as flat arrays (t,)."""
-
-    equation: IntArray
-    power: IntArray
-    signal: IntArray
-    monomial: IntArray
-    coefficient: FloatArray
+    varying: Monomial = ONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,33 +69,68 @@ class Combinations:
 
 
 def split_features(
-    equation: int, polynomial: Polynomial, known: Mapping[str, Fraction], signals: frozenset[str]
+    equation: int,
+    polynomial: Polynomial,
+    known: Mapping[str, Fraction],
+    signals: frozenset[str],
+    varying: frozenset[str] = frozenset(),
 ) -> list[Feature]:
     """Sort an equation's terms by p^k · signal; ValueError where it is not linear in the signals."""
-    symbolic: dict[tuple[int, str], dict[Monomial, Polynomial]] = {}
+    symbolic: dict[tuple[int, str, Monomial], dict[Monomial, Polynomial]] = {}
     for monomial, value in polynomial.items():
-        k, signal, numbers, parameters = 0, CONSTANT, [], []
+        k, signal, numbers, parameters, factors_of_row = 0, CONSTANT, [], [], []
         for name, exponent in monomial:
             if name == P:
                 k = exponent
+            elif name in varying:
+                factors_of_row.append((name, exponent))
             elif name in signals:
                 if signal or exponent != 1:
                     term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
-                    raise ValueError(f"it is not linear in the signals: it contains {term}")
+                    raise ValueError(
+                        f"it is not linear in the signals: it contains {term} (a quantity that is known in each "
+                        f"row of the table is named under varying)"
+                    )
                 signal = name
             elif name in known:
                 numbers.append((name, exponent))
             else:
                 parameters.append((name, exponent))
-        place = symbolic.setdefault((k, signal), {}).setdefault(tuple(parameters), {})
+        place = symbolic.setdefault((k, signal, tuple(factors_of_row)), {}).setdefault(tuple(parameters), {})
         place[tuple(numbers)] = value
     features = []
-    for (k, signal), parts in sorted(symbolic.items(), key=lambda item: item[0]):
+    for (k, signal, factors), parts in sorted(symbolic.items(), key=lambda item: item[0]):
         exact = {m: insert(part, known) for m, part in parts.items()}
         exact = {m: x for m, x in exact.items() if x}
         if exact:
-            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}))
+            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}, factors))
     return features
+
+
+def multipliers(
+    powers: Sequence[int],
+    products: Sequence[Monomial],
+    frequencies: FloatArray,
+    varying: Mapping[str, FloatArray] | None = None,
+) -> ComplexArray:
+    """(iω)^k and the varying quantities of each feature (n, f), for frequencies (n,) and quantities (n,)."""
+    w, k = np.asarray(frequencies, dtype=float), np.asarray(powers, dtype=np.int_)
+    if (k < 0).any() and (w == 0).any():
+        raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
+    # exact powers of i, so that a real row has no imaginary dust
+    out = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+    for j, product in enumerate(products):
+        for name, exponent in product:
+            if varying is None or name not in varying:
+                raise ValueError(
+                    f"{name} stands as a factor in the equations and is neither known nor estimated: "
+                    f"the measurements must have its value in every row (a column {name})"
+                )
+            value = np.asarray(varying[name], dtype=float)
+            if exponent < 0 and (value == 0).any():
+                raise ValueError(f"an equation divides by {name}, which is 0 in a row of the measurements")
+            out[:, j] *= value ** float(exponent)
+    return np.asarray(out, dtype=complex)
 
 
 def insert(polynomial: Polynomial, known: Mapping[str, Fraction]) -> Fraction:
@@ -122,20 +149,6 @@ def lifted(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Mono
     order = {name: i for i, name in enumerate(parameters)}
     found = {m for feature in features for m in feature.exact if m != ONE}
     return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
-
-
-def flatten(features: Sequence[Feature], monomials: Sequence[Monomial], signals: Sequence[str]) -> Terms:
-    """Features as flat arrays; monomial 0 is 1, the others follow; signal −1 is the constant."""
-    place = {ONE: 0} | {m: i + 1 for i, m in enumerate(monomials)}
-    column = {name: i for i, name in enumerate(signals)} | {CONSTANT: -1}
-    rows = [
-        (f.equation, f.power, column[f.signal], place[m], float(x))
-        for f in features
-        for m, x in f.exact.items()
-    ]
-    table = np.array(rows, dtype=float).reshape(-1, 5)
-    whole = table[:, :4].astype(np.int64)
-    return Terms(whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], table[:, 4])
 
 
 def merge(

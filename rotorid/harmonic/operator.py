@@ -7,14 +7,15 @@ p² = −ω², b = 0, and odd powers of p, which would need imaginary amplitudes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.harmonic.features import CONSTANT, Feature
+from rotorid.harmonic.features import CONSTANT, Feature, multipliers
+from rotorid.harmonic.polynomial import Monomial
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class Operator:
         Coefficients, features × monomials.
     exponents
         Of the parameters in each monomial, monomials × parameters.
+    varying
+        Product of known quantities that change from row to row, of each feature.
     """
 
     parameters: tuple[str, ...]
@@ -41,6 +44,7 @@ class Operator:
     power: IntArray
     C: FloatArray
     exponents: IntArray
+    varying: tuple[Monomial, ...]
 
     @cached_property
     def _is_output(self) -> BoolArray:
@@ -75,7 +79,12 @@ class Operator:
         return self.C @ monomials, self.C @ slopes
 
     def forced(
-        self, theta: FloatArray, frequencies: FloatArray, inputs: ComplexArray, slopes: bool = True
+        self,
+        theta: FloatArray,
+        frequencies: FloatArray,
+        inputs: ComplexArray,
+        slopes: bool = True,
+        varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Amplitudes (n, e) and their derivatives (n, e, parameters).
 
@@ -89,6 +98,8 @@ class Operator:
             Amplitudes of the inputs, (n, inputs).
         slopes
             False: without derivatives (an empty array).
+        varying
+            Known quantities (n,) that change from row to row, by name.
 
         Raises
         ------
@@ -97,7 +108,7 @@ class Operator:
         """
         P, dP = self.polynomials(theta)
         n, e = len(frequencies), len(self.outputs)
-        pk = self._p(frequencies)
+        pk = self.multipliers(frequencies, varying)
         A = ((pk * P) @ self._place).reshape(n, e, e)
         # only inputs and terms without a signal are in it so far
         load = pk * self._amplitudes(np.zeros((n, e), dtype=complex), inputs)
@@ -109,9 +120,17 @@ class Operator:
         G = -np.stack([load[:, f] @ dP[f] for f in self.rows], axis=1)
         return Z, np.asarray(np.linalg.solve(A, G), dtype=np.complex128)
 
-    def dynamic_stiffness(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n)."""
+    def dynamic_stiffness(
+        self, theta: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n).
+
+        Varying quantities (1,) have the values of one row.
+        """
         P, dP = self.polynomials(theta)
+        if any(self.varying):
+            row = multipliers([0] * len(P), self.varying, np.ones(1), varying)[0].real
+            P, dP = P * row, dP * row[:, None]
         e = len(self.outputs)
         use = self._is_output & (self.power % 2 == 0)
         low = int(self.power[use].min()) if use.any() else 0
@@ -126,19 +145,26 @@ class Operator:
             dA[at] += sign[f] * dP[f]
         return A, dA
 
-    def loads(self, frequencies: FloatArray, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
-        """What each feature's coefficient multiplies: p^k · amplitude, (n, f)."""
-        return self._p(frequencies) * self._amplitudes(Z, inputs)
+    def loads(
+        self,
+        frequencies: FloatArray,
+        Z: ComplexArray,
+        inputs: ComplexArray,
+        varying: Mapping[str, FloatArray] | None = None,
+    ) -> ComplexArray:
+        """What each feature's coefficient multiplies: p^k · varying · amplitude, (n, f)."""
+        return self.multipliers(frequencies, varying) * self._amplitudes(Z, inputs)
 
     def _amplitudes(self, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
         """Amplitude that each feature multiplies, (n, f)."""
         table = np.concatenate((Z, inputs, np.ones((len(Z), 1))), axis=1)
         return np.asarray(table[:, self.signal])
 
-    def _p(self, frequencies: FloatArray) -> ComplexArray:
-        """p^k of each feature, (n, f)."""
-        p = 1j * np.asarray(frequencies, dtype=np.float64)
-        return np.asarray(p[:, None] ** self.power, dtype=np.complex128)
+    def multipliers(
+        self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
+        """p^k · varying of each feature, (n, f)."""
+        return multipliers(self.power.tolist(), self.varying, frequencies, varying)
 
 
 def compile_operator(
@@ -179,4 +205,5 @@ def compile_operator(
         power=np.array([f.power for f in features], dtype=np.int_),
         C=C,
         exponents=np.array(list(monomials), dtype=np.int_).reshape(-1, len(parameters)),
+        varying=tuple(f.varying for f in features),
     )

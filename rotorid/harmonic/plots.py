@@ -216,6 +216,8 @@ def _curve(result: Identification) -> Curve | None:
     w = _frequencies(result)[forced]
     if not np.isfinite(values).all() or len(w) < 2 or len(model.outputs) != len(model.equations):
         return None
+    if model.varying:
+        return None
     # what is measured may lie at a peak: the line passes exactly there
     grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
     inputs: dict[str, ComplexArray] = {}

@@ -22,7 +22,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Combinations `matrix @ monomials(θ) = values`.
+    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
 
     Attributes
     ----------
@@ -34,6 +34,8 @@ class System:
         (q, monomials).
     values, covariance
         (q,), and (q, q) or None.
+    below
+        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
     """
 
     names: tuple[str, ...]
@@ -41,6 +43,24 @@ class System:
     matrix: FloatArray
     values: FloatArray
     covariance: FloatArray | None
+    below: FloatArray | None = None
+
+    def combinations(self, theta: FloatArray) -> FloatArray:
+        """Values (q,) at the parameters."""
+        return np.asarray(self.matrix @ self.monomials(theta) / self._bottom(theta))
+
+    def cleared(self) -> System:
+        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
+        if self.below is None:
+            return self
+        matrix = self.matrix - self.values[:, None] * self.below
+        values = np.where(self.below.any(axis=1), 0.0, self.values)
+        return System(self.names, self.exponents, matrix, values, None)
+
+    def _bottom(self, theta: FloatArray) -> FloatArray:
+        if self.below is None:
+            return np.ones(len(self.values))
+        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
 
     def monomials(self, theta: FloatArray) -> FloatArray:
         """Values (monomials,)."""
@@ -54,7 +74,10 @@ class System:
             lower = self.exponents[used].copy()
             lower[:, j] -= 1
             out[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
-        return np.asarray(self.matrix @ out)
+        slopes = self.matrix @ out
+        if self.below is not None:
+            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
+        return np.asarray(slopes / self._bottom(theta)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +154,7 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
     free = [j for j in range(len(names)) if j not in fixed]
     base = np.full(len(names), GAUGE)
     warnings: list[str] = []
-    candidates, searched = real_solutions(system, free, base)
+    candidates, searched = real_solutions(system.cleared(), free, base)
     found: list[tuple[float, FloatArray]] = []
     weight = _weights(system)
     for start in candidates:
@@ -190,7 +213,7 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
         return theta
 
     def misfit(t: FloatArray) -> FloatArray:
-        return np.asarray(weight @ (system.matrix @ system.monomials(t) - system.values))
+        return np.asarray(weight @ (system.combinations(t) - system.values))
 
     with np.errstate(all="ignore"):
         r = misfit(theta)
@@ -223,8 +246,9 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
 def _misfit(system: System, theta: FloatArray) -> float:
     """Largest error of a combination in units of what rounding and four standard deviations allow."""
     mu = system.monomials(theta)
-    size = np.abs(system.matrix) @ np.abs(mu) + np.abs(system.values) + 1e-300
-    error = np.abs(system.matrix @ mu - system.values) / size
+    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system._bottom(theta))
+    size += np.abs(system.values) + 1e-300
+    error = np.abs(system.combinations(theta) - system.values) / size
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
     return float(np.max(error / (1e-6 + 4 * std / size)))
 

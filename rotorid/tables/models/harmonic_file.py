@@ -54,8 +54,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """Read a model file (`harmonic.toml`).
 
     Its keys are `equations` (texts with p = d/dt), `estimate` (names), `known` (name = number), optional
-    `inputs` (names of the exciting amplitudes), `[bounds]` (name = [lowest, highest]), `[start]` (name =
-    guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
+    `inputs` (names of the exciting amplitudes), `varying` (names of known quantities that change from row to
+    row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest, highest]),
+    `[start]` (name = guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
 
     Instead of equations there may be a linear model in time as `read_ode_model` reads it, such as the one
     that `rotorid reduce --model` writes: `M`, `C`, `K` (then (M p² + C p + K) X = F with amplitudes named
@@ -99,6 +100,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     equations = _equations(section)
     estimate = _names(section, "estimate", 'such as estimate = ["c", "b"]', required=True)
     inputs = _names(section, "inputs", 'such as inputs = ["F"]', required=False)
+    varying = _names(section, "varying", 'such as varying = ["Omega"]', required=False)
     known = _numbers(section, "known")
     for name in estimate or ():
         if name in known:
@@ -116,7 +118,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         from rotorid.harmonic.model import harmonic_model
 
         try:
-            model = harmonic_model(equations, known=known, estimate=estimate, inputs=inputs)
+            model = harmonic_model(
+                equations, known=known, estimate=estimate, inputs=inputs, varying=varying or ()
+            )
         except ValueError as error:
             section.complain("equations", f"a usable model: {error}", value=False)
     problems.stop()
