@@ -21,7 +21,7 @@ from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.output_error import operator_of
+from rotorid.harmonic.operator import operator_of
 from rotorid.regression import least_squares
 
 if TYPE_CHECKING:

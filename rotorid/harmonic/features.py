@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -88,8 +89,8 @@ def split_features(
                 if signal or exponent != 1:
                     term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
                     raise ValueError(
-                        f"it is not linear in the signals: it contains {term} (a quantity that is known in each "
-                        f"row of the table is named under varying)"
+                        f"it is not linear in the signals: it contains {term} (name a quantity that is known "
+                        f"in each row under varying)"
                     )
                 signal = name
             elif name in known:
@@ -257,6 +258,29 @@ def combination_words(coefficients: Mapping[Monomial, Polynomial]) -> str:
     inverse = tuple((name, -e) for name, e in common)
     inside = _sum_words([(known, times(m, inverse), value) for known, m, value in terms])
     return f"{_product_words((), common)}*({inside})"
+
+
+def ratio_words(above: Polynomial, below: Polynomial) -> str:
+    """Write one sum over another, common factors cancelled.
+
+    Examples
+    --------
+    >>> one, ka, kb = Fraction(1), (("ka", 1),), (("kb", 1),)
+    >>> ratio_words({(("ka", 1), ("kb", 1)): one}, {ka: one, kb: one})
+    'ka*kb/(ka + kb)'
+    """
+    import sympy
+
+    def expression(polynomial: Polynomial) -> Any:  # noqa: ANN401 - sympy has no types
+        return sympy.Add(
+            *(
+                sympy.Rational(x.numerator, x.denominator)
+                * sympy.Mul(*(sympy.Symbol(name) ** e for name, e in monomial))
+                for monomial, x in polynomial.items()
+            )
+        )
+
+    return str(sympy.factor(sympy.cancel(expression(above) / expression(below))))
 
 
 def _sum_words(terms: Sequence[tuple[Monomial, Monomial, Fraction]]) -> str:

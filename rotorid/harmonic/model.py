@@ -163,11 +163,12 @@ class HarmonicModel:
             [f.power for f in self.features], [f.varying for f in self.features], frequencies, varying
         )
         out = np.zeros((len(weights), len(pk), len(self.equations), 1 + len(self.signals)), dtype=complex)
-        np.add.at(out, (slice(None), slice(None), equation, column), weights[:, None] * pk)
+        for j, (e, c) in enumerate(zip(equation, column, strict=True)):
+            out[:, :, e, c] += weights[:, j, None] * pk[:, j]
         return out
 
 
-def harmonic_model(  # noqa: C901
+def harmonic_model(
     equations: Sequence[str],
     *,
     known: Mapping[str, float] | None = None,
@@ -182,7 +183,8 @@ def harmonic_model(  # noqa: C901
     equations
         "left = right" in p = d/dt, known names, parameters and signals, such as "(m*p**2 + b*p + c)*X = F".
         Every name that is neither p, known nor to be estimated is a signal, but for one that stands only as a
-        factor of signals: that is varying. A term without a signal has amplitude 1. Denominators of several terms are multiplied out.
+        factor of signals: that is varying. A term without a signal has amplitude 1. Denominators of several
+        terms are multiplied out.
     known
         Numbers by name.
     estimate
@@ -276,7 +278,7 @@ def _all_features(
     expanded = []
     for i, (text, side) in enumerate(zip(equations, sides, strict=True)):
         with _named(i, text):
-            expanded.append(_expand(*side, known))
+            expanded.append(_expand(side[0], side[1], known))
     changing = _row_by_row([part for part, _ in expanded], names_, inputs, varying)
     features: list[Feature] = []
     for i, (text, (difference, bottom)) in enumerate(zip(equations, expanded, strict=True)):

@@ -15,6 +15,7 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.features import CONSTANT, Feature, multipliers
+from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.polynomial import Monomial
 
 
@@ -206,4 +207,11 @@ def compile_operator(
         C=C,
         exponents=np.array(list(monomials), dtype=np.int_).reshape(-1, len(parameters)),
         varying=tuple(f.varying for f in features),
+    )
+
+
+def operator_of(model: HarmonicModel) -> Operator:
+    """Compile a model for prediction; ValueError if equations and outputs differ in number."""
+    return compile_operator(
+        model.features, parameters=model.parameters, outputs=model.outputs, inputs=model.inputs
     )

@@ -26,7 +26,8 @@ from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import Operator, compile_operator
+from rotorid.harmonic.operator import Operator, operator_of
+from rotorid.harmonic.plausibility import doubts
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
 from rotorid.regression.estimate import Estimate
@@ -36,6 +37,8 @@ REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
 MOST_STARTS = 8
 """Solutions of the linear estimate from which to begin."""
+ROUNDING = 1e-9
+"""Relative errors that are smaller are rounding."""
 SAME = 1e-6
 """Parameters that differ by less, relatively, are the same solution."""
 
@@ -134,7 +137,9 @@ def output_error(
             break
         point = fit.estimate.solution
         comparison = comparison.reweighted(point)
-    return _result(_joined(rounds), comparison, experiments, operator)
+    joined = _joined(rounds)
+    J = comparison.jacobian(joined.estimate.solution)
+    return _result(replace(joined, estimate=_spare(joined.estimate, J)), comparison, experiments, operator)
 
 
 def identify_outputs(
@@ -171,7 +176,7 @@ def identify_outputs(
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
     free_of_bounds = not chosen.fit.at_bounds and estimate.full_rank and loss == "linear"
-    return Identification(
+    identification = Identification(
         model=model,
         experiments=experiments,
         method="output-error",
@@ -181,6 +186,7 @@ def identify_outputs(
         errors_stated=estimate.errors_stated,
         combinations=_combinations(model, estimate),
         solutions=tuple(dict(zip(model.parameters, map(float, point), strict=True)) for point in points),
+        starts=(dict(zip(model.parameters, estimate.solution.tolist(), strict=True)),),
         rank=estimate.rank,
         condition_number=estimate.condition_number,
         unidentifiable=(reasons or (estimate.describe_rank(),)) if np.isnan(values).any() else (),
@@ -192,8 +198,20 @@ def identify_outputs(
         if free_of_bounds
         else None,
         left_out=chosen.left_out,
-        warnings=(*(w for w in chosen.warnings if w != estimate.describe_rank()), *_misfit(estimate)),
+        converged=chosen.fit.converged,
+        warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
+    )
+    if not identification.converged:
+        return identification
+
+    def refit(others: Experiments) -> Sequence[FloatArray]:
+        from rotorid.harmonic.equation_error import linear_fit
+
+        return linear_fit(model, others).recovery.solutions
+
+    return replace(
+        identification, warnings=(*identification.warnings, *doubts(identification, estimate, bounds, refit))
     )
 
 
@@ -248,32 +266,10 @@ def _combinations(model: HarmonicModel, estimate: Estimate) -> tuple[FoundCombin
     return tuple(out)
 
 
-def _misfit(estimate: Estimate) -> tuple[str, ...]:
-    """A warning where residuals this large are improbable (0.1 %) for the stated errors."""
-    from scipy.special import chdtrc
-
-    if estimate.chi_square is None or estimate.dof < 1:
-        return ()
-    if chdtrc(estimate.dof, estimate.chi_square) > 1e-3:
-        return ()
-    ratio = float(np.sqrt(estimate.chi_square / estimate.dof))
-    return (
-        f"residuals are {ratio:.2g} times as large as the stated errors explain: the model, a reading, or "
-        "the errors stated are wrong, or a better minimum lies elsewhere (try another start)",
-    )
-
-
 def _rms(residuals: ComplexArray) -> float:
     used = residuals[~np.isnan(residuals)]
     parts = np.concatenate((used.real, used.imag))
     return float(np.sqrt(np.mean(parts**2))) if len(parts) else float("nan")
-
-
-def operator_of(model: HarmonicModel) -> Operator:
-    """Compile a model for prediction; ValueError if equations and outputs differ in number."""
-    return compile_operator(
-        model.features, parameters=model.parameters, outputs=model.outputs, inputs=model.inputs
-    )
 
 
 def _moved(before: NonlinearEstimate, after: NonlinearEstimate) -> float:
@@ -297,6 +293,30 @@ def _joined(rounds: Sequence[NonlinearEstimate]) -> NonlinearEstimate:
         message=f"converged in {iterations} iterations" if last.converged else last.message,
         history=np.concatenate([rounds[0].history, *(fit.history[1:] for fit in rounds[1:])]),
         costs=np.concatenate([rounds[0].costs, *(fit.costs[1:] for fit in rounds[1:])]),
+    )
+
+
+def _spare(estimate: Estimate, jacobian: FloatArray) -> Estimate:
+    """Without the degrees of freedom of rows that no parameter moves and that hold but for rounding.
+
+    Such are the phases of a model without damping: they are met by any values, and say nothing of errors.
+    """
+    still = np.abs(jacobian * estimate.solution).max(axis=1, initial=0.0) <= ROUNDING
+    idle = int(np.count_nonzero(still & (np.abs(estimate.residuals) <= ROUNDING)))
+    dof, factor = estimate.dof - idle, 1.0
+    if not idle:
+        return estimate
+    if not estimate.errors_stated:
+        factor = estimate.dof / dof if dof > 0 else np.nan
+
+    def scaled(covariance: FloatArray | None) -> FloatArray | None:
+        return None if covariance is None or np.isnan(factor) else covariance * factor
+
+    return replace(
+        estimate,
+        dof=dof,
+        covariance=scaled(estimate.covariance),
+        solution_covariance=scaled(estimate.solution_covariance),
     )
 
 

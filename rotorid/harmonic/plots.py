@@ -235,7 +235,7 @@ def _curve(result: Identification) -> Curve | None:
 def _modes(result: Identification) -> tuple[ComplexArray, FloatArray]:
     """Shapes (experiments, outputs) and frequencies of the identified model; NaN where it predicts none."""
     from rotorid.harmonic.comparison import compare
-    from rotorid.harmonic.output_error import operator_of
+    from rotorid.harmonic.operator import operator_of
 
     unknown = np.full((len(result.experiments), len(result.model.outputs)), np.nan, dtype=complex)
     try:

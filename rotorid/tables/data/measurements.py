@@ -33,8 +33,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     Its columns are `experiment` (optional), `frequency_rad_s` (or `_Hz`, or `speed_rpm`) and, for each
     amplitude NAME of the model, either `NAME_amplitude` (peak, with or without a unit) and `NAME_phase_deg`
     (positive = lead), or `NAME_re` and `NAME_im` (without `_im`: real). A blank amplitude was not measured.
-    Where inputs are absent or 0 the row is a free vibration: natural frequency and shape. A known quantity that
-    changes from row to row has a column NAME (or NAME_rad_s, NAME_Hz, NAME_rpm, which become rad/s).
+    Where inputs are absent or 0 the row is a free vibration: natural frequency and shape. A known quantity
+    that changes from row to row has a column NAME (or NAME_rad_s, NAME_Hz, NAME_rpm, which become rad/s).
 
     With a column `repeat`, rows of one experiment (or, without names, of one frequency and excitation) are
     readings of the same: their mean counts, and their scatter, pooled over the table, says how large the

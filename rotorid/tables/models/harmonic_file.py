@@ -55,8 +55,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
 
     Its keys are `equations` (texts with p = d/dt), `estimate` (names), `known` (name = number), optional
     `inputs` (names of the exciting amplitudes), `varying` (names of known quantities that change from row to
-    row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest, highest]),
-    `[start]` (name = guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
+    row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest,
+    highest]), `[start]` (name = guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one
+    standard deviation of a reading).
 
     Instead of equations there may be a linear model in time as `read_ode_model` reads it, such as the one
     that `rotorid reduce --model` writes: `M`, `C`, `K` (then (M p² + C p + K) X = F with amplitudes named
