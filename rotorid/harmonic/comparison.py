@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -102,30 +102,6 @@ class Comparison:
                 Z[i] = mode[1] / mode[1][reference] * shape[reference]
         return Z, frequencies
 
-    def equations(self) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
-        """Function of θ: what the measured amplitudes leave of each equation (rows,), and its Jacobian."""
-        free = self.experiments.free
-        inputs = np.where(free[:, None], 0.0, self.inputs)
-        varying = self.experiments.varying
-        load = self.operator.loads(self.experiments.frequencies, self.measured, inputs, varying)
-        odd = self.operator.power % 2 != 0
-        constant = self.operator.signal < 0
-        load[np.ix_(free, odd | constant)] = 0.0
-        stretched = np.concatenate((load.real, load.imag))
-
-        def evaluate(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-            P, dP = self.operator.polynomials(theta)
-            values, slopes = [], []
-            for features in self.operator.rows:
-                rows = stretched[:, features]
-                rows = rows[~np.isnan(rows).any(axis=1)]
-                size = float(np.abs(rows).max(initial=0.0)) or 1.0
-                values.append(rows @ P[features] / size)
-                slopes.append(rows @ dP[features] / size)
-            return np.concatenate(values), np.concatenate(slopes)
-
-        return evaluate
-
     def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         key = theta.tobytes()
         if key not in self._last:
@@ -157,7 +133,7 @@ class Comparison:
     def _modes(self, theta: FloatArray) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
         """Dynamic stiffness, its derivatives and its modes for each free vibration."""
         for k, i in enumerate(self.free):
-            if not k or any(self.operator.varying):
+            if not k or self.operator.model.varying:
                 A, dA = self.operator.dynamic_stiffness(theta, self._rows(np.array([i])))
                 z, v = natural_modes(A)
             yield A, dA, z, v
@@ -197,8 +173,10 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
     unknown = np.full(n, np.nan, dtype=complex)
     measured = np.stack([np.asarray(experiments.signals.get(o, unknown), dtype=complex) for o in outputs], 1)
     inputs = (
-        np.stack([np.asarray(experiments.signals.get(i, unknown), dtype=complex) for i in operator.inputs], 1)
-        if operator.inputs
+        np.stack(
+            [np.asarray(experiments.signals.get(i, unknown), dtype=complex) for i in operator.model.inputs], 1
+        )
+        if operator.model.inputs
         else np.zeros((n, 0), dtype=complex)
     )
     given = ~np.isnan(measured)
@@ -239,16 +217,17 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
 def _left_out(
     experiments: Experiments, operator: Operator, given: BoolArray, known: BoolArray
 ) -> tuple[str, ...]:
-    words = []
+    hidden = np.asarray(~given.any(axis=0))
+    words = [f"{o} is measured nowhere" for o, lost in zip(operator.outputs, hidden, strict=True) if lost]
     for i, name in enumerate(experiments.names):
         if not known[i] and not experiments.free[i]:
-            what = "input or varying quantity" if any(operator.varying) else "input"
+            what = "input or varying quantity" if operator.model.varying else "input"
             words.append(f"experiment {name}: left out, for not every {what} is known")
         elif not given[i].any():
             words.append(f"experiment {name}: left out, for no amplitude is measured")
         elif not given[i].all():
-            missing = [o for o, g in zip(operator.outputs, given[i], strict=True) if not g]
-            words.append(f"experiment {name}: {', '.join(missing)} not measured")
+            missing = [o for o, g in zip(operator.outputs, given[i] | hidden, strict=True) if not g]
+            words += [f"experiment {name}: {', '.join(missing)} not measured"] if missing else []
     return tuple(words)
 
 

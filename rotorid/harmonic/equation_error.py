@@ -12,13 +12,21 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words, ratio_words
+from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
-from rotorid.harmonic.recovery import Recovery, System, and_words, recover, undetermined_parameters
+from rotorid.harmonic.recovery import (
+    Recovery,
+    System,
+    and_words,
+    only_determined,
+    recover,
+    undetermined_parameters,
+)
 from rotorid.harmonic.result import FoundCombination, Identification
-from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
+from rotorid.harmonic.rows import Rows, ask_about_case, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate, echelon
 
@@ -76,13 +84,21 @@ def identify(
     for name, (low, high) in limits(bounds).items():
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
+    ask_about_case(model, experiments)
     if method == "output-error":
         from rotorid.harmonic.output_error import identify_outputs
 
         return identify_outputs(model, experiments, bounds=bounds, loss=loss, start=start)
     if loss != "linear" or start:
         raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
-    return equation_error(model, experiments, bounds=bounds)
+    hidden = hidden_outputs(model, experiments)
+    seen = without(model, hidden) if hidden else None
+    if seen is None:
+        return equation_error(model, experiments, bounds=bounds)
+    found = equation_error(seen, experiments, bounds=bounds)
+    note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
+    shown = () if found.identifiable else found.combinations
+    return replace(found, combinations=shown, notes=(note, *found.notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +236,7 @@ def equation_error(
         ),
         rank=len(fit.picks),
         condition_number=estimate.condition_number,
-        unidentifiable=_reasons(fit, experiments) if np.isnan(parameters).any() else (),
+        unidentifiable=reasons(fit, experiments) if np.isnan(parameters).any() else (),
         residuals=residuals,
         residual_names=tuple(f"equation {i + 1}" for i in range(len(model.equations))),
         residual_rms=float(np.sqrt(np.mean(used**2))),
@@ -290,13 +306,13 @@ def _groups(rows: Rows) -> tuple[IntArray, ...]:
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
     """
-    from scipy.sparse.csgraph import connected_components
-
     holds = np.zeros((rows.Y.shape[1], rows.coefficients.shape[1]), dtype=bool)
     np.logical_or.at(holds, rows.equation, rows.coefficients != 0)
-    number, label = connected_components(holds @ holds.T, directed=False)
+    linked = holds @ holds.T | np.eye(len(holds), dtype=bool)
+    for _ in range(len(holds).bit_length()):
+        linked = linked @ linked
     known = np.any(rows.Y != 0, axis=0)
-    parts = [label == i for i in range(number)]
+    parts = np.unique(linked, axis=0)[::-1]
     return tuple(
         np.flatnonzero(holds[part].any(axis=0))
         for part in parts
@@ -335,42 +351,27 @@ def _unique(words: tuple[str, ...]) -> list[str]:
     return [w if words.count(w) == 1 else f"{w} [{i + 1}]" for i, w in enumerate(words)]
 
 
-def _reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
+def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
+    """Why parameters have no one value, in words."""
     model, recovery, estimate = fit.model, fit.recovery, fit.estimate
-    reasons = []
+    found = []
     if recovery.undetermined.any():
         lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
-        reasons.append(only_determined(model.parameters, lost, fit.words))
+        found.append(only_determined(model.parameters, lost, fit.words))
     for group in fit.groups:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):
-            reasons.append(
+            found.append(
                 f"every multiple of {and_words(loose)} fits, for no known term that is not zero stands in "
                 f"their equations: no experiment of this kind tells more than ratios; make one of them known"
             )
     if not estimate.full_rank:
         now = len(model.parameters) - len(undetermined_parameters(fit.system)[1])
-        reasons.append(
+        found.append(
             f"these experiments determine {estimate.rank} of the {len(estimate.names)} combinations that the "
             f"model could show; {what_more_can_tell(model, experiments, now)}"
         )
-    return (*reasons, *recovery.reasons)
-
-
-def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
-    """Say which parameters and combinations are determined and which parameters are not."""
-    seen = [name for name in parameters if name not in lost]
-    seen += [w for w in words if w not in seen and any(n in _names(w) for n in lost)]
-    verb = "is" if len(seen) == 1 else "are"
-    text = f"only {and_words(seen)} {verb} determined" if seen else "nothing is determined"
-    itself = "itself is" if len(lost) == 1 else "themselves are"
-    return f"{text}; {and_words(lost)} by {itself} not"
-
-
-def _names(words: str) -> set[str]:
-    import re
-
-    return set(re.findall(r"[^\W\d]\w*", words))
+    return (*found, *recovery.reasons)
 
 
 def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recovery) -> dict[str, ComplexArray]:

@@ -156,44 +156,21 @@ def merge(
     features: Sequence[Feature], monomials: Sequence[Monomial], known: Mapping[str, Fraction]
 ) -> Combinations:
     """Merge monomials whose columns no data can tell apart into the combinations that data can see."""
-    place = {m: i for i, m in enumerate(monomials)}
-    echelon: dict[int, dict[int, Fraction]] = {}
-    for feature in features:
-        _insert_row(echelon, {place[m]: x for m, x in feature.exact.items() if m != ONE})
-    pivots = sorted(echelon)
+    from sympy import QQ
+    from sympy.polys.matrices import DomainMatrix
+
+    exact = [[f.exact.get(m, Fraction(0)) for m in monomials] for f in features]
+    table = [[QQ(x.numerator, x.denominator) for x in row] for row in exact]
+    reduced, pivots = DomainMatrix(table, (len(table), len(monomials)), QQ).to_sparse().rref()
     rows, words = np.zeros((len(pivots), len(monomials))), []
-    for i, pivot in enumerate(pivots):
-        wanted = {monomials[c]: x for c, x in sorted(echelon[pivot].items())}
+    for i, row in enumerate(reduced.to_Matrix().tolist()[: len(pivots)]):
+        wanted = {m: Fraction(int(x.p), int(x.q)) for m, x in zip(monomials, row, strict=True) if x}
         symbolic = _own_words(wanted, features)
         for m, part in symbolic.items():
-            rows[i, place[m]] = float(insert(part, known))
+            rows[i, monomials.index(m)] = float(insert(part, known))
         words.append(combination_words(symbolic))
     scales = rows[np.arange(len(pivots)), pivots]
     return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(words))
-
-
-def _insert_row(echelon: dict[int, dict[int, Fraction]], row: dict[int, Fraction]) -> None:
-    """Add a row to a reduced echelon form kept by pivot."""
-    for pivot in [c for c in row if c in echelon]:
-        _subtract(row, echelon[pivot], row[pivot])
-    if not row:
-        return
-    pivot = min(row)
-    lead = row[pivot]
-    row = {c: x / lead for c, x in row.items()}
-    for other in echelon.values():
-        if pivot in other:
-            _subtract(other, row, other[pivot])
-    echelon[pivot] = row
-
-
-def _subtract(row: dict[int, Fraction], other: Mapping[int, Fraction], factor: Fraction) -> None:
-    for column, value in other.items():
-        left = row.get(column, Fraction(0)) - factor * value
-        if left:
-            row[column] = left
-        else:
-            row.pop(column, None)
 
 
 def _own_words(

@@ -86,6 +86,8 @@ class HarmonicModel:
     def monomial_jacobian(self, values: FloatArray) -> FloatArray:
         """Derivatives (1 + monomials, n) of the monomials by the parameters."""
         theta = np.asarray(values, dtype=float)
+        if theta.all():
+            return np.asarray(self.monomial_values(theta)[:, None] * self.exponents / theta)
         jacobian = np.zeros_like(self.exponents)
         for j in range(len(theta)):
             used = np.flatnonzero(self.exponents[:, j])
@@ -108,13 +110,14 @@ class HarmonicModel:
         varying
             Known quantities (n,) that change from row to row, by name.
         """
-        weights = self.coefficients @ self.monomial_values(values)
-        A: ComplexArray = self._evaluate(weights[None], frequencies, varying)[0]
+        place = {name: i for i, name in enumerate((*self.signals, CONSTANT))}
+        powers, products = [f.power for f in self.features], [f.varying for f in self.features]
+        pk = multipliers(powers, products, frequencies, varying)
+        terms = pk * (self.coefficients @ self.monomial_values(values))
+        A = np.zeros((len(terms), len(self.equations), 1 + len(self.signals)), dtype=complex)
+        for j, f in enumerate(self.features):
+            A[:, f.equation, place[f.signal]] += terms[:, j]
         return A
-
-    def matrix_derivatives(self, values: FloatArray, frequencies: FloatArray) -> ComplexArray:
-        """∂A/∂θ, shape (parameters, n, equations, 1 + signals), in the order of `matrices`."""
-        return self._evaluate((self.coefficients @ self.monomial_jacobian(values)).T, frequencies)
 
     def predict(
         self,
@@ -148,24 +151,6 @@ class HarmonicModel:
                 f"{', '.join(self.outputs) or 'none'} in {len(self.equations)} equations: "
                 f"say which signals are given with inputs = [...]"
             )
-
-    def _evaluate(
-        self,
-        weights: FloatArray,
-        frequencies: FloatArray,
-        varying: Mapping[str, FloatArray] | None = None,
-    ) -> ComplexArray:
-        """Σ weights · p^k sorted into (rows of weights, n, equations, 1 + signals)."""
-        place = {name: i for i, name in enumerate((*self.signals, CONSTANT))}
-        column = np.array([place[f.signal] for f in self.features])
-        equation = np.array([f.equation for f in self.features])
-        pk = multipliers(
-            [f.power for f in self.features], [f.varying for f in self.features], frequencies, varying
-        )
-        out = np.zeros((len(weights), len(pk), len(self.equations), 1 + len(self.signals)), dtype=complex)
-        for j, (e, c) in enumerate(zip(equation, column, strict=True)):
-            out[:, :, e, c] += weights[:, j, None] * pk[:, j]
-        return out
 
 
 def harmonic_model(

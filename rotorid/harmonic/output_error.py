@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,19 +25,26 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator import Operator, operator_of
-from rotorid.harmonic.plausibility import doubts
+from rotorid.harmonic.plausibility import doubts, what_more_can_tell
+from rotorid.harmonic.recovery import only_determined
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
+if TYPE_CHECKING:
+    from rotorid.harmonic.equation_error import LinearFit
+
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
 MOST_STARTS = 8
 """Solutions of the linear estimate from which to begin."""
+WITHIN = 1e-6
+"""A combination is determined if no more than this share of its slope lies outside what the data see."""
 ROUNDING = 1e-9
 """Relative errors that are smaller are rounding."""
 SAME = 1e-6
@@ -117,7 +125,7 @@ def output_error(
     """
     operator = operator_of(model)
     comparison = compare(operator, experiments)
-    point = starting_values(start, comparison, bounds)
+    point = starting_values(model, experiments, start)[0]
     rounds: list[NonlinearEstimate] = []
     while True:
         fit = nonlinear_least_squares(
@@ -162,8 +170,15 @@ def identify_outputs(
     Residuals are relative to each amplitude: (measured − predicted)/|measured|. `influence` is of first
     order.
     """
-    starts, reasons = _linear_starts(model, experiments, bounds, start)
-    found = [output_error(model, experiments, s, bounds=bounds, loss=loss) for s in starts]
+    starts, linear, reasons = _linear_starts(model, experiments, bounds, start)
+    found, problem = [], None
+    for begin in starts:
+        try:
+            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss))
+        except ValueError as error:  # one of several starts may have no answer
+            problem = error
+    if problem is not None and not found:
+        raise problem
     lowest = min(f.fit.costs[-1] for f in found)
     slack = 1e-6 * lowest + 1e-16 * max(1.0, float(len(found[0].rows)))
     best = _distinct([f for f in found if f.fit.costs[-1] <= lowest + slack])
@@ -180,16 +195,18 @@ def identify_outputs(
         model=model,
         experiments=experiments,
         method="output-error",
-        values=values,
+        values=values if chosen.fit.converged else estimate.solution,
         covariance=covariance,
         dof=estimate.dof,
         errors_stated=estimate.errors_stated,
-        combinations=_combinations(model, estimate),
+        combinations=_combinations(model, estimate, linear) if chosen.fit.converged else (),
         solutions=tuple(dict(zip(model.parameters, map(float, point), strict=True)) for point in points),
         starts=(dict(zip(model.parameters, estimate.solution.tolist(), strict=True)),),
         rank=estimate.rank,
         condition_number=estimate.condition_number,
-        unidentifiable=(reasons or (estimate.describe_rank(),)) if np.isnan(values).any() else (),
+        unidentifiable=_undetermined(model, experiments, estimate, linear, reasons)
+        if chosen.fit.converged and np.isnan(values).any()
+        else (),
         residuals=residuals,
         residual_names=model.outputs,
         residual_rms=_rms(residuals),
@@ -220,23 +237,31 @@ def _linear_starts(
     experiments: Experiments,
     bounds: Bounds | None,
     start: Mapping[str, float] | None,
-) -> tuple[list[dict[str, float]], tuple[str, ...]]:
-    """Where to begin, and the linear estimate's reasons for what is not determined."""
-    from rotorid.harmonic.equation_error import equation_error
+) -> tuple[list[dict[str, float]], LinearFit | None, tuple[str, ...]]:
+    """Where to begin, the linear estimate, and its reasons for what is not determined.
 
-    given = dict(start or {})
-    if set(given) == set(model.parameters):
-        return [given], ()
-    limits = {
-        name: (-np.inf if a is None else a, np.inf if b is None else b)
-        for name, (a, b) in (bounds or {}).items()
-    }
+    With hidden amplitudes the linear estimate is of the model without them, where that is not too long.
+    """
+    from rotorid.harmonic.equation_error import limits, linear_fit, reasons
+
+    given, hidden = dict(start or {}), hidden_outputs(model, experiments)
+    linear: LinearFit | None = None
+    words: tuple[str, ...] = ()
     try:
-        linear = equation_error(model, experiments, bounds=limits or None)
-    except ValueError:
-        return [given], ()
-    solutions = [{**s, **given} for s in (linear.starts or linear.solutions)[:MOST_STARTS]]
-    return solutions or [given], linear.unidentifiable
+        seen = without(model, hidden) if hidden else model
+        if seen is not None:
+            linear = linear_fit(seen, experiments, limits(bounds) or None)
+            words = reasons(linear, experiments)
+    except ValueError:  # more equations than outputs, no complete row
+        pass
+    if set(given) == set(model.parameters):
+        return [given], linear, words
+    if hidden or linear is None or not linear.recovery.solutions:
+        ends = starting_values(model, experiments, given)
+    else:
+        ends = list(linear.recovery.solutions[:MOST_STARTS])
+    solutions = [dict(zip(model.parameters, end.tolist(), strict=True)) for end in ends]
+    return [{**s, **given} for s in solutions], linear, words
 
 
 def _distinct(found: Sequence[OutputError]) -> list[OutputError]:
@@ -252,18 +277,48 @@ def _distinct(found: Sequence[OutputError]) -> list[OutputError]:
     return kept
 
 
-def _combinations(model: HarmonicModel, estimate: Estimate) -> tuple[FoundCombination, ...]:
-    """The products and sums that the data see, at the estimate, with the spread of the linearised model."""
+def _combinations(
+    model: HarmonicModel, estimate: Estimate, linear: LinearFit | None
+) -> tuple[FoundCombination, ...]:
+    """Products, sums and ratios that the data see, at the estimate, with the spread of the linearised model.
+
+    They are those of the linear estimate: exact, and not tangents at the end of the search. Without it
+    tangents are given, named so.
+    """
     theta, spread = estimate.solution, estimate.solution_covariance
-    values = model.combinations.rows @ model.monomial_values(theta)[1:]
-    slopes = model.combinations.rows @ model.monomial_jacobian(theta)[1:]
+    if linear is None:
+        tangents = [] if estimate.full_rank else estimate.combinations
+        return tuple(FoundCombination(f"(near these values) {c.words}", c.value, None) for c in tangents)
+    if linear.model is not model and estimate.full_rank:
+        return ()
+    values, slopes = linear.system.combinations(theta), linear.system.jacobian(theta)
+    rows = np.linalg.qr((estimate.row_space * np.where(theta == 0, 1.0, theta)).T)[0]
     out = []
-    for words, value, slope in zip(model.combinations.words, values, slopes, strict=True):
+    for words, value, slope in zip(linear.words, values, slopes, strict=True):
+        relative = slope * np.where(theta == 0, 1.0, theta)
+        beside = np.linalg.norm(relative - rows @ (rows.T @ relative))
         variance = np.nan if spread is None else float(slope @ spread @ slope)
-        if words not in model.parameters:
+        if words not in model.parameters and beside <= WITHIN * np.linalg.norm(relative):
             std = float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else None
             out.append(FoundCombination(words, float(value), std))
     return tuple(out)
+
+
+def _undetermined(
+    model: HarmonicModel,
+    experiments: Experiments,
+    estimate: Estimate,
+    linear: LinearFit | None,
+    reasons: tuple[str, ...],
+) -> tuple[str, ...]:
+    """Why parameters have no one value."""
+    if linear is not None and linear.model is model and reasons:
+        return reasons
+    if estimate.full_rank:
+        return (estimate.describe_rank(),)
+    words = [c.words for c in _combinations(model, estimate, linear)]
+    more = what_more_can_tell(model, experiments, estimate.rank)
+    return only_determined(model.parameters, estimate.undetermined, words), more
 
 
 def _rms(residuals: ComplexArray) -> float:

@@ -290,3 +290,19 @@ def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: Bo
 def and_words(words: Sequence[str]) -> str:
     """Join words: "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
+    """Say which parameters and combinations are determined and which parameters are not."""
+    seen = [name for name in parameters if name not in lost]
+    seen += [w for w in words if w not in seen and any(n in _names(w) for n in lost)]
+    verb = "is" if len(seen) == 1 else "are"
+    text = f"only {and_words(seen)} {verb} determined" if seen else "nothing is determined"
+    itself = "itself is" if len(lost) == 1 else "themselves are"
+    return f"{text}; {and_words(lost)} by {itself} not"
+
+
+def _names(words: str) -> set[str]:
+    import re
+
+    return set(re.findall(r"[^\W\d]\w*", words))

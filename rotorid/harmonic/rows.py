@@ -150,6 +150,21 @@ def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
             raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured)")
 
 
+def ask_about_case(model: HarmonicModel, experiments: Experiments) -> None:
+    """Raise ValueError for a signal without readings that differs by case only from another name (x2, X2)."""
+    import re
+
+    words = re.findall(r"[^\W\d]\w*", " ".join(model.equations))
+    for name in model.signals:
+        alike = [w for w in words if w != name and w.casefold() == name.casefold()]
+        values = np.nan_to_num(experiments.signals.get(name, np.zeros(1)))
+        if alike and words.count(name) == 1 and not np.any(values):
+            raise ValueError(
+                f"is {name} meant to be {alike[0]}? It stands in the equations once and has no readings; "
+                f"if it is an amplitude of its own, give it another name"
+            )
+
+
 def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u: FloatArray) -> FloatArray:
     """Covariance of each experiment's real rows, (n, 2·equations, 2·equations).
 

@@ -227,7 +227,7 @@ def _complain_about_missing(
         import warnings
 
         lost = listing(absent, "and")
-        message = f"{table.source}: the table has no {lost}: equations that need it say nothing"
+        message = f"{table.source}: the table has no {lost}: eliminated from the equations, or predicted"
         warnings.warn(message, TableWarning, stacklevel=3)
     for name, values in read.items():
         if values is not None and np.isnan(values).all() and not len(problems):

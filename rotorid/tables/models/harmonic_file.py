@@ -138,6 +138,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
 
     form = read_time_form(section, problems, initial=False)
     problems.stop()
+    from rotorid.harmonic.hidden import without
     from rotorid.harmonic.model import harmonic_model
 
     model = None
@@ -147,6 +148,10 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         model = harmonic_model(
             operators.equations, known=form.known, estimate=list(start), inputs=operators.inputs
         )
+        own = operators.unseen
+        parametric = {f.equation for f in model.features if f.signal in own and set(f.exact) != {()}}
+        plain = {name: i for name, i in own.items() if i not in parametric}
+        model = (without(model, plain, plain) if plain else None) or model
         if model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "
