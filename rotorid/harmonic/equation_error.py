@@ -33,7 +33,7 @@ from rotorid.regression.estimate import Estimate, echelon
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
 METHODS = ("equation-error", "output-error")
-REWEIGHTINGS = 20
+REWEIGHTINGS = 60
 SETTLED = 0.01
 """Weights have settled where the last round moved nothing by more than this share of its deviation."""
 RCOND = 1e-11

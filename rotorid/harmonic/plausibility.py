@@ -17,7 +17,7 @@ from rotorid.harmonic.polynomial import Monomial
 from rotorid.harmonic.result import Identification
 from rotorid.regression.estimate import Estimate
 
-LARGE = 0.1
+LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
 EXPLAINS = 0.2
 """Another reading of the data is named where it leaves less than this share of what is left without it."""
@@ -31,7 +31,7 @@ def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, ref
     """What speaks against a result, in words.
 
     Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise: what the model
-    leaves of the readings, if it is more than a tenth of them. Units and phases that would explain it, found
+    leaves of the readings, if it is much. Units and phases that would explain it, found
     by `refit`, a linear estimate from other experiments. Passive elements with a negative value are named,
     unless bounds say that it may be so.
     """
@@ -42,7 +42,7 @@ def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, ref
     if not words and not estimate.errors_stated and left is not None and left > LARGE:
         advice = ", or readings are noisy: try output error" if found.method == "equation-error" else ""
         words.append(
-            f"the model leaves {100 * left:.2g} % of the readings: "
+            f"the model leaves {100 * left:.0f} % of the readings: "
             f"the model, a reading or a unit is wrong{advice}"
         )
     if words and left is not None:
@@ -101,9 +101,9 @@ def _other_reading(found: Identification, left: float, refit: Refit) -> list[str
         except (ValueError, np.linalg.LinAlgError):
             continue
         rest = left_over(found.model, other, solutions[0]) if solutions else None
-        if rest is not None and rest < EXPLAINS * left:
+        if rest is not None and rest < min(EXPLAINS * left, LARGE):
             words.append(
-                f"with {what} the model leaves {100 * rest:.2g} % of the readings, not {100 * left:.2g} %"
+                f"with {what} the model leaves {100 * rest:.2g} % of the readings, not {100 * left:.0f} %"
             )
     return words
 
