@@ -40,7 +40,8 @@ def test_drawn_chains_with_an_unmeasured_mass_are_found(seed, method):
     model, truth, data = drawn_chain(seed, 2 + seed % 3)
     found = identify(model, data, method=method)
     np.testing.assert_allclose(found.values, truth, rtol=1e-5)
-    assert found.identifiable and not found.unidentifiable
+    assert found.identifiable
+    assert not found.unidentifiable
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -48,7 +49,8 @@ def test_noisy_ones_within_their_intervals(seed):
     errors = AmplitudeErrors(0.01, 0.01)
     model, truth, data = drawn_chain(seed, 3, 0.01, errors)
     found = identify(model, data, method="output-error")
-    assert found.converged and found.warnings == ()
+    assert found.converged
+    assert found.warnings == ()
     assert (np.abs(found.values - truth) < 4.5 * found.std).all()
     assert found.left_out == (f"{(set(model.outputs) - set(data.signals)).pop()} is measured nowhere",)
 
@@ -73,7 +75,7 @@ SPRINGS = ["(m*p**2 + b*p)*X + ka*(X - W) = F", "kb*W + ka*(W - X) = 0"]
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("ka, kb", [(2e4, 3e4), (1e3, 9e5), (5e5, 5e5)])
+@pytest.mark.parametrize(("ka", "kb"), [(2e4, 3e4), (1e3, 9e5), (5e5, 5e5)])
 def test_springs_in_series_show_the_one_stiffness_whatever_they_are(method, ka, kb):
     model = harmonic_model(SPRINGS, known={"m": 5.0}, estimate=["b", "ka", "kb"])
     w, errors = np.linspace(5, 200, 9), AmplitudeErrors(0.02, 0.02)
@@ -96,12 +98,16 @@ def test_a_search_that_does_not_converge_says_nothing_else():
     model, truth, data = drawn_chain(1, 4)
     start = dict(zip(model.parameters, 1e4 / truth, strict=True))
     found = identify(model, data, method="output-error", start=start)
-    assert not found.converged and not found.identifiable
-    assert found.ci95 is None and found.std is None
+    assert not found.converged
+    assert not found.identifiable
+    assert found.ci95 is None
+    assert found.std is None
     document = found.to_dict()
-    assert document["converged"] is False and document["identifiable"] is False
+    assert document["converged"] is False
+    assert document["identifiable"] is False
     assert all(p["std"] is None and p["ci95"] is None for p in document["parameters"].values())
-    assert document["combinations"] == {} and document["unidentifiable"] == []
+    assert document["combinations"] == {}
+    assert document["unidentifiable"] == []
     text = found.summary()
     assert "not converged: the values are where the search stopped" in text
     assert "determined" not in text
@@ -127,7 +133,8 @@ def test_the_cases_say_what_they_should(cli):
         assert ratios == {"b/m": pytest.approx(20 / 3, rel=1e-6), "c/m": pytest.approx(1e4 / 3, rel=1e-6)}
         words = " ".join(found["unidentifiable"])
         assert "no experiment of this kind tells more" in words
-        assert "nothing is determined" not in words and "may determine" not in words
+        assert "nothing is determined" not in words
+        assert "may determine" not in words
         found = run(cli, "speed_column", "--method", method).json
         assert found["identifiable"]
 

@@ -38,7 +38,7 @@ def test_a_speed_that_changes_from_row_to_row(method):
 
 
 def test_it_is_what_known_numbers_are_in_experiments_at_one_speed():
-    model, _, data = gyroscopic()
+    _model, _, data = gyroscopic()
     one = data.take(np.isclose(data.varying["Omega"], data.varying["Omega"][2]))
     fixed = harmonic_model(
         GYRO, known={"I": 0.8, "Omega": float(one.varying["Omega"][0])}, estimate=["k", "G"]
