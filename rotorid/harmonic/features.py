@@ -152,6 +152,25 @@ def lifted(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Mono
     return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
 
 
+def powers_product(exponents: FloatArray, theta: FloatArray) -> FloatArray:
+    """Products Π θ^e (m,) of exponents (m, n)."""
+    return np.asarray(np.prod(np.asarray(theta, dtype=float) ** exponents, axis=1))
+
+
+def powers_slopes(exponents: FloatArray, theta: FloatArray) -> FloatArray:
+    """Derivatives (m, n) of the products by θ."""
+    values = np.asarray(theta, dtype=float)
+    if values.all():
+        return np.asarray(powers_product(exponents, values)[:, None] * exponents / values)
+    slopes = np.zeros_like(exponents)
+    for j in range(len(values)):
+        used = np.flatnonzero(exponents[:, j])
+        lower = exponents[used].copy()
+        lower[:, j] -= 1
+        slopes[used, j] = exponents[used, j] * powers_product(lower, values)
+    return slopes
+
+
 def merge(
     features: Sequence[Feature], monomials: Sequence[Monomial], known: Mapping[str, Fraction]
 ) -> Combinations:

@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.harmonic.features import CONSTANT, Combinations, Feature, P, lifted, merge, multipliers
+from rotorid.harmonic.features import (
+    CONSTANT,
+    Combinations,
+    Feature,
+    P,
+    lifted,
+    merge,
+    multipliers,
+    powers_product,
+    powers_slopes,
+)
 from rotorid.harmonic.features import split_features as _split
 from rotorid.harmonic.polynomial import ONE, Factor, Monomial, Polynomial, add, from_expression
 
@@ -81,20 +91,11 @@ class HarmonicModel:
 
     def monomial_values(self, values: FloatArray) -> FloatArray:
         """Monomials (1 + monomials,) of parameters (n,)."""
-        return np.asarray(np.prod(np.asarray(values, dtype=float) ** self.exponents, axis=1))
+        return powers_product(self.exponents, values)
 
     def monomial_jacobian(self, values: FloatArray) -> FloatArray:
         """Derivatives (1 + monomials, n) of the monomials by the parameters."""
-        theta = np.asarray(values, dtype=float)
-        if theta.all():
-            return np.asarray(self.monomial_values(theta)[:, None] * self.exponents / theta)
-        jacobian = np.zeros_like(self.exponents)
-        for j in range(len(theta)):
-            used = np.flatnonzero(self.exponents[:, j])
-            lower = self.exponents[used].copy()
-            lower[:, j] -= 1
-            jacobian[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
-        return jacobian
+        return powers_slopes(self.exponents, values)
 
     def matrices(
         self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None

@@ -13,7 +13,6 @@ from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import multipliers
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator import operator_of
-from rotorid.harmonic.polynomial import Monomial
 from rotorid.harmonic.result import Identification
 from rotorid.regression.estimate import Estimate
 
@@ -144,28 +143,28 @@ def passive_elements(model: HarmonicModel) -> dict[str, int]:
     e = len(model.equations)
     if len(model.outputs) != e:
         return {}
-    place = {name: i for i, name in enumerate(model.outputs)}
-    own = [f for f in model.features if f.signal in place and not f.varying]
+    operator = operator_of(model)
+    equation, signal, power = operator.equation, operator.signal, operator.power
+    own = (signal == equation) & (power >= 0) & (power <= 2)
     diagonal = np.zeros((e, 3))
-    for f in own:
-        if f.equation == place[f.signal] and 0 <= f.power <= 2:
-            diagonal[f.equation, f.power] += sum(map(float, f.exact.values()))
+    np.add.at(diagonal, (equation[own], power[own]), model.coefficients.sum(axis=1)[own])
     sign = np.array([next((np.sign(x) for x in row[::-1] if x), 1.0) for row in diagonal])
     found = {}
-    for name in model.parameters:
-        alone: Monomial = ((name, 1),)
-        used = [f for f in model.features if any(name in dict(m) for m in f.exact)]
-        powers = {f.power for f in used}
-        if len(powers) != 1 or not powers <= {0, 1, 2}:
+    for j, name in enumerate(model.parameters):
+        (monomials,) = np.nonzero(model.exponents[:, j])
+        if len(monomials) != 1 or model.exponents[monomials[0], j] != 1:
             continue
-        if any(f.varying or (name in dict(m) and m != alone) for f in used for m in f.exact):
+        alone = model.coefficients[:, monomials[0]]
+        used = np.flatnonzero(alone)
+        kinds = {int(k) for k in power[used]}
+        if np.abs(model.exponents[monomials[0]]).sum() != 1 or len(kinds) != 1 or not kinds <= {0, 1, 2}:
             continue
         S = np.zeros((e, e))
-        for f in used:
-            if f.signal in place:
-                S[f.equation, place[f.signal]] += sign[f.equation] * float(f.exact[alone])
-        if S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max():
-            found[name] = powers.pop()
+        for f in used[signal[used] < e]:
+            S[equation[f], signal[f]] = sign[equation[f]] * alone[f]
+        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
+        if passive and not any(model.features[f].varying for f in used):
+            found[name] = kinds.pop()
     return found
 
 

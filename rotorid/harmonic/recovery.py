@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.harmonic.elimination import real_solutions
+from rotorid.harmonic.features import powers_product, powers_slopes
 from rotorid.regression.estimate import WORD_TOLERANCE
 
 Bounds = Mapping[str, tuple[float, float]]
@@ -64,16 +65,11 @@ class System:
 
     def monomials(self, theta: FloatArray) -> FloatArray:
         """Values (monomials,)."""
-        return np.asarray(np.prod(theta**self.exponents, axis=1))
+        return powers_product(self.exponents, theta)
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         """Derivatives (q, n) of the combinations by the parameters."""
-        out = np.zeros_like(self.exponents)
-        for j in range(len(theta)):
-            used = np.flatnonzero(self.exponents[:, j])
-            lower = self.exponents[used].copy()
-            lower[:, j] -= 1
-            out[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
+        out = powers_slopes(self.exponents, theta)
         slopes = self.matrix @ out
         if self.below is not None:
             slopes -= self.combinations(theta)[:, None] * (self.below @ out)

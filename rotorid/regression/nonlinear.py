@@ -109,6 +109,7 @@ class NonlinearEstimate:
         """As JSON types; the keys of the estimate and those of the search."""
         return {
             **self.estimate.to_dict(),
+            "identifiable": self.converged and self.estimate.full_rank,
             "converged": self.converged,
             "message": self.message,
             "iterations": self.iterations,

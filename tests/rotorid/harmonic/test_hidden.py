@@ -94,6 +94,22 @@ def test_springs_in_series_show_the_one_stiffness_whatever_they_are(method, ka, 
     assert spring.std == pytest.approx(plain.std[1], rel=0.02)
 
 
+def test_where_the_elimination_is_too_long_tangents_are_named_so(monkeypatch):
+    monkeypatch.setattr("rotorid.harmonic.hidden.MOST_TERMS", 0)
+    model = harmonic_model(SPRINGS, known={"m": 5.0}, estimate=["b", "ka", "kb"])
+    w = np.linspace(5, 200, 9)
+    x = model.predict(np.array([30.0, 2e4, 3e4]), w, {"F": np.ones(9, dtype=complex)})["X"]
+    data = experiments(model, w, {"F": 1.0, "X": x}, free=False)
+    found = identify(model, data, method="output-error")
+    assert found.value("b") == pytest.approx(30.0, rel=1e-6)
+    (near,) = found.combinations
+    assert near.words.startswith("(near these values) ka + ")
+    assert near.std is None
+    assert "no experiment of this kind tells more" in found.unidentifiable[1]
+    with pytest.raises(ValueError, match="W of the model is not among the measurements"):
+        identify(model, data)
+
+
 def test_a_search_that_does_not_converge_says_nothing_else():
     model, truth, data = drawn_chain(1, 4)
     start = dict(zip(model.parameters, 1e4 / truth, strict=True))
