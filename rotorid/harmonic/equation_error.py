@@ -111,6 +111,8 @@ class LinearFit:
         The equations, and their rows.
     estimate, K, Y, experiment
         The regression: its unknowns, weighted rows (m, u), (m,) and the experiment of each.
+    solution
+        Of all unknowns, those that the others are told relative to included (as 1).
     picks
         Combinations of its unknowns that the data determine, (q, u).
     groups

@@ -96,7 +96,7 @@ def _searched(
             found = least_squares(lambda x: projected(whole(x)), begin, max_nfev=60)
         except (ValueError, np.linalg.LinAlgError):
             return []
-    return [(float(found.cost), whole(found.x))] if np.abs(found.x).max() < 4 * DECADES else []
+    return [(float(found.cost), whole(found.x))] if found.x.max() < 4 * DECADES else []
 
 
 def _projected(

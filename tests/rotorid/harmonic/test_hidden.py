@@ -44,7 +44,7 @@ def test_drawn_chains_with_an_unmeasured_mass_are_found(seed, method):
     assert not found.unidentifiable
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, 1, 20])  # 20: noise drives a damper to 0
 def test_noisy_ones_within_their_intervals(seed):
     errors = AmplitudeErrors(0.01, 0.01)
     model, truth, data = drawn_chain(seed, 3, 0.01, errors)
