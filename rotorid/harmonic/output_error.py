@@ -219,8 +219,6 @@ def identify_outputs(
         warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
     )
-    if not identification.converged:
-        return identification
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         from rotorid.harmonic.equation_error import linear_fit

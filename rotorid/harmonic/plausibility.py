@@ -34,19 +34,19 @@ def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, ref
     by `refit`, a linear estimate from other experiments. Passive elements with a negative value are named,
     unless bounds say that it may be so.
     """
-    words = [*misfit(estimate)]
+    words = [*misfit(estimate)] if found.converged else []
     left = None
     if found.starts and estimate.dof > 0:
         left = left_over(found.model, found.experiments, np.array(list(found.starts[0].values())))
-    if not words and not estimate.errors_stated and left is not None and left > LARGE:
+    if found.converged and not estimate.errors_stated and left is not None and left > LARGE:
         advice = ", or readings are noisy: try output error" if found.method == "equation-error" else ""
         words.append(
             f"the model leaves {100 * left:.0f} % of the readings: "
             f"the model, a reading or a unit is wrong{advice}"
         )
-    if words and left is not None:
+    if left is not None and (words or not found.converged):
         words += _other_reading(found, left, refit)
-    return (*words, *_negative(found, bounds))
+    return (*words, *(_negative(found, bounds) if found.converged else ()))
 
 
 def misfit(estimate: Estimate) -> tuple[str, ...]:

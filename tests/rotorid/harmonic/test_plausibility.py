@@ -64,8 +64,7 @@ def test_frequencies_in_hertz(method):
     wrong = lambda m, d: (m, replace(d, frequencies=d.frequencies / (2 * np.pi)))  # noqa: E731
     said = spoken(8, 1, wrong, False, method)
     assert all(said)
-    if method == "equation-error":
-        assert sum("frequencies in Hz, not rad/s" in text for text in said) >= 6, said
+    assert sum("frequencies in Hz, not rad/s" in text for text in said) >= 6, said
 
 
 @pytest.mark.parametrize("method", METHODS)
