@@ -30,7 +30,7 @@ from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator import Operator, operator_of
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
-from rotorid.harmonic.recovery import only_determined
+from rotorid.harmonic.recovery import only_determined, why_several
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
 from rotorid.regression.estimate import Estimate
@@ -181,7 +181,8 @@ def identify_outputs(
         raise problem
     lowest = min(f.fit.costs[-1] for f in found)
     slack = 1e-6 * lowest + 1e-16 * max(1.0, float(len(found[0].rows)))
-    best = _distinct([f for f in found if f.fit.costs[-1] <= lowest + slack])
+    equal = [f for f in found if f.fit.costs[-1] <= lowest + slack]
+    best = _distinct([f for f in equal if f.fit.converged] or equal)
     chosen, estimate = best[0], best[0].fit.estimate
     points = np.stack([f.fit.values for f in best])
     apart = (np.ptp(points, axis=0) > SAME * np.abs(points).max(axis=0)) & ~np.isnan(points).any(axis=0)
@@ -204,7 +205,7 @@ def identify_outputs(
         starts=(dict(zip(model.parameters, estimate.solution.tolist(), strict=True)),),
         rank=estimate.rank,
         condition_number=estimate.condition_number,
-        unidentifiable=_undetermined(model, experiments, estimate, linear, reasons)
+        unidentifiable=_undetermined(model, experiments, estimate, linear, reasons, points)
         if chosen.fit.converged and np.isnan(values).any()
         else (),
         residuals=residuals,
@@ -254,10 +255,9 @@ def _linear_starts(
         pass
     if set(given) == set(model.parameters):
         return [given], linear, words
-    if hidden or linear is None or not linear.recovery.solutions:
-        ends = starting_values(model, experiments, given)
-    else:
-        ends = list(linear.recovery.solutions[:MOST_STARTS])
+    ends = [] if linear is None else list(linear.recovery.solutions[:MOST_STARTS])
+    if hidden or not ends:
+        ends += starting_values(model, experiments, given)
     solutions = [dict(zip(model.parameters, end.tolist(), strict=True)) for end in ends]
     return [{**s, **given} for s in solutions], linear, words
 
@@ -308,12 +308,13 @@ def _undetermined(
     estimate: Estimate,
     linear: LinearFit | None,
     reasons: tuple[str, ...],
+    points: FloatArray,
 ) -> tuple[str, ...]:
     """Why parameters have no one value."""
     if linear is not None and linear.model is model and reasons:
         return reasons
     if estimate.full_rank:
-        return (estimate.describe_rank(),)
+        return tuple(why_several(list(points), model.parameters, np.zeros(len(points[0]), dtype=bool)))
     words = [c.words for c in _combinations(model, estimate, linear)]
     more = what_more_can_tell(model, experiments, estimate.rank)
     return only_determined(model.parameters, estimate.undetermined, words), more

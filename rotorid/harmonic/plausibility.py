@@ -199,7 +199,7 @@ def what_more_can_tell(model: HarmonicModel, experiments: Experiments, now: int)
         J = J[np.isfinite(J).all(axis=1)] * theta
         size = np.linalg.norm(J, axis=0)
         s = np.linalg.svd(J / np.where(size > 0, size, 1.0), compute_uv=False)
-        most = max(most, int(np.count_nonzero(s > 1e-9 * s[0])))
+        most = max(most, int(np.count_nonzero(s > 1e-9 * s.max(initial=0.0))))
     if 0 < most <= now:
         return "no experiment of this kind tells more: make a parameter known, or excite or measure elsewhere"
     return "more experiments, at other frequencies, may determine the rest"

@@ -73,7 +73,11 @@ def starting_values(
     if not ends:
         missing = ", ".join(names[j] for j in open_)
         raise ValueError(f"no start was found: give starting values of {missing}")
-    return [end for _, end in ends[:BEST]]
+    apart: list[FloatArray] = []
+    for _, point in ends:
+        if not any(np.allclose(point, other, rtol=1e-3) for other in apart):
+            apart.append(point)
+    return apart[:BEST]
 
 
 def _searched(

@@ -129,6 +129,20 @@ def test_a_search_that_does_not_converge_says_nothing_else():
     assert "determined" not in text
 
 
+def test_several_solutions_beside_a_hidden_amplitude_are_said_as_such():
+    """Time constants in series can be exchanged; the amplitude between them is not measured."""
+    model = harmonic_model(["(T1*p + 1)*Y = F", "(T2*p + 1)*X = Y"], estimate=["T1", "T2"])
+    w = np.array([1.0, 3.0, 6.0])
+    x = model.predict(np.array([0.5, 0.2]), w, {"F": np.ones(3, dtype=complex)})["X"]
+    data = experiments(model, w, {"F": 1.0, "X": x}, free=False)
+    for method in METHODS:
+        found = identify(model, data, method=method)
+        assert np.isnan(found.values).all()
+        assert not any("are determined" in text for text in found.unidentifiable)
+        assert sorted(round(s["T1"], 6) for s in found.solutions) == [0.2, 0.5]
+        assert "can be exchanged" in found.unidentifiable[0]
+
+
 def run(cli, name, *options):
     return cli("identify", CASES / name / "model.toml", CASES / name / "data.csv", "--json", *options)
 
