@@ -96,6 +96,11 @@ def identify(
     if seen is None:
         return equation_error(model, experiments, bounds=bounds)
     found = equation_error(seen, experiments, bounds=bounds)
+    if not np.isfinite(found.condition_number):
+        raise ValueError(
+            f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
+            f"equations without {and_words(hidden)} (not measured): use the method output-error, or measure more"
+        )
     note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
     shown = () if found.identifiable else found.combinations
     return replace(found, combinations=shown, notes=(note, *found.notes))

@@ -36,7 +36,7 @@ def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, ref
     """
     words = [*misfit(estimate)] if found.converged else []
     left = None
-    if found.starts and estimate.dof > 0:
+    if found.starts:
         left = left_over(found.model, found.experiments, np.array(list(found.starts[0].values())))
     if found.converged and not estimate.errors_stated and left is not None and left > LARGE:
         advice = ", or readings are noisy: try output error" if found.method == "equation-error" else ""

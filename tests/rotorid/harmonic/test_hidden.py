@@ -143,6 +143,16 @@ def test_several_solutions_beside_a_hidden_amplitude_are_said_as_such():
         assert "can be exchanged" in found.unidentifiable[0]
 
 
+def test_too_few_experiments_for_the_elimination_are_said_and_output_error_does():
+    model, truth, data = drawn_chain(121, 3, lost=2)
+    few = data.take(np.arange(4))
+    with pytest.raises(ValueError, match="use the method output-error, or measure more"):
+        identify(model, few)
+    found = identify(model, few, method="output-error")
+    good = np.isfinite(found.values)
+    np.testing.assert_allclose(found.values[good], truth[good], rtol=1e-5)
+
+
 def run(cli, name, *options):
     return cli("identify", CASES / name / "model.toml", CASES / name / "data.csv", "--json", *options)
 
