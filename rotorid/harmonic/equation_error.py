@@ -99,7 +99,8 @@ def identify(
     if not np.isfinite(found.condition_number):
         raise ValueError(
             f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
-            f"equations without {and_words(hidden)} (not measured): use the method output-error, or measure more"
+            f"equations without {and_words(hidden)} (not measured): use the method "
+            "output-error, or measure more"
         )
     note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
     shown = () if found.identifiable else found.combinations
