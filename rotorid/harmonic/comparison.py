@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -91,41 +91,16 @@ class Comparison:
         w = self.experiments.frequencies
         if len(self.forced):
             Z[self.forced] = self.operator.forced(
-                theta, w[self.forced], self.inputs[self.forced], slopes=False
+                theta, w[self.forced], self.inputs[self.forced], False, self._rows(self.forced)
             )[0]
-        if len(self.free):
-            z, v = natural_modes(self.operator.dynamic_stiffness(theta)[0])
-            for i in self.free:
-                shape = self.measured[i].real
-                mode = nearest_mode(z, v, float(self.experiments.frequencies[i]), shape)
-                if mode is not None:
-                    reference = _reference(shape)
-                    frequencies[i] = np.sqrt(mode[0])
-                    Z[i] = mode[1] / mode[1][reference] * shape[reference]
+        for i, (_, _, z, v) in zip(self.free, self._modes(theta), strict=True):
+            shape = self.measured[i].real
+            mode = nearest_mode(z, v, float(self.experiments.frequencies[i]), shape)
+            if mode is not None:
+                reference = _reference(shape)
+                frequencies[i] = np.sqrt(mode[0])
+                Z[i] = mode[1] / mode[1][reference] * shape[reference]
         return Z, frequencies
-
-    def equations(self) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
-        """Function of θ: what the measured amplitudes leave of each equation (rows,), and its Jacobian."""
-        free = self.experiments.free
-        inputs = np.where(free[:, None], 0.0, self.inputs)
-        load = self.operator.loads(self.experiments.frequencies, self.measured, inputs)
-        odd = self.operator.power % 2 != 0
-        constant = self.operator.signal < 0
-        load[np.ix_(free, odd | constant)] = 0.0
-        stretched = np.concatenate((load.real, load.imag))
-
-        def evaluate(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-            P, dP = self.operator.polynomials(theta)
-            values, slopes = [], []
-            for features in self.operator.rows:
-                rows = stretched[:, features]
-                rows = rows[~np.isnan(rows).any(axis=1)]
-                size = float(np.abs(rows).max(initial=0.0)) or 1.0
-                values.append(rows @ P[features] / size)
-                slopes.append(rows @ dP[features] / size)
-            return np.concatenate(values), np.concatenate(slopes)
-
-        return evaluate
 
     def _both(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         key = theta.tobytes()
@@ -143,7 +118,7 @@ class Comparison:
         if not len(self.forced):
             return np.zeros(0), np.zeros((0, len(theta)))
         w = self.experiments.frequencies[self.forced]
-        Z, dZ = self.operator.forced(theta, w, self.inputs[self.forced])
+        Z, dZ = self.operator.forced(theta, w, self.inputs[self.forced], varying=self._rows(self.forced))
         root = self.whiten[self.forced][self.seen]
         gap = (Z - self.measured[self.forced])[self.seen]
         slope = dZ[self.seen]
@@ -151,13 +126,21 @@ class Comparison:
         J = root @ np.stack((slope.real, slope.imag), 1)
         return r.reshape(-1), J.reshape(-1, len(theta))
 
+    def _rows(self, chosen: IntArray) -> dict[str, FloatArray]:
+        """Known quantities that change from row to row, of some experiments."""
+        return {name: values[chosen] for name, values in self.experiments.varying.items()}
+
+    def _modes(self, theta: FloatArray) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
+        """Dynamic stiffness, its derivatives and its modes for each free vibration."""
+        for k, i in enumerate(self.free):
+            if not k or self.operator.model.varying:
+                A, dA = self.operator.dynamic_stiffness(theta, self._rows(np.array([i])))
+                z, v = natural_modes(A)
+            yield A, dA, z, v
+
     def _free(self, theta: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-        if not len(self.free):
-            return []
-        A, dA = self.operator.dynamic_stiffness(theta)
-        z, v = natural_modes(A)
         parts = []
-        for i in self.free:
+        for i, (A, dA, z, v) in zip(self.free, self._modes(theta), strict=True):
             shape, omega = self.measured[i].real, float(self.experiments.frequencies[i])
             reference = _reference(shape)
             others = np.flatnonzero(~np.isnan(shape) & (np.arange(len(shape)) != reference))
@@ -190,12 +173,15 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
     unknown = np.full(n, np.nan, dtype=complex)
     measured = np.stack([np.asarray(experiments.signals.get(o, unknown), dtype=complex) for o in outputs], 1)
     inputs = (
-        np.stack([np.asarray(experiments.signals.get(i, unknown), dtype=complex) for i in operator.inputs], 1)
-        if operator.inputs
+        np.stack(
+            [np.asarray(experiments.signals.get(i, unknown), dtype=complex) for i in operator.model.inputs], 1
+        )
+        if operator.model.inputs
         else np.zeros((n, 0), dtype=complex)
     )
     given = ~np.isnan(measured)
-    known = ~np.isnan(inputs).any(axis=1)
+    factors = operator.multipliers(experiments.frequencies, experiments.varying)
+    known = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1)
     forced = np.flatnonzero(~experiments.free & known & given.any(axis=1))
     free = np.flatnonzero(experiments.free & (given.sum(axis=1) > 0))
     left_out = _left_out(experiments, operator, given, known)
@@ -231,15 +217,17 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
 def _left_out(
     experiments: Experiments, operator: Operator, given: BoolArray, known: BoolArray
 ) -> tuple[str, ...]:
-    words = []
+    hidden = np.asarray(~given.any(axis=0))
+    words = [f"{o} is measured nowhere" for o, lost in zip(operator.outputs, hidden, strict=True) if lost]
     for i, name in enumerate(experiments.names):
         if not known[i] and not experiments.free[i]:
-            words.append(f"experiment {name}: left out, for not every input is known")
+            what = "input or varying quantity" if operator.model.varying else "input"
+            words.append(f"experiment {name}: left out, for not every {what} is known")
         elif not given[i].any():
             words.append(f"experiment {name}: left out, for no amplitude is measured")
         elif not given[i].all():
-            missing = [o for o, g in zip(operator.outputs, given[i], strict=True) if not g]
-            words.append(f"experiment {name}: {', '.join(missing)} not measured")
+            missing = [o for o, g in zip(operator.outputs, given[i] | hidden, strict=True) if not g]
+            words += [f"experiment {name}: {', '.join(missing)} not measured"] if missing else []
     return tuple(words)
 
 

@@ -21,7 +21,7 @@ from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.output_error import operator_of
+from rotorid.harmonic.operator import operator_of
 from rotorid.regression import least_squares
 
 if TYPE_CHECKING:
@@ -258,6 +258,8 @@ def _sensitivities(
     for name in sensors:
         if name not in model.outputs:
             raise ValueError(f"{name} is no output; those are {', '.join(model.outputs)}")
+    if model.varying:
+        raise ValueError(f"a design needs {', '.join(model.varying)} known, not changing from row to row")
     lost = [name for name in model.inputs if name not in inputs]
     if lost or not sensors:
         raise ValueError(f"give the amplitude of {', '.join(lost)}" if lost else "no output has a sensor")

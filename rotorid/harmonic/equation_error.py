@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import combination_words
+from rotorid.harmonic.features import combination_words, ratio_words
+from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.polynomial import ONE
-from rotorid.harmonic.recovery import Recovery, System, and_words, recover
+from rotorid.harmonic.plausibility import doubts, what_more_can_tell
+from rotorid.harmonic.polynomial import ONE, Polynomial
+from rotorid.harmonic.recovery import (
+    Recovery,
+    System,
+    and_words,
+    only_determined,
+    recover,
+    undetermined_parameters,
+)
 from rotorid.harmonic.result import FoundCombination, Identification
-from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
+from rotorid.harmonic.rows import Rows, ask_about_case, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate, echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
 METHODS = ("equation-error", "output-error")
-REWEIGHTINGS = 20
+REWEIGHTINGS = 60
+SETTLED = 0.01
+"""Weights have settled where the last round moved nothing by more than this share of its deviation."""
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
 
@@ -72,38 +84,115 @@ def identify(
     for name, (low, high) in limits(bounds).items():
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
+    ask_about_case(model, experiments)
     if method == "output-error":
         from rotorid.harmonic.output_error import identify_outputs
 
         return identify_outputs(model, experiments, bounds=bounds, loss=loss, start=start)
     if loss != "linear" or start:
         raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
-    return equation_error(model, experiments, bounds=bounds)
+    hidden = hidden_outputs(model, experiments)
+    seen = without(model, hidden) if hidden else None
+    if seen is None:
+        return equation_error(model, experiments, bounds=bounds)
+    found = equation_error(seen, experiments, bounds=bounds)
+    if not np.isfinite(found.condition_number):
+        raise ValueError(
+            f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
+            f"equations without {and_words(hidden)} (not measured): use the method "
+            "output-error, or measure more"
+        )
+    note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
+    shown = () if found.identifiable else found.combinations
+    return replace(found, combinations=shown, notes=(note, *found.notes))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """What linear regression finds, before it becomes an answer.
+
+    Attributes
+    ----------
+    model, rows
+        The equations, and their rows.
+    estimate, K, Y, experiment
+        The regression: its unknowns, weighted rows (m, u), (m,) and the experiment of each.
+    solution
+        Of all unknowns, those that the others are told relative to included (as 1).
+    picks
+        Combinations of its unknowns that the data determine, (q, u).
+    groups
+        Unknowns that may all be multiplied by one factor; of these only ratios are determined.
+    system, words, recovery
+        The combinations (q,) as functions of the parameters, in words, and the parameters from them.
+    settled
+        Whether the weights fit the estimate.
+    """
+
+    model: HarmonicModel
+    rows: Rows
+    estimate: Estimate
+    solution: FloatArray
+    K: FloatArray
+    Y: FloatArray
+    experiment: IntArray
+    picks: FloatArray
+    groups: tuple[IntArray, ...]
+    system: System
+    words: tuple[str, ...]
+    recovery: Recovery
+    settled: bool
+
+
+def linear_fit(model: HarmonicModel, experiments: Experiments, bounds: Bounds | None = None) -> LinearFit:
+    """Regression of the equations, and the parameters that follow; errors as in `identify`."""
+    rows = build_rows(model, experiments)
+    groups = _groups(rows)
+    fixed = np.zeros(rows.coefficients.shape[1])
+    fixed[[_reference(rows, group) for group in groups]] = 1.0
+    if fixed.all():  # each unknown is alone with its factor: nothing is told relative to another
+        fixed[:] = 0.0
+    kept = np.flatnonzero(fixed == 0)
+    estimate, solution, K, Y, experiment, settled = _regress(model, experiments, rows, fixed)
+    picks = _determined(estimate)[: 0 if len(groups) and not fixed.any() else None]
+    whole = np.zeros((len(picks), len(fixed)))
+    whole[:, kept] = picks
+    below = np.zeros_like(whole)
+    for group in groups:
+        below[whole[:, group].any(axis=1)] = np.where(np.isin(np.arange(len(fixed)), group), fixed, 0.0)
+    cov_u = estimate.solution_covariance if settled else None
+    covariance = None if cov_u is None else picks @ cov_u @ picks.T
+    combos = model.combinations
+    system = System(
+        model.parameters,
+        model.exponents[1:],
+        whole @ combos.rows,
+        whole @ solution,
+        covariance,
+        below @ combos.rows if groups else None,
+    )
+    if len(picks):
+        recovery = recover(system, limits(bounds))
+    else:
+        recovery = Recovery((), np.ones(len(model.parameters), dtype=bool), None, (), ())
+    words = _words(model, whole, system)
+    return LinearFit(
+        model, rows, estimate, solution, K, Y, experiment, picks, groups, system, words, recovery, settled
+    )
 
 
 def equation_error(
     model: HarmonicModel, experiments: Experiments, *, bounds: Bounds | None = None
 ) -> Identification:
     """Linear regression; see `identify`."""
-    rows = build_rows(model, experiments)
-    estimate, K, Y, experiment = _regress(model, experiments, rows)
-    combos = model.combinations
-    scalable = _scalable(rows)
-    picks = _determined(estimate)
-    picks = picks[~np.any(picks[:, scalable], axis=1)]
-    matrix = picks @ combos.rows
-    values = picks @ estimate.solution
-    cov_u = estimate.solution_covariance
-    covariance = None if cov_u is None else picks @ cov_u @ picks.T
-    words = _words(model, picks, matrix)
-
-    warnings = list(rows.warnings)
-    if not len(picks):
-        recovery = Recovery((), np.ones(len(model.parameters), dtype=bool), None, (), ())
-    else:
-        system = System(model.parameters, model.exponents[1:], matrix, values, covariance)
-        recovery = recover(system, limits(bounds))
-    warnings += recovery.warnings
+    fit = linear_fit(model, experiments, bounds)
+    rows, estimate, recovery, words = fit.rows, fit.estimate, fit.recovery, fit.words
+    values, covariance = fit.system.values, fit.system.covariance
+    warnings = [*rows.warnings, *recovery.warnings]
+    if not fit.settled:
+        warnings.append(
+            "the weights that follow from the stated errors did not settle: no intervals; use output error"
+        )
     parameters = recovery.values
     for name, (low, high) in limits(bounds).items():
         value = parameters[model.parameters.index(name)]
@@ -125,10 +214,11 @@ def equation_error(
                     theta_cov[j, m] = covariance[i, k]
     influence = None
     if recovery.gain is not None:
-        influence = leave_one_out(K, Y, experiment, len(experiments)) @ (recovery.gain @ picks).T
-    residuals = rows.residuals(estimate.solution)
+        change = leave_one_out(fit.K, fit.Y, fit.experiment, len(experiments))
+        influence = change @ (recovery.gain @ fit.picks).T
+    residuals = rows.residuals(fit.solution)
     used = np.stack((residuals.real, residuals.imag), axis=2)[rows.used]
-    return Identification(
+    found = Identification(
         model=model,
         experiments=experiments,
         method="equation-error",
@@ -152,18 +242,24 @@ def equation_error(
             {name: float(x) for name, x in zip(model.parameters, theta, strict=True)}
             for theta in recovery.solutions
         ),
-        rank=len(picks),
+        rank=len(fit.picks),
         condition_number=estimate.condition_number,
-        unidentifiable=_reasons(model, recovery, words, estimate, scalable),
+        unidentifiable=reasons(fit, experiments) if np.isnan(parameters).any() else (),
         residuals=residuals,
         residual_names=tuple(f"equation {i + 1}" for i in range(len(model.equations))),
         residual_rms=float(np.sqrt(np.mean(used**2))),
         predicted=_predicted(model, experiments, recovery),
         influence=influence,
         left_out=rows.left_out,
+        converged=fit.settled,
         warnings=tuple(warnings),
         notes=_notes(model, experiments, estimate),
     )
+
+    def refit(others: Experiments) -> Sequence[FloatArray]:
+        return linear_fit(model, others).recovery.solutions
+
+    return replace(found, warnings=(*found.warnings, *doubts(found, estimate, bounds, refit)))
 
 
 def limits(bounds: Bounds | None) -> dict[str, tuple[float, float]]:
@@ -175,22 +271,34 @@ def limits(bounds: Bounds | None) -> dict[str, tuple[float, float]]:
 
 
 def _regress(
-    model: HarmonicModel, experiments: Experiments, rows: Rows
-) -> tuple[Estimate, FloatArray, FloatArray, IntArray]:
-    """Unweighted, or with stated errors reweighted until the weights fit the estimate."""
-    words = _unique(model.combinations.words)
+    model: HarmonicModel, experiments: Experiments, rows: Rows, fixed: FloatArray
+) -> tuple[Estimate, FloatArray, FloatArray, FloatArray, IntArray, bool]:
+    """Unweighted, or with stated errors reweighted until the weights fit; some unknowns are fixed."""
+    kept = np.flatnonzero(fixed == 0)
+    names = _unique(model.combinations.words)
+    words = [names[i] for i in kept]
+
+    def solve(K: FloatArray, Y: FloatArray, sigma: float | None) -> tuple[Estimate, FloatArray]:
+        found = least_squares(K[:, kept], Y - K @ fixed, names=words, sigma=sigma, rcond=RCOND)
+        solution = fixed.copy()
+        solution[kept] = found.solution
+        return found, solution
+
     K, Y, experiment = rows.real_rows()
-    estimate = least_squares(K, Y, names=words, rcond=RCOND)
-    if not experiments.stated or not np.any(Y):
-        return estimate, K, Y, experiment
-    for _ in range(REWEIGHTINGS):
-        before = estimate.solution
-        covariance = row_covariance(model, experiments, rows, before)
-        K, Y, experiment = whiten(rows, covariance)
-        estimate = least_squares(K, Y, names=words, sigma=1.0, rcond=RCOND)
-        if np.all(np.abs(estimate.solution - before) <= 1e-12 * np.abs(before)):
-            break
-    return estimate, K, Y, experiment
+    estimate, solution = solve(K, Y, None)
+    settled = True
+    if experiments.stated and np.any(Y - K @ fixed):
+        for _ in range(REWEIGHTINGS):
+            before = solution
+            K, Y, experiment = whiten(rows, row_covariance(model, experiments, rows, before))
+            estimate, solution = solve(K, Y, 1.0)
+            if np.all(np.abs(solution - before) <= 1e-12 * np.abs(before)):
+                break
+        spread = estimate.solution_covariance
+        std = np.zeros(len(kept)) if spread is None else np.sqrt(np.diag(spread).clip(0))
+        size = np.maximum(1e-6 * np.abs(before[kept]), SETTLED * std)
+        settled = bool(np.all(np.abs(solution - before)[kept] <= size))
+    return estimate, solution, K[:, kept], Y - K @ fixed, experiment, settled
 
 
 def _determined(estimate: Estimate) -> FloatArray:
@@ -201,74 +309,77 @@ def _determined(estimate: Estimate) -> FloatArray:
     return np.array(rows) if rows else np.zeros((0, len(estimate.names)))
 
 
-def _scalable(rows: Rows) -> BoolArray:
-    """Regression unknowns (u,) that may all be multiplied by one factor: their equations have right side 0.
+def _groups(rows: Rows) -> tuple[IntArray, ...]:
+    """Groups of regression unknowns that may all be multiplied by one factor: right sides are 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
     """
-    e, u = rows.Y.shape[1], rows.coefficients.shape[1]
-    holds = np.zeros((e, u), dtype=bool)
+    holds = np.zeros((rows.Y.shape[1], rows.coefficients.shape[1]), dtype=bool)
     np.logical_or.at(holds, rows.equation, rows.coefficients != 0)
-    fixed = np.any(rows.Y != 0, axis=0)
-    while True:
-        known = np.any(holds[fixed], axis=0)
-        linked = fixed | np.any(holds[:, known], axis=1)
-        if (linked == fixed).all():
-            return np.asarray(~known, dtype=bool)
-        fixed = linked
+    linked = holds @ holds.T | np.eye(len(holds), dtype=bool)
+    for _ in range(len(holds).bit_length()):
+        linked = linked @ linked
+    known = np.any(rows.Y != 0, axis=0)
+    parts = np.unique(linked, axis=0)[::-1]
+    return tuple(
+        np.flatnonzero(holds[part].any(axis=0))
+        for part in parts
+        if holds[part].any() and not known[part].any()
+    )
 
 
-def _words(model: HarmonicModel, picks: FloatArray, matrix: FloatArray) -> tuple[str, ...]:
+def _reference(rows: Rows, group: IntArray) -> int:
+    """The first unknown of a group that is surely not zero: the others are told relative to it."""
+    K = rows.real_rows()[0][:, group]
+    scale = np.linalg.norm(K, axis=0)
+    scale[scale == 0] = 1.0
+    share = np.abs(np.linalg.svd(K / scale)[2][-1])
+    return int(group[np.flatnonzero(share > 0.1 * share.max())[0]])
+
+
+def _words(model: HarmonicModel, picks: FloatArray, system: System) -> tuple[str, ...]:
     own = model.combinations.words
     words = []
-    for pick, row in zip(picks, matrix, strict=True):
+    for i, (pick, row) in enumerate(zip(picks, system.matrix, strict=True)):
         used = np.flatnonzero(pick)
-        if len(used) == 1:
+        if system.below is not None and system.below[i].any():
+            words.append(ratio_words(_polynomial(model, row), _polynomial(model, system.below[i])))
+        elif len(used) == 1:
             words.append(own[used[0]])
         else:
-            parts = {model.monomials[j]: {ONE: Fraction(float(f"{row[j]:.6g}"))} for j in np.flatnonzero(row)}
-            words.append(combination_words(parts))
+            words.append(combination_words({m: {ONE: x} for m, x in _polynomial(model, row).items()}))
     return tuple(words)
+
+
+def _polynomial(model: HarmonicModel, row: FloatArray) -> Polynomial:
+    return {model.monomials[j]: Fraction(float(f"{row[j]:.6g}")) for j in np.flatnonzero(row)}
 
 
 def _unique(words: tuple[str, ...]) -> list[str]:
     return [w if words.count(w) == 1 else f"{w} [{i + 1}]" for i, w in enumerate(words)]
 
 
-def _reasons(
-    model: HarmonicModel,
-    recovery: Recovery,
-    words: tuple[str, ...],
-    estimate: Estimate,
-    scalable: BoolArray,
-) -> tuple[str, ...]:
-    reasons = []
+def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
+    """Why parameters have no one value, in words."""
+    model, recovery, estimate = fit.model, fit.recovery, fit.estimate
+    found = []
     if recovery.undetermined.any():
         lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
-        seen = [name for name in model.parameters if name not in lost]
-        seen += [w for w in words if w not in seen and any(n in _names(w) for n in lost)]
-        verb = "is" if len(seen) == 1 else "are"
-        text = f"only {and_words(seen)} {verb} determined" if seen else "nothing is determined"
-        itself = "itself is" if len(lost) == 1 else "themselves are"
-        reasons.append(f"{text}; {and_words(lost)} by {itself} not")
-    if scalable.any():
-        loose = [w for w, loose in zip(model.combinations.words, scalable, strict=True) if loose]
-        reasons.append(
-            f"every multiple of {and_words(loose)} fits, for no known term that is not zero stands in their "
-            f"equations; make one of them known, or give a force that is not zero"
-        )
+        found.append(only_determined(model.parameters, lost, fit.words))
+    for group in fit.groups:
+        loose = [model.combinations.words[i] for i in group]
+        if set(loose) <= set(model.parameters):
+            found.append(
+                f"every multiple of {and_words(loose)} fits, for no known term that is not zero stands in "
+                f"their equations: no experiment of this kind tells more than ratios; make one of them known"
+            )
     if not estimate.full_rank:
-        reasons.append(
+        now = len(model.parameters) - len(undetermined_parameters(fit.system)[1])
+        found.append(
             f"these experiments determine {estimate.rank} of the {len(estimate.names)} combinations that the "
-            f"model could show; more experiments, at other frequencies, may determine the rest"
+            f"model could show; {what_more_can_tell(model, experiments, now)}"
         )
-    return (*reasons, *recovery.reasons)
-
-
-def _names(words: str) -> set[str]:
-    import re
-
-    return set(re.findall(r"[^\W\d]\w*", words))
+    return (*found, *recovery.reasons)
 
 
 def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recovery) -> dict[str, ComplexArray]:
@@ -280,7 +391,7 @@ def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recover
         return {}
     part = experiments.take(driven)
     try:
-        found = model.predict(recovery.solutions[0], part.frequencies, part.signals)
+        found = model.predict(recovery.solutions[0], part.frequencies, part.signals, part.varying)
     except (np.linalg.LinAlgError, ValueError):
         return {}
     out = {}
@@ -292,6 +403,8 @@ def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recover
 
 def _notes(model: HarmonicModel, experiments: Experiments, estimate: Estimate) -> tuple[str, ...]:
     notes = []
+    if model.varying:
+        notes.append(f"{and_words(model.varying)}: from the measurements, row by row")
     if not experiments.stated:
         notes.append(
             "all rows count alike; state errors of the amplitudes to weight them and for honest intervals"

@@ -74,6 +74,8 @@ class Experiments:
         Stated errors of the measured outputs; None: not stated. Inputs count as exact.
     covariances
         From repeated readings: by signal (n, 2, 2), real and imaginary part; before `errors`.
+    varying
+        Known quantities (n,) that change from row to row, by name; NaN where unknown.
     """
 
     names: tuple[str, ...]
@@ -82,6 +84,7 @@ class Experiments:
     free: BoolArray
     errors: AmplitudeErrors | None = None
     covariances: Mapping[str, FloatArray] = field(default_factory=dict)
+    varying: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -128,6 +131,7 @@ class Experiments:
             self.free[chosen],
             self.errors,
             {name: values[chosen] for name, values in self.covariances.items()},
+            {name: values[chosen] for name, values in self.varying.items()},
         )
 
 
@@ -150,7 +154,8 @@ def experiments(
     frequencies
         Shape (n,), rad/s.
     signals
-        Amplitudes by name, (n,) or one for all experiments; NaN: not measured.
+        Amplitudes by name, (n,) or one for all experiments; NaN: not measured. The model's varying
+        quantities, too.
     names
         Default 1, 2, ….
     free
@@ -186,4 +191,5 @@ def experiments(
     for name in model.inputs:
         if name in table or marks.any():
             table[name] = np.where(marks, 0, table.get(name, np.full(w.shape, np.nan)))
-    return Experiments(labels, w, table, marks, errors, dict(covariances or {}))
+    rows = {name: np.asarray(table.pop(name).real) for name in model.varying if name in table}
+    return Experiments(labels, w, table, marks, errors, dict(covariances or {}), rows)

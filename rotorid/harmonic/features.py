@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, degree, times
 
 P = "p"
@@ -33,6 +34,8 @@ class Feature:
         Coefficient of each monomial of the parameters, known numbers inserted.
     symbolic
         The same with the names of the known.
+    varying
+        Product of known quantities that change from row to row, such as a speed: [S] (4).
     """
 
     equation: int
@@ -40,17 +43,7 @@ class Feature:
     signal: str
     exact: dict[Monomial, Fraction]
     symbolic: dict[Monomial, Polynomial]
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """All terms coefficient · monomial(θ) · p^power · signal of all equations as flat arrays (t,)."""
-
-    equation: IntArray
-    power: IntArray
-    signal: IntArray
-    monomial: IntArray
-    coefficient: FloatArray
+    varying: Monomial = ONE
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,33 +70,68 @@ class Combinations:
 
 
 def split_features(
-    equation: int, polynomial: Polynomial, known: Mapping[str, Fraction], signals: frozenset[str]
+    equation: int,
+    polynomial: Polynomial,
+    known: Mapping[str, Fraction],
+    signals: frozenset[str],
+    varying: frozenset[str] = frozenset(),
 ) -> list[Feature]:
     """Sort an equation's terms by p^k · signal; ValueError where it is not linear in the signals."""
-    symbolic: dict[tuple[int, str], dict[Monomial, Polynomial]] = {}
+    symbolic: dict[tuple[int, str, Monomial], dict[Monomial, Polynomial]] = {}
     for monomial, value in polynomial.items():
-        k, signal, numbers, parameters = 0, CONSTANT, [], []
+        k, signal, numbers, parameters, factors_of_row = 0, CONSTANT, [], [], []
         for name, exponent in monomial:
             if name == P:
                 k = exponent
+            elif name in varying:
+                factors_of_row.append((name, exponent))
             elif name in signals:
                 if signal or exponent != 1:
                     term = "*".join(f"{n}**{e}" if e != 1 else n for n, e in monomial if n in signals)
-                    raise ValueError(f"it is not linear in the signals: it contains {term}")
+                    raise ValueError(
+                        f"it is not linear in the signals: it contains {term} (name a quantity that is known "
+                        f"in each row under varying)"
+                    )
                 signal = name
             elif name in known:
                 numbers.append((name, exponent))
             else:
                 parameters.append((name, exponent))
-        place = symbolic.setdefault((k, signal), {}).setdefault(tuple(parameters), {})
+        place = symbolic.setdefault((k, signal, tuple(factors_of_row)), {}).setdefault(tuple(parameters), {})
         place[tuple(numbers)] = value
     features = []
-    for (k, signal), parts in sorted(symbolic.items(), key=lambda item: item[0]):
+    for (k, signal, factors), parts in sorted(symbolic.items(), key=lambda item: item[0]):
         exact = {m: insert(part, known) for m, part in parts.items()}
         exact = {m: x for m, x in exact.items() if x}
         if exact:
-            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}))
+            features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}, factors))
     return features
+
+
+def multipliers(
+    powers: Sequence[int],
+    products: Sequence[Monomial],
+    frequencies: FloatArray,
+    varying: Mapping[str, FloatArray] | None = None,
+) -> ComplexArray:
+    """(iω)^k and the varying quantities of each feature (n, f), for frequencies (n,) and quantities (n,)."""
+    w, k = np.asarray(frequencies, dtype=float), np.asarray(powers, dtype=np.int_)
+    if (k < 0).any() and (w == 0).any():
+        raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
+    # exact powers of i, so that a real row has no imaginary dust
+    out = w[:, None] ** k * np.array([1, 1j, -1, -1j])[k % 4]
+    for j, product in enumerate(products):
+        for name, exponent in product:
+            if varying is None or name not in varying:
+                raise ValueError(
+                    f"{name} stands as a factor in the equations and is neither known nor estimated: "
+                    f"the measurements must have its value in every row (a column {name})"
+                )
+            value = np.asarray(varying[name], dtype=float)
+            if exponent < 0 and (value == 0).any():
+                raise ValueError(f"an equation divides by {name}, which is 0 in a row of the measurements")
+            out[:, j] *= value ** float(exponent)
+    return np.asarray(out, dtype=complex)
 
 
 def insert(polynomial: Polynomial, known: Mapping[str, Fraction]) -> Fraction:
@@ -124,62 +152,44 @@ def lifted(features: Sequence[Feature], parameters: Sequence[str]) -> tuple[Mono
     return tuple(sorted(found, key=lambda m: (degree(m), sorted((order[n], e) for n, e in m))))
 
 
-def flatten(features: Sequence[Feature], monomials: Sequence[Monomial], signals: Sequence[str]) -> Terms:
-    """Features as flat arrays; monomial 0 is 1, the others follow; signal −1 is the constant."""
-    place = {ONE: 0} | {m: i + 1 for i, m in enumerate(monomials)}
-    column = {name: i for i, name in enumerate(signals)} | {CONSTANT: -1}
-    rows = [
-        (f.equation, f.power, column[f.signal], place[m], float(x))
-        for f in features
-        for m, x in f.exact.items()
-    ]
-    table = np.array(rows, dtype=float).reshape(-1, 5)
-    whole = table[:, :4].astype(np.int64)
-    return Terms(whole[:, 0], whole[:, 1], whole[:, 2], whole[:, 3], table[:, 4])
+def powers_product(exponents: FloatArray, theta: FloatArray) -> FloatArray:
+    """Products Π θ^e (m,) of exponents (m, n)."""
+    return np.asarray(np.prod(np.asarray(theta, dtype=float) ** exponents, axis=1))
+
+
+def powers_slopes(exponents: FloatArray, theta: FloatArray) -> FloatArray:
+    """Derivatives (m, n) of the products by θ."""
+    values = np.asarray(theta, dtype=float)
+    if values.all():
+        return np.asarray(powers_product(exponents, values)[:, None] * exponents / values)
+    slopes = np.zeros_like(exponents)
+    for j in range(len(values)):
+        used = np.flatnonzero(exponents[:, j])
+        lower = exponents[used].copy()
+        lower[:, j] -= 1
+        slopes[used, j] = exponents[used, j] * powers_product(lower, values)
+    return slopes
 
 
 def merge(
     features: Sequence[Feature], monomials: Sequence[Monomial], known: Mapping[str, Fraction]
 ) -> Combinations:
     """Merge monomials whose columns no data can tell apart into the combinations that data can see."""
-    place = {m: i for i, m in enumerate(monomials)}
-    echelon: dict[int, dict[int, Fraction]] = {}
-    for feature in features:
-        _insert_row(echelon, {place[m]: x for m, x in feature.exact.items() if m != ONE})
-    pivots = sorted(echelon)
+    from sympy import QQ
+    from sympy.polys.matrices import DomainMatrix
+
+    exact = [[f.exact.get(m, Fraction(0)) for m in monomials] for f in features]
+    table = [[QQ(x.numerator, x.denominator) for x in row] for row in exact]
+    reduced, pivots = DomainMatrix(table, (len(table), len(monomials)), QQ).to_sparse().rref()
     rows, words = np.zeros((len(pivots), len(monomials))), []
-    for i, pivot in enumerate(pivots):
-        wanted = {monomials[c]: x for c, x in sorted(echelon[pivot].items())}
+    for i, row in enumerate(reduced.to_Matrix().tolist()[: len(pivots)]):
+        wanted = {m: Fraction(int(x.p), int(x.q)) for m, x in zip(monomials, row, strict=True) if x}
         symbolic = _own_words(wanted, features)
         for m, part in symbolic.items():
-            rows[i, place[m]] = float(insert(part, known))
+            rows[i, monomials.index(m)] = float(insert(part, known))
         words.append(combination_words(symbolic))
     scales = rows[np.arange(len(pivots)), pivots]
     return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(words))
-
-
-def _insert_row(echelon: dict[int, dict[int, Fraction]], row: dict[int, Fraction]) -> None:
-    """Add a row to a reduced echelon form kept by pivot."""
-    for pivot in [c for c in row if c in echelon]:
-        _subtract(row, echelon[pivot], row[pivot])
-    if not row:
-        return
-    pivot = min(row)
-    lead = row[pivot]
-    row = {c: x / lead for c, x in row.items()}
-    for other in echelon.values():
-        if pivot in other:
-            _subtract(other, row, other[pivot])
-    echelon[pivot] = row
-
-
-def _subtract(row: dict[int, Fraction], other: Mapping[int, Fraction], factor: Fraction) -> None:
-    for column, value in other.items():
-        left = row.get(column, Fraction(0)) - factor * value
-        if left:
-            row[column] = left
-        else:
-            row.pop(column, None)
 
 
 def _own_words(
@@ -244,6 +254,29 @@ def combination_words(coefficients: Mapping[Monomial, Polynomial]) -> str:
     inverse = tuple((name, -e) for name, e in common)
     inside = _sum_words([(known, times(m, inverse), value) for known, m, value in terms])
     return f"{_product_words((), common)}*({inside})"
+
+
+def ratio_words(above: Polynomial, below: Polynomial) -> str:
+    """Write one sum over another, common factors cancelled.
+
+    Examples
+    --------
+    >>> one, ka, kb = Fraction(1), (("ka", 1),), (("kb", 1),)
+    >>> ratio_words({(("ka", 1), ("kb", 1)): one}, {ka: one, kb: one})
+    'ka*kb/(ka + kb)'
+    """
+    import sympy
+
+    def expression(polynomial: Polynomial) -> Any:  # noqa: ANN401 - sympy has no types
+        return sympy.Add(
+            *(
+                sympy.Rational(x.numerator, x.denominator)
+                * sympy.Mul(*(sympy.Symbol(name) ** e for name, e in monomial))
+                for monomial, x in polynomial.items()
+            )
+        )
+
+    return str(sympy.factor(sympy.cancel(expression(above) / expression(below))))
 
 
 def _sum_words(terms: Sequence[tuple[Monomial, Monomial, Fraction]]) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -12,9 +13,19 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.harmonic.features import CONSTANT, Combinations, Feature, P, Terms, flatten, lifted, merge
+from rotorid.harmonic.features import (
+    CONSTANT,
+    Combinations,
+    Feature,
+    P,
+    lifted,
+    merge,
+    multipliers,
+    powers_product,
+    powers_slopes,
+)
 from rotorid.harmonic.features import split_features as _split
-from rotorid.harmonic.polynomial import Monomial, add, from_expression
+from rotorid.harmonic.polynomial import ONE, Factor, Monomial, Polynomial, add, from_expression
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +44,8 @@ class HarmonicModel:
         Names of all amplitudes, of the exciting ones and of the others.
     features
         The coefficients of p^k · signal in each equation.
+    varying
+        Names of known quantities that change from row to row, [S] (4): columns of the measurements.
     """
 
     equations: tuple[str, ...]
@@ -42,6 +55,7 @@ class HarmonicModel:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     features: tuple[Feature, ...] = field(repr=False)
+    varying: tuple[str, ...] = ()
 
     @property
     def has_constant_terms(self) -> bool:
@@ -60,9 +74,10 @@ class HarmonicModel:
         return merge(self.features, self.monomials, exact)
 
     @cached_property
-    def terms(self) -> Terms:
-        """All terms as flat arrays."""
-        return flatten(self.features, self.monomials, self.signals)
+    def coefficients(self) -> FloatArray:
+        """Of the features in 1 and the monomials, (features, 1 + monomials)."""
+        lifted_ = (ONE, *self.monomials)
+        return np.array([[float(f.exact.get(m, 0)) for m in lifted_] for f in self.features])
 
     @cached_property
     def exponents(self) -> FloatArray:
@@ -76,20 +91,15 @@ class HarmonicModel:
 
     def monomial_values(self, values: FloatArray) -> FloatArray:
         """Monomials (1 + monomials,) of parameters (n,)."""
-        return np.asarray(np.prod(np.asarray(values, dtype=float) ** self.exponents, axis=1))
+        return powers_product(self.exponents, values)
 
     def monomial_jacobian(self, values: FloatArray) -> FloatArray:
         """Derivatives (1 + monomials, n) of the monomials by the parameters."""
-        theta = np.asarray(values, dtype=float)
-        jacobian = np.zeros_like(self.exponents)
-        for j in range(len(theta)):
-            used = np.flatnonzero(self.exponents[:, j])
-            lower = self.exponents[used].copy()
-            lower[:, j] -= 1
-            jacobian[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
-        return jacobian
+        return powers_slopes(self.exponents, values)
 
-    def matrices(self, values: FloatArray, frequencies: FloatArray) -> ComplexArray:
+    def matrices(
+        self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
         """Coefficients A(iω; θ) of the signals, (n, equations, 1 + signals); the last is the constant's.
 
         Parameters
@@ -98,22 +108,26 @@ class HarmonicModel:
             Of the parameters.
         frequencies
             (n,), rad/s.
+        varying
+            Known quantities (n,) that change from row to row, by name.
         """
-        t = self.terms
-        weights = t.coefficient * self.monomial_values(values)[t.monomial]
-        A: ComplexArray = self._evaluate(weights[None], frequencies)[0]
+        place = {name: i for i, name in enumerate((*self.signals, CONSTANT))}
+        powers, products = [f.power for f in self.features], [f.varying for f in self.features]
+        pk = multipliers(powers, products, frequencies, varying)
+        terms = pk * (self.coefficients @ self.monomial_values(values))
+        A = np.zeros((len(terms), len(self.equations), 1 + len(self.signals)), dtype=complex)
+        for j, f in enumerate(self.features):
+            A[:, f.equation, place[f.signal]] += terms[:, j]
         return A
 
-    def matrix_derivatives(self, values: FloatArray, frequencies: FloatArray) -> ComplexArray:
-        """∂A/∂θ, shape (parameters, n, equations, 1 + signals), in the order of `matrices`."""
-        t = self.terms
-        weights = t.coefficient * self.monomial_jacobian(values)[t.monomial].T
-        return self._evaluate(weights, frequencies)
-
     def predict(
-        self, values: FloatArray, frequencies: FloatArray, inputs: Mapping[str, ComplexArray]
+        self,
+        values: FloatArray,
+        frequencies: FloatArray,
+        inputs: Mapping[str, ComplexArray],
+        varying: Mapping[str, FloatArray] | None = None,
     ) -> dict[str, ComplexArray]:
-        """Amplitudes of the outputs at frequencies (n,) for amplitudes of the inputs (n,).
+        """Amplitudes of the outputs at frequencies (n,) for inputs and varying quantities (n,).
 
         Raises
         ------
@@ -121,7 +135,7 @@ class HarmonicModel:
             If there are not as many outputs as equations.
         """
         self.check_square()
-        A = self.matrices(values, frequencies)
+        A = self.matrices(values, frequencies, varying)
         place = {name: i for i, name in enumerate(self.signals)}
         right = -A[:, :, -1]
         for name in self.inputs:
@@ -139,31 +153,14 @@ class HarmonicModel:
                 f"say which signals are given with inputs = [...]"
             )
 
-    def _evaluate(self, weights: FloatArray, frequencies: FloatArray) -> ComplexArray:
-        """Σ weights · p^k sorted into (rows of weights, n, equations, 1 + signals)."""
-        t = self.terms
-        w = np.asarray(frequencies, dtype=float)
-        if (t.power < 0).any() and (w == 0).any():
-            raise ValueError("an equation divides by p: it has no meaning at the frequency 0")
-        width = 1 + len(self.signals)
-        shape = (len(weights), len(self.equations), width)
-        out = np.zeros((len(weights), len(w), *shape[1:]), dtype=complex)
-        column = np.where(t.signal < 0, width - 1, t.signal)
-        for k in np.unique(t.power):
-            used = t.power == k
-            part = np.zeros(shape)
-            for row, own in zip(part, weights, strict=True):
-                np.add.at(row, (t.equation[used], column[used]), own[used])
-            out += part[:, None] * ((1j * w) ** int(k))[None, :, None, None]
-        return out
 
-
-def harmonic_model(  # noqa: C901
+def harmonic_model(
     equations: Sequence[str],
     *,
     known: Mapping[str, float] | None = None,
     estimate: Sequence[str],
     inputs: Sequence[str] | None = None,
+    varying: Sequence[str] = (),
 ) -> HarmonicModel:
     """Read an operator model.
 
@@ -171,14 +168,17 @@ def harmonic_model(  # noqa: C901
     ----------
     equations
         "left = right" in p = d/dt, known names, parameters and signals, such as "(m*p**2 + b*p + c)*X = F".
-        Every name that is neither p, known nor to be estimated is a signal; a term without a signal has
-        amplitude 1. Denominators of several terms are multiplied out.
+        Every name that is neither p, known nor to be estimated is a signal, but for one that stands only as a
+        factor of signals: that is varying. A term without a signal has amplitude 1. Denominators of several
+        terms are multiplied out.
     known
         Numbers by name.
     estimate
         Names of the parameters to be estimated.
     inputs
         Signals that excite. Default: those that stand only on right sides.
+    varying
+        Further known quantities that change from row to row, [S] (4), such as a speed.
 
     Raises
     ------
@@ -210,12 +210,7 @@ def harmonic_model(  # noqa: C901
             raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
 
     exact = {name: exact_number(value) for name, value in numbers.items()}
-    features: list[Feature] = []
-    for i, (text, (lhs, rhs)) in enumerate(zip(equations, sides, strict=True)):
-        try:
-            features += _expand(i, lhs, rhs, exact, frozenset(occurring))
-        except ValueError as problem:
-            raise ValueError(f"equation {i + 1}, '{text}': {problem}") from None
+    features, changing = _all_features(equations, sides, exact, occurring, inputs or (), varying)
     used = {f.signal for f in features} - {CONSTANT}
     signals = tuple(name for name in _by_place(equations, occurring) if name in used)
     if not signals:
@@ -241,7 +236,14 @@ def harmonic_model(  # noqa: C901
     if not outputs:
         raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
     return HarmonicModel(
-        tuple(equations), tuple(estimate), numbers, signals, chosen, outputs, tuple(features)
+        tuple(equations),
+        tuple(estimate),
+        numbers,
+        signals,
+        chosen,
+        outputs,
+        tuple(features),
+        tuple(name for name in occurring if name in changing),
     )
 
 
@@ -250,13 +252,61 @@ def exact_number(value: float) -> Fraction:
     return Fraction(repr(float(value)))
 
 
-def _expand(  # noqa: C901
-    index: int,
-    lhs: Any,  # noqa: ANN401 - sympy
-    rhs: Any,  # noqa: ANN401
+def _all_features(
+    equations: Sequence[str],
+    sides: Sequence[Any],
     known: Mapping[str, Fraction],
-    signals: frozenset[str],
-) -> list[Feature]:
+    names_: Sequence[str],
+    inputs: Sequence[str],
+    varying: Sequence[str],
+) -> tuple[list[Feature], frozenset[str]]:
+    """Features of all equations, and the names of quantities that change from row to row."""
+    expanded = []
+    for i, (text, side) in enumerate(zip(equations, sides, strict=True)):
+        with _named(i, text):
+            expanded.append(_expand(side[0], side[1], known))
+    changing = _row_by_row([part for part, _ in expanded], names_, inputs, varying)
+    features: list[Feature] = []
+    for i, (text, (difference, bottom)) in enumerate(zip(equations, expanded, strict=True)):
+        with _named(i, text):
+            for name in (name for factor in bottom for monomial, _ in factor for name, _ in monomial):
+                if name in names_ and name not in changing:
+                    raise ValueError(f"it is not linear in the signals: {name} stands in a denominator")
+            own = _split(i, difference, known, frozenset(names_), changing)
+            if not any(f.signal for f in own):
+                raise ValueError(
+                    "it contains no signal; names that are neither known nor estimated are signals"
+                )
+            features += own
+    return features, changing
+
+
+@contextmanager
+def _named(index: int, text: str) -> Iterator[None]:
+    """Say in which equation a problem lies."""
+    try:
+        yield
+    except ValueError as problem:
+        raise ValueError(f"equation {index + 1}, '{text}': {problem}") from None
+
+
+def _row_by_row(
+    expanded: Sequence[Polynomial], occurring: Sequence[str], inputs: Sequence[str], stated: Sequence[str]
+) -> frozenset[str]:
+    """Names that stand only beside a signal, as factors of it: it stands alone somewhere, they do not."""
+    terms = [{n: e for n, e in m if n in occurring} for part in expanded for m in part]
+    alone = {n for term in terms if len(term) == 1 for n, e in term.items() if e == 1} | set(inputs)
+    alone -= set(stated)
+    found = set(stated)
+    for term in terms:
+        if len(alone.intersection(term)) == 1:
+            found |= set(term) - alone
+    return frozenset(found)
+
+
+def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomial, Iterable[Factor]]:  # noqa: ANN401
+    """Left minus right side over the common denominator, and that."""
+
     def constant(part: Any) -> Fraction | None:  # noqa: ANN401
         if any(symbol.name not in known for symbol in part.free_symbols):
             return None
@@ -269,21 +319,13 @@ def _expand(  # noqa: C901
         left, right = from_expression(lhs, constant), from_expression(rhs, constant)
     except ZeroDivisionError:
         raise ValueError("it divides by zero") from None
-    for factor in (*left.bottom, *right.bottom):
-        for monomial, _ in factor:
-            for name, _ in monomial:
-                if name in signals:
-                    raise ValueError(f"it is not linear in the signals: {name} stands in a denominator")
     bottom = left.bottom | right.bottom
     difference = add(left.over(bottom), right.over(bottom), -1)
     for monomial in difference:
         for name, exponent in monomial:
             if name in known and exponent < 0 and not known[name]:
                 raise ValueError(f"it divides by {name}, which is 0")
-    features = _split(index, difference, known, signals)
-    if not any(f.signal for f in features):
-        raise ValueError("it contains no signal; names that are neither known nor estimated are signals")
-    return features
+    return difference, (*left.bottom, *right.bottom)
 
 
 def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:

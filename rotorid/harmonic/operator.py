@@ -7,40 +7,51 @@ p² = −ω², b = 0, and odd powers of p, which would need imaginary amplitudes
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from rotorid.harmonic.features import CONSTANT, Feature
+from rotorid.harmonic.features import multipliers
+from rotorid.harmonic.model import HarmonicModel
 
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """A model compiled to arrays: f features (equation, signal, power of p), each a polynomial of θ.
+    """A model ready for prediction: f features (equation, signal, power of p), each a polynomial of θ.
 
     Attributes
     ----------
-    parameters, outputs, inputs
-        Names; as many outputs as equations.
-    equation, signal, power
-        Of each feature, shape (f,); `signal` counts outputs, then inputs, then −1 for none.
-    C
-        Coefficients, features × monomials.
-    exponents
-        Of the parameters in each monomial, monomials × parameters.
+    model
+        With as many outputs as equations.
     """
 
-    parameters: tuple[str, ...]
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    equation: IntArray
-    signal: IntArray
-    power: IntArray
-    C: FloatArray
-    exponents: IntArray
+    model: HarmonicModel
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of what is predicted."""
+        return self.model.outputs
+
+    @cached_property
+    def equation(self) -> IntArray:
+        """Of each feature (f,)."""
+        return np.array([f.equation for f in self.model.features], dtype=np.int_)
+
+    @cached_property
+    def power(self) -> IntArray:
+        """Of p in each feature (f,)."""
+        return np.array([f.power for f in self.model.features], dtype=np.int_)
+
+    @cached_property
+    def signal(self) -> IntArray:
+        """Of each feature (f,): outputs, then inputs, then −1 for none."""
+        names = [*self.outputs, *self.model.inputs]
+        return np.array(
+            [names.index(f.signal) if f.signal else -1 for f in self.model.features], dtype=np.int_
+        )
 
     @cached_property
     def _is_output(self) -> BoolArray:
@@ -62,20 +73,16 @@ class Operator:
 
     def polynomials(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Values (f,) and derivatives (f, n) of the features' coefficients at θ (n,)."""
-        powers = theta ** self.exponents.astype(np.float64)
-        monomials = powers.prod(axis=1)
-        if theta.all():
-            return self.C @ monomials, self.C @ (monomials[:, None] * self.exponents / theta)
-        slopes = np.zeros(powers.shape)
-        for j in np.flatnonzero(self.exponents.any(axis=0)):
-            others = np.delete(powers, j, axis=1).prod(axis=1)
-            e = self.exponents[:, j].astype(np.float64)
-            own = np.where(e == 0, 0.0, e * theta[j] ** np.where(e == 0, 1.0, e - 1))
-            slopes[:, j] = own * others
-        return self.C @ monomials, self.C @ slopes
+        C = self.model.coefficients
+        return C @ self.model.monomial_values(theta), C @ self.model.monomial_jacobian(theta)
 
     def forced(
-        self, theta: FloatArray, frequencies: FloatArray, inputs: ComplexArray, slopes: bool = True
+        self,
+        theta: FloatArray,
+        frequencies: FloatArray,
+        inputs: ComplexArray,
+        slopes: bool = True,
+        varying: Mapping[str, FloatArray] | None = None,
     ) -> tuple[ComplexArray, ComplexArray]:
         """Amplitudes (n, e) and their derivatives (n, e, parameters).
 
@@ -89,6 +96,8 @@ class Operator:
             Amplitudes of the inputs, (n, inputs).
         slopes
             False: without derivatives (an empty array).
+        varying
+            Known quantities (n,) that change from row to row, by name.
 
         Raises
         ------
@@ -97,7 +106,7 @@ class Operator:
         """
         P, dP = self.polynomials(theta)
         n, e = len(frequencies), len(self.outputs)
-        pk = self._p(frequencies)
+        pk = self.multipliers(frequencies, varying)
         A = ((pk * P) @ self._place).reshape(n, e, e)
         # only inputs and terms without a signal are in it so far
         load = pk * self._amplitudes(np.zeros((n, e), dtype=complex), inputs)
@@ -109,9 +118,18 @@ class Operator:
         G = -np.stack([load[:, f] @ dP[f] for f in self.rows], axis=1)
         return Z, np.asarray(np.linalg.solve(A, G), dtype=np.complex128)
 
-    def dynamic_stiffness(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n)."""
+    def dynamic_stiffness(
+        self, theta: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n).
+
+        Varying quantities (1,) have the values of one row.
+        """
         P, dP = self.polynomials(theta)
+        if self.model.varying:
+            products = [f.varying for f in self.model.features]
+            row = multipliers([0] * len(P), products, np.ones(1), varying)[0].real
+            P, dP = P * row, dP * row[:, None]
         e = len(self.outputs)
         use = self._is_output & (self.power % 2 == 0)
         low = int(self.power[use].min()) if use.any() else 0
@@ -126,57 +144,26 @@ class Operator:
             dA[at] += sign[f] * dP[f]
         return A, dA
 
-    def loads(self, frequencies: FloatArray, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
-        """What each feature's coefficient multiplies: p^k · amplitude, (n, f)."""
-        return self._p(frequencies) * self._amplitudes(Z, inputs)
-
     def _amplitudes(self, Z: ComplexArray, inputs: ComplexArray) -> ComplexArray:
         """Amplitude that each feature multiplies, (n, f)."""
         table = np.concatenate((Z, inputs, np.ones((len(Z), 1))), axis=1)
         return np.asarray(table[:, self.signal])
 
-    def _p(self, frequencies: FloatArray) -> ComplexArray:
-        """p^k of each feature, (n, f)."""
-        p = 1j * np.asarray(frequencies, dtype=np.float64)
-        return np.asarray(p[:, None] ** self.power, dtype=np.complex128)
-
-
-def compile_operator(
-    features: Sequence[Feature], *, parameters: Sequence[str], outputs: Sequence[str], inputs: Sequence[str]
-) -> Operator:
-    """Gather the features of a model into an `Operator`.
-
-    Raises
-    ------
-    ValueError
-        If there are not as many outputs as equations.
-    """
-    count = len({f.equation for f in features})
-    if count != len(outputs) or count == 0:
-        raise ValueError(
-            f"predicting amplitudes needs as many equations as outputs; there are {count} equations and "
-            f"{len(outputs)} outputs ({', '.join(outputs) or 'none'}): say which signals are known with "
-            "inputs = [...], or use the equation-error method"
+    def multipliers(
+        self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
+        """p^k · varying of each feature, (n, f)."""
+        return multipliers(
+            self.power.tolist(), [f.varying for f in self.model.features], frequencies, varying
         )
-    names = [*outputs, *inputs]
-    monomials: dict[tuple[int, ...], int] = {}
-    entries: list[tuple[int, int, float]] = []
-    for i, feature in enumerate(features):
-        for monomial, value in feature.exact.items():
-            powers = dict(monomial)
-            key = tuple(powers.get(name, 0) for name in parameters)
-            entries.append((i, monomials.setdefault(key, len(monomials)), float(value)))
-    C = np.zeros((len(features), len(monomials)))
-    for f, m, coefficient in entries:
-        C[f, m] += coefficient
-    signal = [names.index(f.signal) if f.signal != CONSTANT else -1 for f in features]
-    return Operator(
-        parameters=tuple(parameters),
-        outputs=tuple(outputs),
-        inputs=tuple(inputs),
-        equation=np.array([f.equation for f in features], dtype=np.int_),
-        signal=np.array(signal, dtype=np.int_),
-        power=np.array([f.power for f in features], dtype=np.int_),
-        C=C,
-        exponents=np.array(list(monomials), dtype=np.int_).reshape(-1, len(parameters)),
-    )
+
+
+def operator_of(model: HarmonicModel) -> Operator:
+    """Prepare a model for prediction; ValueError if equations and outputs differ in number."""
+    if len(model.equations) != len(model.outputs):
+        raise ValueError(
+            f"predicting amplitudes needs as many equations as outputs; there are {len(model.equations)} "
+            f"equations and {len(model.outputs)} outputs ({', '.join(model.outputs) or 'none'}): say which "
+            "signals are known with inputs = [...], or use the equation-error method"
+        )
+    return Operator(model)

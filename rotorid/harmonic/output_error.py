@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,18 +25,28 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import Operator, compile_operator
+from rotorid.harmonic.operator import Operator, operator_of
+from rotorid.harmonic.plausibility import doubts, what_more_can_tell
+from rotorid.harmonic.recovery import only_determined, why_several
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.starting import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
+if TYPE_CHECKING:
+    from rotorid.harmonic.equation_error import LinearFit
+
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
 MOST_STARTS = 8
 """Solutions of the linear estimate from which to begin."""
+WITHIN = 1e-6
+"""A combination is determined if no more than this share of its slope lies outside what the data see."""
+ROUNDING = 1e-9
+"""Relative errors that are smaller are rounding."""
 SAME = 1e-6
 """Parameters that differ by less, relatively, are the same solution."""
 
@@ -114,7 +125,7 @@ def output_error(
     """
     operator = operator_of(model)
     comparison = compare(operator, experiments)
-    point = starting_values(start, comparison, bounds)
+    point = starting_values(model, experiments, start)[0]
     rounds: list[NonlinearEstimate] = []
     while True:
         fit = nonlinear_least_squares(
@@ -134,7 +145,9 @@ def output_error(
             break
         point = fit.estimate.solution
         comparison = comparison.reweighted(point)
-    return _result(_joined(rounds), comparison, experiments, operator)
+    joined = _joined(rounds)
+    J = comparison.jacobian(joined.estimate.solution)
+    return _result(replace(joined, estimate=_spare(joined.estimate, J)), comparison, experiments, operator)
 
 
 def identify_outputs(
@@ -157,11 +170,19 @@ def identify_outputs(
     Residuals are relative to each amplitude: (measured − predicted)/|measured|. `influence` is of first
     order.
     """
-    starts, reasons = _linear_starts(model, experiments, bounds, start)
-    found = [output_error(model, experiments, s, bounds=bounds, loss=loss) for s in starts]
+    starts, linear, reasons = _linear_starts(model, experiments, bounds, start)
+    found, problem = [], None
+    for begin in starts:
+        try:
+            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss))
+        except ValueError as error:  # one of several starts may have no answer
+            problem = error
+    if problem is not None and not found:
+        raise problem
     lowest = min(f.fit.costs[-1] for f in found)
     slack = 1e-6 * lowest + 1e-16 * max(1.0, float(len(found[0].rows)))
-    best = _distinct([f for f in found if f.fit.costs[-1] <= lowest + slack])
+    equal = [f for f in found if f.fit.costs[-1] <= lowest + slack]
+    best = _distinct([f for f in equal if f.fit.converged] or equal)
     chosen, estimate = best[0], best[0].fit.estimate
     points = np.stack([f.fit.values for f in best])
     apart = (np.ptp(points, axis=0) > SAME * np.abs(points).max(axis=0)) & ~np.isnan(points).any(axis=0)
@@ -171,19 +192,22 @@ def identify_outputs(
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
     free_of_bounds = not chosen.fit.at_bounds and estimate.full_rank and loss == "linear"
-    return Identification(
+    identification = Identification(
         model=model,
         experiments=experiments,
         method="output-error",
-        values=values,
+        values=values if chosen.fit.converged else estimate.solution,
         covariance=covariance,
         dof=estimate.dof,
         errors_stated=estimate.errors_stated,
-        combinations=_combinations(model, estimate),
+        combinations=_combinations(model, estimate, linear) if chosen.fit.converged else (),
         solutions=tuple(dict(zip(model.parameters, map(float, point), strict=True)) for point in points),
+        starts=(dict(zip(model.parameters, estimate.solution.tolist(), strict=True)),),
         rank=estimate.rank,
         condition_number=estimate.condition_number,
-        unidentifiable=(reasons or (estimate.describe_rank(),)) if np.isnan(values).any() else (),
+        unidentifiable=_undetermined(model, experiments, estimate, linear, reasons, points)
+        if chosen.fit.converged and np.isnan(values).any()
+        else (),
         residuals=residuals,
         residual_names=model.outputs,
         residual_rms=_rms(residuals),
@@ -192,8 +216,18 @@ def identify_outputs(
         if free_of_bounds
         else None,
         left_out=chosen.left_out,
-        warnings=(*(w for w in chosen.warnings if w != estimate.describe_rank()), *_misfit(estimate)),
+        converged=chosen.fit.converged,
+        warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
+    )
+
+    def refit(others: Experiments) -> Sequence[FloatArray]:
+        from rotorid.harmonic.equation_error import linear_fit
+
+        return linear_fit(model, others).recovery.solutions
+
+    return replace(
+        identification, warnings=(*identification.warnings, *doubts(identification, estimate, bounds, refit))
     )
 
 
@@ -202,23 +236,30 @@ def _linear_starts(
     experiments: Experiments,
     bounds: Bounds | None,
     start: Mapping[str, float] | None,
-) -> tuple[list[dict[str, float]], tuple[str, ...]]:
-    """Where to begin, and the linear estimate's reasons for what is not determined."""
-    from rotorid.harmonic.equation_error import equation_error
+) -> tuple[list[dict[str, float]], LinearFit | None, tuple[str, ...]]:
+    """Where to begin, the linear estimate, and its reasons for what is not determined.
 
-    given = dict(start or {})
-    if set(given) == set(model.parameters):
-        return [given], ()
-    limits = {
-        name: (-np.inf if a is None else a, np.inf if b is None else b)
-        for name, (a, b) in (bounds or {}).items()
-    }
+    With hidden amplitudes the linear estimate is of the model without them, where that is not too long.
+    """
+    from rotorid.harmonic.equation_error import limits, linear_fit, reasons
+
+    given, hidden = dict(start or {}), hidden_outputs(model, experiments)
+    linear: LinearFit | None = None
+    words: tuple[str, ...] = ()
     try:
-        linear = equation_error(model, experiments, bounds=limits or None)
-    except ValueError:
-        return [given], ()
-    solutions = [{**s, **given} for s in (linear.starts or linear.solutions)[:MOST_STARTS]]
-    return solutions or [given], linear.unidentifiable
+        seen = without(model, hidden) if hidden else model
+        if seen is not None:
+            linear = linear_fit(seen, experiments, limits(bounds) or None)
+            words = reasons(linear, experiments)
+    except ValueError:  # more equations than outputs, no complete row
+        pass
+    if set(given) == set(model.parameters):
+        return [given], linear, words
+    ends = [] if linear is None else list(linear.recovery.solutions[:MOST_STARTS])
+    if hidden or not ends:
+        ends += starting_values(model, experiments, given)
+    solutions = [dict(zip(model.parameters, end.tolist(), strict=True)) for end in ends]
+    return [{**s, **given} for s in solutions], linear, words
 
 
 def _distinct(found: Sequence[OutputError]) -> list[OutputError]:
@@ -234,46 +275,55 @@ def _distinct(found: Sequence[OutputError]) -> list[OutputError]:
     return kept
 
 
-def _combinations(model: HarmonicModel, estimate: Estimate) -> tuple[FoundCombination, ...]:
-    """The products and sums that the data see, at the estimate, with the spread of the linearised model."""
+def _combinations(
+    model: HarmonicModel, estimate: Estimate, linear: LinearFit | None
+) -> tuple[FoundCombination, ...]:
+    """Products, sums and ratios that the data see, at the estimate, with the spread of the linearised model.
+
+    They are those of the linear estimate: exact, and not tangents at the end of the search. Without it
+    tangents are given, named so.
+    """
     theta, spread = estimate.solution, estimate.solution_covariance
-    values = model.combinations.rows @ model.monomial_values(theta)[1:]
-    slopes = model.combinations.rows @ model.monomial_jacobian(theta)[1:]
+    if linear is None:
+        tangents = [] if estimate.full_rank else estimate.combinations
+        return tuple(FoundCombination(f"(near these values) {c.words}", c.value, None) for c in tangents)
+    if linear.model is not model and estimate.full_rank:
+        return ()
+    values, slopes = linear.system.combinations(theta), linear.system.jacobian(theta)
+    rows = np.linalg.qr((estimate.row_space * np.where(theta == 0, 1.0, theta)).T)[0]
     out = []
-    for words, value, slope in zip(model.combinations.words, values, slopes, strict=True):
+    for words, value, slope in zip(linear.words, values, slopes, strict=True):
+        relative = slope * np.where(theta == 0, 1.0, theta)
+        beside = np.linalg.norm(relative - rows @ (rows.T @ relative))
         variance = np.nan if spread is None else float(slope @ spread @ slope)
-        if words not in model.parameters:
+        if words not in model.parameters and beside <= WITHIN * np.linalg.norm(relative):
             std = float(np.sqrt(max(variance, 0.0))) if np.isfinite(variance) else None
             out.append(FoundCombination(words, float(value), std))
     return tuple(out)
 
 
-def _misfit(estimate: Estimate) -> tuple[str, ...]:
-    """A warning where residuals this large are improbable (0.1 %) for the stated errors."""
-    from scipy.special import chdtrc
-
-    if estimate.chi_square is None or estimate.dof < 1:
-        return ()
-    if chdtrc(estimate.dof, estimate.chi_square) > 1e-3:
-        return ()
-    ratio = float(np.sqrt(estimate.chi_square / estimate.dof))
-    return (
-        f"residuals are {ratio:.2g} times as large as the stated errors explain: the model, a reading, or "
-        "the errors stated are wrong, or a better minimum lies elsewhere (try another start)",
-    )
+def _undetermined(
+    model: HarmonicModel,
+    experiments: Experiments,
+    estimate: Estimate,
+    linear: LinearFit | None,
+    reasons: tuple[str, ...],
+    points: FloatArray,
+) -> tuple[str, ...]:
+    """Why parameters have no one value."""
+    if linear is not None and linear.model is model and reasons:
+        return reasons
+    if estimate.full_rank:
+        return tuple(why_several(list(points), model.parameters, np.zeros(len(points[0]), dtype=bool)))
+    words = [c.words for c in _combinations(model, estimate, linear)]
+    more = what_more_can_tell(model, experiments, estimate.rank)
+    return only_determined(model.parameters, estimate.undetermined, words), more
 
 
 def _rms(residuals: ComplexArray) -> float:
     used = residuals[~np.isnan(residuals)]
     parts = np.concatenate((used.real, used.imag))
     return float(np.sqrt(np.mean(parts**2))) if len(parts) else float("nan")
-
-
-def operator_of(model: HarmonicModel) -> Operator:
-    """Compile a model for prediction; ValueError if equations and outputs differ in number."""
-    return compile_operator(
-        model.features, parameters=model.parameters, outputs=model.outputs, inputs=model.inputs
-    )
 
 
 def _moved(before: NonlinearEstimate, after: NonlinearEstimate) -> float:
@@ -297,6 +347,30 @@ def _joined(rounds: Sequence[NonlinearEstimate]) -> NonlinearEstimate:
         message=f"converged in {iterations} iterations" if last.converged else last.message,
         history=np.concatenate([rounds[0].history, *(fit.history[1:] for fit in rounds[1:])]),
         costs=np.concatenate([rounds[0].costs, *(fit.costs[1:] for fit in rounds[1:])]),
+    )
+
+
+def _spare(estimate: Estimate, jacobian: FloatArray) -> Estimate:
+    """Without the degrees of freedom of rows that no parameter moves and that hold but for rounding.
+
+    Such are the phases of a model without damping: they are met by any values, and say nothing of errors.
+    """
+    still = np.abs(jacobian * estimate.solution).max(axis=1, initial=0.0) <= ROUNDING
+    idle = int(np.count_nonzero(still & (np.abs(estimate.residuals) <= ROUNDING)))
+    dof, factor = estimate.dof - idle, 1.0
+    if not idle:
+        return estimate
+    if not estimate.errors_stated:
+        factor = estimate.dof / dof if dof > 0 else np.nan
+
+    def scaled(covariance: FloatArray | None) -> FloatArray | None:
+        return None if covariance is None or np.isnan(factor) else covariance * factor
+
+    return replace(
+        estimate,
+        dof=dof,
+        covariance=scaled(estimate.covariance),
+        solution_covariance=scaled(estimate.solution_covariance),
     )
 
 

@@ -216,6 +216,8 @@ def _curve(result: Identification) -> Curve | None:
     w = _frequencies(result)[forced]
     if not np.isfinite(values).all() or len(w) < 2 or len(model.outputs) != len(model.equations):
         return None
+    if model.varying:
+        return None
     # what is measured may lie at a peak: the line passes exactly there
     grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
     inputs: dict[str, ComplexArray] = {}
@@ -233,7 +235,7 @@ def _curve(result: Identification) -> Curve | None:
 def _modes(result: Identification) -> tuple[ComplexArray, FloatArray]:
     """Shapes (experiments, outputs) and frequencies of the identified model; NaN where it predicts none."""
     from rotorid.harmonic.comparison import compare
-    from rotorid.harmonic.output_error import operator_of
+    from rotorid.harmonic.operator import operator_of
 
     unknown = np.full((len(result.experiments), len(result.model.outputs)), np.nan, dtype=complex)
     try:

@@ -10,6 +10,7 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.harmonic.elimination import real_solutions
+from rotorid.harmonic.features import powers_product, powers_slopes
 from rotorid.regression.estimate import WORD_TOLERANCE
 
 Bounds = Mapping[str, tuple[float, float]]
@@ -22,7 +23,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Combinations `matrix @ monomials(θ) = values`.
+    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
 
     Attributes
     ----------
@@ -34,6 +35,8 @@ class System:
         (q, monomials).
     values, covariance
         (q,), and (q, q) or None.
+    below
+        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
     """
 
     names: tuple[str, ...]
@@ -41,20 +44,36 @@ class System:
     matrix: FloatArray
     values: FloatArray
     covariance: FloatArray | None
+    below: FloatArray | None = None
+
+    def combinations(self, theta: FloatArray) -> FloatArray:
+        """Values (q,) at the parameters."""
+        return np.asarray(self.matrix @ self.monomials(theta) / self._bottom(theta))
+
+    def cleared(self) -> System:
+        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
+        if self.below is None:
+            return self
+        matrix = self.matrix - self.values[:, None] * self.below
+        values = np.where(self.below.any(axis=1), 0.0, self.values)
+        return System(self.names, self.exponents, matrix, values, None)
+
+    def _bottom(self, theta: FloatArray) -> FloatArray:
+        if self.below is None:
+            return np.ones(len(self.values))
+        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
 
     def monomials(self, theta: FloatArray) -> FloatArray:
         """Values (monomials,)."""
-        return np.asarray(np.prod(theta**self.exponents, axis=1))
+        return powers_product(self.exponents, theta)
 
     def jacobian(self, theta: FloatArray) -> FloatArray:
         """Derivatives (q, n) of the combinations by the parameters."""
-        out = np.zeros_like(self.exponents)
-        for j in range(len(theta)):
-            used = np.flatnonzero(self.exponents[:, j])
-            lower = self.exponents[used].copy()
-            lower[:, j] -= 1
-            out[used, j] = self.exponents[used, j] * np.prod(theta**lower, axis=1)
-        return np.asarray(self.matrix @ out)
+        out = powers_slopes(self.exponents, theta)
+        slopes = self.matrix @ out
+        if self.below is not None:
+            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
+        return np.asarray(slopes / self._bottom(theta)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +150,7 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
     free = [j for j in range(len(names)) if j not in fixed]
     base = np.full(len(names), GAUGE)
     warnings: list[str] = []
-    candidates, searched = real_solutions(system, free, base)
+    candidates, searched = real_solutions(system.cleared(), free, base)
     found: list[tuple[float, FloatArray]] = []
     weight = _weights(system)
     for start in candidates:
@@ -190,7 +209,7 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
         return theta
 
     def misfit(t: FloatArray) -> FloatArray:
-        return np.asarray(weight @ (system.matrix @ system.monomials(t) - system.values))
+        return np.asarray(weight @ (system.combinations(t) - system.values))
 
     with np.errstate(all="ignore"):
         r = misfit(theta)
@@ -223,8 +242,9 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
 def _misfit(system: System, theta: FloatArray) -> float:
     """Largest error of a combination in units of what rounding and four standard deviations allow."""
     mu = system.monomials(theta)
-    size = np.abs(system.matrix) @ np.abs(mu) + np.abs(system.values) + 1e-300
-    error = np.abs(system.matrix @ mu - system.values) / size
+    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system._bottom(theta))
+    size += np.abs(system.values) + 1e-300
+    error = np.abs(system.combinations(theta) - system.values) / size
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
     return float(np.max(error / (1e-6 + 4 * std / size)))
 
@@ -266,3 +286,19 @@ def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: Bo
 def and_words(words: Sequence[str]) -> str:
     """Join words: "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
+    """Say which parameters and combinations are determined and which parameters are not."""
+    seen = [name for name in parameters if name not in lost]
+    seen += [w for w in words if w not in seen and any(n in _names(w) for n in lost)]
+    verb = "is" if len(seen) == 1 else "are"
+    text = f"only {and_words(seen)} {verb} determined" if seen else "nothing is determined"
+    itself = "itself is" if len(lost) == 1 else "themselves are"
+    return f"{text}; {and_words(lost)} by {itself} not"
+
+
+def _names(words: str) -> set[str]:
+    import re
+
+    return set(re.findall(r"[^\W\d]\w*", words))

@@ -78,6 +78,8 @@ class Identification:
         Shape (experiments, n): change of each parameter if the experiment is left out; NaN where unknown.
     left_out
         Rows without effect because an amplitude was not measured, in words.
+    converged
+        False: the search did not end at a minimum; `values` are where it stopped, and have no intervals.
     notes
         How the numbers came about, in words.
     warnings
@@ -103,6 +105,7 @@ class Identification:
     influence: FloatArray | None = None
     starts: tuple[Mapping[str, float], ...] = ()
     left_out: tuple[str, ...] = ()
+    converged: bool = True
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -113,8 +116,8 @@ class Identification:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the data determine one value of every parameter."""
-        return bool(np.isfinite(self.values).all())
+        """Whether the data determine one value of every parameter, and the search found it."""
+        return self.converged and bool(np.isfinite(self.values).all())
 
     @property
     def std(self) -> FloatArray | None:
@@ -157,6 +160,7 @@ class Identification:
                 }
                 for i, name in enumerate(self.parameters)
             },
+            "converged": self.converged,
             "rank": self.rank,
             "condition_number": finite(self.condition_number),
             "identifiable": self.identifiable,
@@ -207,6 +211,8 @@ class Identification:
         words = [*self.parameters, *(c.words for c in self.combinations)]
         width = max(len(w) for w in words)
         lines = [METHODS.get(self.method, self.method)]
+        if not self.converged:
+            lines.append("not converged: the values are where the search stopped, no estimates")
         lines += [self._line(i, width) for i in range(len(self.parameters))]
         for c in self.combinations:
             lines.append(f"{c.words:<{width}} = {c.value:.6g}" + ("" if c.std is None else f" ± {c.std:.2g}"))
@@ -219,7 +225,7 @@ class Identification:
             for i, solution in enumerate(self.solutions):
                 values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
                 lines.append(f"solution {i + 1}: {values}")
-        if self.covariance is None:
+        if self.covariance is None and self.converged:
             lines.append("no intervals: no errors are stated and there are no more equations than unknowns")
         lines += [f"left out: {row}" for row in self.left_out]
         lines += [f"warning: {text}" for text in self.warnings]

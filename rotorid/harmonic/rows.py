@@ -8,11 +8,14 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.features import multipliers
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.polynomial import ONE
 
 COVARIANCE_FLOOR = 1e-10
 """Smallest variance relative to the mean of an experiment: exact rows must not get infinite weight."""
+ROUNDING = 1e-13
+"""A part of a row that is smaller than this share of its terms is what rounding leaves of zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +79,7 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
     column = np.array([place.get(f.signal, len(place)) for f in features])
     equation = np.array([f.equation for f in features])
     k = np.array([f.power for f in features])
-    if (k < 0).any() and (w == 0).any():
-        raise ValueError("an equation divides by p: an experiment at the frequency 0 cannot be used")
-    # exact powers of i, so that a real row has no imaginary dust
-    powers = w[:, None].astype(float) ** k * np.array([1, 1j, -1, -1j])[k % 4]
+    powers = multipliers(k.tolist(), [f.varying for f in features], w, experiments.varying)
     warnings: list[str] = []
     if experiments.free.any() and (k % 2).any():
         powers[np.ix_(experiments.free, k % 2 == 1)] = 0
@@ -96,22 +96,32 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
     K = np.zeros((n, equations, len(pivots)), dtype=complex)
     Y = np.zeros((n, equations), dtype=complex)
     missing = np.zeros((n, equations), dtype=bool)
+    empty = np.zeros((n, equations, 2), dtype=bool)
     left_out: list[str] = []
     for e in range(equations):
         own = equation == e
         lost = np.isnan(phi[:, own])
         missing[:, e] = lost.any(axis=1)
         K[:, e], Y[:, e] = phi[:, own] @ C[own], -phi[:, own] @ constants[own]
+        sizes = ROUNDING * np.abs(phi[:, own]) @ np.abs(np.column_stack((C[own], constants[own])))
+        for part, row in enumerate((K[:, e].real, K[:, e].imag)):
+            right = (Y[:, e].real, Y[:, e].imag)[part]
+            empty[:, e, part] = (np.abs(np.column_stack((row, right))) <= sizes).all(axis=1)
         for i in np.flatnonzero(missing[:, e]):
-            names = dict.fromkeys(features[j].signal for j in np.flatnonzero(own) if np.isnan(phi[i, j]))
+            lost_here = [features[j] for j in np.flatnonzero(own) if np.isnan(phi[i, j])]
+            names = dict.fromkeys(
+                name
+                for f in lost_here
+                for name in (f.signal, *dict(f.varying))
+                if name
+                and np.isnan(amplitudes[i, place[name]] if name in place else experiments.varying[name][i])
+            )
             left_out.append(
                 f"experiment {experiments.names[i]}, equation {e + 1} ({', '.join(names)} not measured)"
             )
     K[missing], Y[missing] = 0, 0
     used = np.stack((~missing, ~missing & ~experiments.free[:, None]), axis=2)
     # rows of zeros say nothing and are no degrees of freedom (undamped models)
-    empty = np.stack((Y.real, Y.imag), axis=2) == 0
-    empty &= (np.stack((K.real, K.imag), axis=2) == 0).all(axis=3)
     used &= ~empty
     if not used.any():
         raise ValueError(
@@ -138,6 +148,21 @@ def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
     for name, values in experiments.signals.items():
         if np.isinf(np.asarray(values)).any():
             raise ValueError(f"the amplitudes {name} must be finite (or NaN: not measured)")
+
+
+def ask_about_case(model: HarmonicModel, experiments: Experiments) -> None:
+    """Raise ValueError for a signal without readings that differs by case only from another name (x2, X2)."""
+    import re
+
+    words = re.findall(r"[^\W\d]\w*", " ".join(model.equations))
+    for name in model.signals:
+        alike = [w for w in words if w != name and w.casefold() == name.casefold()]
+        values = np.nan_to_num(experiments.signals.get(name, np.zeros(1)))
+        if alike and words.count(name) == 1 and not np.any(values):
+            raise ValueError(
+                f"is {name} meant to be {alike[0]}? It stands in the equations once and has no readings; "
+                f"if it is an amplitude of its own, give it another name"
+            )
 
 
 def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u: FloatArray) -> FloatArray:

@@ -1,72 +1,147 @@
-"""Where output error begins."""
+"""Where output error begins: values with which the equations hold best, amplitudes that are hidden apart."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
-from rotorid.harmonic.comparison import Comparison
-from rotorid.regression.nonlinear import Bounds, nonlinear_least_squares
+from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.features import CONSTANT, multipliers
+from rotorid.harmonic.hidden import hidden_outputs
+from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.plausibility import passive_elements
+
+SEARCHES, AGAIN, BEST = 60, 4, 3
+"""Random starts at most; enough of them with one end; how many ends are handed on."""
+DECADES = 1.5
+"""How far from their typical size parameters begin."""
 
 
 def starting_values(
-    start: Mapping[str, float] | ArrayLike, comparison: Comparison, bounds: Bounds | None
-) -> FloatArray:
-    """Starting values; those not given make the equations hold best for the measured amplitudes.
+    model: HarmonicModel, experiments: Experiments, start: Mapping[str, float] | ArrayLike
+) -> list[FloatArray]:
+    """Starting values; those not given make the equations hold best for some hidden amplitudes.
+
+    Of each experiment's equations only what no hidden amplitude can change is looked at (variable projection,
+    Golub and Pereyra 1973). That has few local minima: the search begins at random sizes of the parameters,
+    which keep their signs, and ends where several starts have come to the same end.
 
     Parameters
     ----------
+    model, experiments
+        Equations and data.
     start
         By name, or (n,) in the model's order; NaN where there is none.
-    comparison
-        Model and data.
-    bounds
-        By name.
 
     Returns
     -------
-    Shape (n,).
+    At most `BEST` of shape (n,), the best first.
 
     Raises
     ------
     ValueError
-        For unknown names, a wrong number of values, or where no experiment has every amplitude.
+        For unknown names, a wrong number of values, or where nothing is found.
     """
-    names = comparison.operator.parameters
+    names = model.parameters
     if isinstance(start, Mapping):
         wrong = [name for name in start if name not in names]
         if wrong:
             raise ValueError(f"a start is given for {wrong[0]!r}, which is not estimated: {', '.join(names)}")
-        values = np.array([start.get(name, np.nan) for name in names], dtype=np.float64)
+        theta = np.array([start.get(name, np.nan) for name in names], dtype=np.float64)
     else:
-        values = np.array(start, dtype=np.float64)
-    if values.shape != (len(names),):
+        theta = np.array(start, dtype=np.float64)
+    if theta.shape != (len(names),):
         raise ValueError(f"{len(names)} starting values are needed, for {', '.join(names)}; got {start!r}")
-    open_ = np.flatnonzero(np.isnan(values))
+    open_ = np.flatnonzero(np.isnan(theta))
     if not len(open_):
-        return values
-    # no two alike, none 0 or 1: products of parameters have saddles there
-    values[open_] = 0.35 + 0.1 * np.arange(len(open_))
-    equations = comparison.equations()
-    if not len(equations(values)[0]):
-        missing = ", ".join(names[i] for i in open_)
-        raise ValueError(f"no experiment has every amplitude: give starting values of {missing}")
-    limits = {names[i]: bounds[names[i]] for i in open_ if bounds and names[i] in bounds}
+        return [theta]
+    projected, scale = _projected(model, experiments)
+    passive = passive_elements(model)
+    either = np.array([names[j] not in passive for j in open_])
+    rng = np.random.default_rng(0)
+    ends: list[tuple[float, FloatArray]] = []
+    for _ in range(SEARCHES):
+        size = scale[open_] * np.where(either, rng.choice((-1.0, 1.0), len(open_)), 1.0)
+        begin = rng.uniform(-DECADES, DECADES, len(open_))
+        end = _searched(projected, theta, open_, size, begin)
+        ends = sorted([*ends, *end], key=lambda one: one[0])
+        if ends and sum(cost < 1.01 * ends[0][0] + 1e-14 for cost, _ in ends) >= AGAIN:
+            break
+    if not ends:
+        missing = ", ".join(names[j] for j in open_)
+        raise ValueError(f"no start was found: give starting values of {missing}")
+    apart: list[FloatArray] = []
+    for _, point in ends:
+        if not any(np.allclose(point, other, rtol=1e-3) for other in apart):
+            apart.append(point)
+    return apart[:BEST]
 
-    def whole(part: FloatArray) -> FloatArray:
-        theta = values.copy()
-        theta[open_] = part
-        return theta
 
-    found = nonlinear_least_squares(
-        lambda part: equations(whole(part))[0],
-        lambda part: equations(whole(part))[1][:, open_],
-        values[open_],
-        names=[names[i] for i in open_],
-        sigma_stated=False,
-        bounds=limits,
-    )
-    return whole(found.estimate.solution)
+def _searched(
+    projected: Callable[[FloatArray], FloatArray],
+    theta: FloatArray,
+    open_: IntArray,
+    size: FloatArray,
+    begin: FloatArray,
+) -> list[tuple[float, FloatArray]]:
+    """Sum of squares and parameters where one search over their logarithms ends; none if they ran away."""
+    from scipy.optimize import least_squares
+
+    def whole(x: FloatArray) -> FloatArray:
+        full = theta.copy()
+        full[open_] = size * 10.0**x
+        return full
+
+    with np.errstate(all="ignore"):
+        try:
+            found = least_squares(lambda x: projected(whole(x)), begin, max_nfev=60)
+        except (ValueError, np.linalg.LinAlgError):
+            return []
+    return [(float(found.cost), whole(found.x))] if found.x.max() < 4 * DECADES else []
+
+
+def _projected(
+    model: HarmonicModel, experiments: Experiments
+) -> tuple[Callable[[FloatArray], FloatArray], FloatArray]:
+    """What the equations leave beside hidden amplitudes, over their known terms; sizes of parameters (n,).
+
+    ValueError where no experiment has all other amplitudes.
+    """
+    hidden, place = hidden_outputs(model, experiments), {s: i for i, s in enumerate(model.signals)}
+    seen = [s for s in model.signals if s not in hidden]
+    unknown = np.full(len(experiments), np.nan)
+    table = np.column_stack([*(experiments.signals.get(s, unknown) for s in seen), np.ones(len(experiments))])
+    complete = ~np.isnan(table).any(axis=1)
+    if not complete.any():
+        raise ValueError(
+            f"no experiment has every amplitude: give starting values of {', '.join(model.parameters)}"
+        )
+    data, table = experiments.take(complete), table[complete]
+    columns, lost = [*(place[s] for s in seen), len(place)], [place[s] for s in hidden]
+    sizes = dict(zip((*seen, CONSTANT), np.abs(table).T, strict=True))
+    typical = np.median([sizes[s] for s in seen if s in model.outputs])
+    known, own = np.zeros(len(table)), dict[str, list[float]]()
+    for f in model.features:
+        pk = multipliers([f.power], [f.varying], data.frequencies, data.varying)[:, 0]
+        force = np.abs(pk) * sizes.get(f.signal, typical)
+        for monomial, x in f.exact.items():
+            if not monomial:
+                known = np.maximum(known, abs(float(x)) * force)
+            elif len(monomial) == 1:
+                own.setdefault(monomial[0][0], []).append(abs(float(x)) * float(np.median(force)))
+    known[known == 0] = 1.0
+
+    def projected(theta: FloatArray) -> FloatArray:
+        A = model.matrices(theta, data.frequencies, data.varying)
+        A = np.where(data.free[:, None, None], A.real, A)  # no odd powers of p
+        v = np.einsum("nes,ns->ne", A[:, :, columns], table)
+        Q = np.linalg.qr(A[:, :, lost])[0]
+        r = (v - np.einsum("neh,nfh,nf->ne", Q, Q.conj(), v)) / known[:, None]
+        return np.concatenate((r.real.ravel(), r.imag.ravel()))
+
+    force = float(np.median(known))
+    scale = [force / np.median(own[n]) if np.any(own.get(n)) else 1.0 for n in model.parameters]
+    return projected, np.array(scale)

@@ -9,7 +9,7 @@ of the residuals and Student's t. Output error and time-domain fits share this m
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +34,8 @@ class NonlinearEstimate:
     ----------
     estimate
         Values, covariance, rank and null space at the minimum; `residuals` are those of the given function.
-        The values of combinations are of the model linearised there.
+        The values of combinations are of the model linearised there. No covariance where the search did not
+        converge.
     start
         Where the search began (inside the bounds), shape (n,).
     converged, message
@@ -91,18 +92,24 @@ class NonlinearEstimate:
                 f"{', '.join(self.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: "
                 "no standard deviation is given, and those of the others hold it fixed"
             )
-        if not self.estimate.full_rank:
+        if self.converged and not self.estimate.full_rank:
             found.append(self.estimate.describe_rank())
         return tuple(found)
 
     def summary(self) -> str:
         """Text: the estimate, parameters at bounds, convergence."""
+        if not self.converged:
+            values = [
+                f"{name} = {value:.6g}" for name, value in zip(self.names, self.history[-1], strict=True)
+            ]
+            return "\n".join(("the search ended, not converged, at", *values, self.message))
         return f"{self.estimate.summary(self.at_bounds)}\n{self.message}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the keys of the estimate and those of the search."""
         return {
             **self.estimate.to_dict(),
+            "identifiable": self.converged and self.estimate.full_rank,
             "converged": self.converged,
             "message": self.message,
             "iterations": self.iterations,
@@ -209,6 +216,8 @@ def nonlinear_least_squares(  # noqa: PLR0913
         why = "the minimum was not reached: the last step is not yet small"
     elif converged:
         why = f"converged in {len(search.path) - 1} iterations"
+    if not converged:
+        judged = replace(judged, covariance=None, solution_covariance=None)
     fixed = (x <= lower) | (x >= upper)
     return NonlinearEstimate(
         estimate=judged,

@@ -16,7 +16,7 @@ import fem
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic import Experiments, HarmonicModel, Identification, harmonic_model, identify
 from rotorid.harmonic.natural import natural_modes
-from rotorid.harmonic.output_error import operator_of
+from rotorid.harmonic.operator import operator_of
 from rotorid.harmonic.rows import build_rows
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements

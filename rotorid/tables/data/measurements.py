@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.data.repeats import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
@@ -32,7 +33,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     Its columns are `experiment` (optional), `frequency_rad_s` (or `_Hz`, or `speed_rpm`) and, for each
     amplitude NAME of the model, either `NAME_amplitude` (peak, with or without a unit) and `NAME_phase_deg`
     (positive = lead), or `NAME_re` and `NAME_im` (without `_im`: real). A blank amplitude was not measured.
-    Where inputs are absent or 0 the row is a free vibration: natural frequency and shape.
+    Where inputs are absent or 0 the row is a free vibration: natural frequency and shape. A known quantity
+    that changes from row to row has a column NAME (or NAME_rad_s, NAME_Hz, NAME_rpm, which become rad/s).
 
     With a column `repeat`, rows of one experiment (or, without names, of one frequency and excitation) are
     readings of the same: their mean counts, and their scatter, pooled over the table, says how large the
@@ -65,7 +67,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     file = model if isinstance(model, HarmonicFile) else None
     equations = model.model if isinstance(model, HarmonicFile) else model
     problems = Problems()
-    table = read_table(path, "measurements", _columns(equations.signals), problems, first=True)
+    columns = _columns(equations.signals, equations.varying)
+    table = read_table(path, "measurements", columns, problems, first=True)
     if table is None:
         problems.stop()
         raise AssertionError("no table and no problem")
@@ -74,6 +77,11 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     read = {name: _amplitude(table, name, problems, unclear=unclear) for name in equations.signals}
     if not unclear:
         _complain_about_missing(table, equations, read, problems)
+        for name in equations.varying:
+            if name not in table:
+                expected = f"a column {name}: the equations multiply amplitudes by it"
+                near = did_you_mean(name, [*equations.parameters, *equations.known])
+                problems.add(table.source, table.header_row, name, None, expected + near)
     names = _experiments(table, problems)
     problems.stop()
     signals = {name: values for name, values in read.items() if values is not None}
@@ -84,15 +92,17 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         if name not in signals:
             signals[name] = np.zeros(len(table), dtype=complex) if name in equations.inputs else nothing
     errors = None if file is None else file.errors
-    rows = Experiments(names, frequency, signals, free, errors)
+    varying = {name: table.numbers(name) for name in equations.varying}
+    rows = Experiments(names, frequency, signals, free, errors, varying=varying)
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations, problems)
         problems.stop()
     return rows
 
 
-def _columns(signals: tuple[str, ...]) -> tuple[Column, ...]:
-    own = [
+def _columns(signals: tuple[str, ...], varying: tuple[str, ...]) -> tuple[Column, ...]:
+    own = [Column(name, _row_unit, (name,), False, blank=True) for name in varying]
+    own += [
         column
         for name in signals
         for column in (
@@ -121,6 +131,18 @@ def _amplitude_unit(name: str) -> Unit:
             f"no unit (amplitudes are in the units of the model) or one such as mm, um_pp, not {name!r}"
         )
     return unit
+
+
+def _row_unit(name: str) -> Unit:
+    """No unit (the model's own; `re` says the same), or one of speed."""
+    if name in ("", "re"):
+        return Unit("", "model")
+    try:
+        return _SPEED(name)
+    except UnitError:
+        raise UnitError(
+            f"a real number in the unit of the model, or rad_s, Hz or rpm, not {name!r}"
+        ) from None
 
 
 def _frequency(table: Table, problems: Problems, *, unclear: bool) -> FloatArray:
@@ -205,7 +227,7 @@ def _complain_about_missing(
         import warnings
 
         lost = listing(absent, "and")
-        message = f"{table.source}: the table has no {lost}: equations that need it say nothing"
+        message = f"{table.source}: the table has no {lost}: eliminated from the equations, or predicted"
         warnings.warn(message, TableWarning, stacklevel=3)
     for name, values in read.items():
         if values is not None and np.isnan(values).all() and not len(problems):

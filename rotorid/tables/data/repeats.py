@@ -62,6 +62,7 @@ def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel, problem
         frequencies=np.array([rows.frequencies[m].mean() for m in members]),
         signals=signals,
         free=np.array([rows.free[m].all() for m in members]),
+        varying={name: np.array([v[m].mean() for m in members]) for name, v in rows.varying.items()},
     )
     errors = rows.errors or _scatter(table.source, rows, merged, members, model)
     if errors is None:
@@ -79,6 +80,7 @@ def _groups(table: Table, rows: Experiments, model: HarmonicModel, problems: Pro
     found: dict[tuple[object, ...], list[int]] = defaultdict(list)
     for i, name in enumerate(rows.names):
         excitation = [complex(rows.signals[s][i]) for s in model.inputs]
+        excitation += [complex(values[i]) for values in rows.varying.values()]
         key = (name,) if named else (float(rows.frequencies[i]), *map(str, excitation))
         found[key].append(i)
     labels = table.texts("repeat")
@@ -104,6 +106,9 @@ def _complain_about_changes(
         if abs(rows.frequencies[i] - rows.frequencies[head]) > 1e-9 * rows.frequencies[head]:
             expected = f"the frequency of row {table.rows[head]}, the same experiment"
             table.complain(problems, i, stem, expected)
+        for name, values in rows.varying.items():
+            if values[i] != values[head]:
+                table.complain(problems, i, name, f"the value of row {table.rows[head]}, the same experiment")
         for name in model.inputs:
             a, b = rows.signals[name][head], rows.signals[name][i]
             column = next((f"{name}_{p}" for p in ("amplitude", "re") if f"{name}_{p}" in table), None)

@@ -54,8 +54,10 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """Read a model file (`harmonic.toml`).
 
     Its keys are `equations` (texts with p = d/dt), `estimate` (names), `known` (name = number), optional
-    `inputs` (names of the exciting amplitudes), `[bounds]` (name = [lowest, highest]), `[start]` (name =
-    guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
+    `inputs` (names of the exciting amplitudes), `varying` (names of known quantities that change from row to
+    row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest,
+    highest]), `[start]` (name = guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one
+    standard deviation of a reading).
 
     Instead of equations there may be a linear model in time as `read_ode_model` reads it, such as the one
     that `rotorid reduce --model` writes: `M`, `C`, `K` (then (M p² + C p + K) X = F with amplitudes named
@@ -101,6 +103,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     equations = _equations(section)
     estimate = _names(section, "estimate", 'such as estimate = ["c", "b"]', required=True)
     inputs = _names(section, "inputs", 'such as inputs = ["F"]', required=False)
+    varying = _names(section, "varying", 'such as varying = ["Omega"]', required=False)
     known = _numbers(section, "known")
     for name in estimate or ():
         if name in known:
@@ -118,7 +121,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         from rotorid.harmonic.model import harmonic_model
 
         try:
-            model = harmonic_model(equations, known=known, estimate=estimate, inputs=inputs)
+            model = harmonic_model(
+                equations, known=known, estimate=estimate, inputs=inputs, varying=varying or ()
+            )
         except ValueError as error:
             section.complain("equations", f"a usable model: {error}", value=False)
     problems.stop()
@@ -135,6 +140,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
 
     form = read_time_form(section, problems, initial=False)
     problems.stop()
+    from rotorid.harmonic.hidden import without
     from rotorid.harmonic.model import harmonic_model
 
     model = None
@@ -144,6 +150,10 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         model = harmonic_model(
             operators.equations, known=form.known, estimate=list(start), inputs=operators.inputs
         )
+        own = operators.unseen
+        parametric = {f.equation for f in model.features if f.signal in own and set(f.exact) != {()}}
+        plain = {name: i for name, i in own.items() if i not in parametric}
+        model = (without(model, plain, plain) if plain else None) or model
         if model.has_constant_terms:
             raise ValueError(
                 "a load or output without any amplitude stands in it: a constant one has no influence on "

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rotorid import expressions
 from rotorid.tables.models.matrix_form import Matrices
-from rotorid.tables.models.operator_elimination import eliminated
 
 if TYPE_CHECKING:
     from rotorid.tables.models.ode_file import TimeForm
@@ -37,12 +36,15 @@ class OperatorForm:
         Names of the exciting amplitudes.
     left_out
         Parameters of initial values alone: amplitudes of steady vibration do not depend on them.
+    unseen
+        Amplitudes that the outputs do not show, each with the number of the equation that goes with it.
     """
 
     equations: tuple[str, ...]
     estimate: Mapping[str, float]
     inputs: tuple[str, ...]
     left_out: tuple[str, ...]
+    unseen: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,7 @@ def operator_form(form: TimeForm) -> OperatorForm:
     velocity, is written as p times that one and needs not be measured.
 
     An output that is a number times a state (or its rate) takes that amplitude's place; any other linear
-    output adds an equation. Where there are `[outputs]`, the states that they do not show are eliminated if
-    no parameter stands at them (supports without mass); otherwise they stay amplitudes, not measured.
+    output adds an equation.
 
     Parameters
     ----------
@@ -104,7 +105,6 @@ def operator_form(form: TimeForm) -> OperatorForm:
     equations = [f"{put(left, names)} = {put(right, names)}" for left, right in rows]
     equations += [f"{output} = {put(text, names)}" for output, text in more.items()]
     unseen = {x: i for i, x in enumerate(owners) if form.outputs and x not in renamed}
-    equations = list(eliminated(equations, unseen, form.known, list(form.estimate)))
     used = {name for text in equations for name in _words(text)}
     at_start = {name for text in form.initial.values() if isinstance(text, str) for name in _words(text)}
     left_out = tuple(name for name in form.estimate if name not in used and name in at_start)
@@ -113,6 +113,7 @@ def operator_form(form: TimeForm) -> OperatorForm:
         {name: value for name, value in form.estimate.items() if name not in left_out},
         tuple(name for name in inputs if name in used),
         left_out,
+        unseen,
     )
 
 

@@ -252,11 +252,12 @@ def test_one_experiment_cannot_tell_stiffness_from_mass():
     assert combination.value == pytest.approx(10.0 - 0.0025 * 1000.0, rel=0.01)
 
 
-def test_equations_without_a_known_term_determine_nothing():
+def test_equations_without_a_known_term_determine_ratios():
     model = harmonic_model(["(m*p**2 + c)*X = k*F"], estimate=["m", "c", "k"])
     found = identify(model, experiments(model, [1, 2, 3], {"F": 1.0, "X": [1.0, 0.5, 0.1]}, free=False))
     assert not found.identifiable
-    assert found.rank == 0
+    assert found.rank == 2
+    assert [c.words for c in found.combinations] == ["c/m", "k/m"]
     assert "every multiple of m, c and k fits" in found.unidentifiable[1]
     assert found.to_dict()["parameters"]["m"]["value"] is None
 
@@ -270,7 +271,8 @@ def test_unknowns_of_an_equation_without_a_known_term_are_not_zero_but_undetermi
     found = identify(model, data)
     np.testing.assert_allclose(found.values[:2], [1.0, 20.0], rtol=1e-9)
     assert np.isnan(found.values[2:]).all()
-    assert found.rank == 2
+    assert found.rank == 4
+    assert {c.words: round(c.value, 1) for c in found.combinations} == {"K/T": 4.0, "k/T": 6.0}
     assert "every multiple of T, K and k fits" in found.unidentifiable[1]
 
 

@@ -12,7 +12,8 @@ from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.model import harmonic_model
-from rotorid.harmonic.output_error import operator_of, output_error
+from rotorid.harmonic.operator import operator_of
+from rotorid.harmonic.output_error import output_error
 
 EVERYTHING = ("c1", "c", "c2", "a1", "a", "a2")
 

@@ -228,7 +228,7 @@ def test_the_smallest_model_file(model_file):
         ("X = F", "X == F", ["key equations", "equation 1", "character"]),
         ("X = F", "X", ["needs one ="]),
         ("p**2", "p^2", ["written **"]),
-        ('["(m', '["X = 1", "(n', ["key equations", "m"]),
+        ('["(m', '["n = 1", "(n', ["key equations", "n"]),
         ("X = F", "X*X = F", ["equation 1", "linear"]),
         ('["c", "b"]', '["c", "k"]', ["k", "stands in no equation"]),
         ('["c", "b"]', '"c"', ["key estimate", "a list of names"]),

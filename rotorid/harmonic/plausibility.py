@@ -1,0 +1,205 @@
+"""Whether an identified model can be right: what it leaves of the readings, signs of passive elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.harmonic.comparison import compare
+from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.features import multipliers
+from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.operator import operator_of
+from rotorid.harmonic.result import Identification
+from rotorid.regression.estimate import Estimate
+
+LARGE = 0.12
+"""Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
+EXPLAINS = 0.2
+"""Another reading of the data is named where it leaves less than this share of what is left without it."""
+KINDS = ("spring", "damper", "mass")
+Bounds = Mapping[str, tuple[float | None, float | None]]
+Refit = Callable[[Experiments], Sequence[FloatArray]]
+UNITS = {"Hz": 2 * np.pi, "rpm": np.pi / 30}
+
+
+def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, refit: Refit) -> tuple[str, ...]:
+    """What speaks against a result, in words.
+
+    Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise: what the model
+    leaves of the readings, if it is much. Units and phases that would explain it, found
+    by `refit`, a linear estimate from other experiments. Passive elements with a negative value are named,
+    unless bounds say that it may be so.
+    """
+    words = [*misfit(estimate)] if found.converged else []
+    left = None
+    if found.starts:
+        left = left_over(found.model, found.experiments, np.array(list(found.starts[0].values())))
+    if found.converged and not estimate.errors_stated and left is not None and left > LARGE:
+        advice = ", or readings are noisy: try output error" if found.method == "equation-error" else ""
+        words.append(
+            f"the model leaves {100 * left:.0f} % of the readings: "
+            f"the model, a reading or a unit is wrong{advice}"
+        )
+    if left is not None and (words or not found.converged):
+        words += _other_reading(found, left, refit)
+    return (*words, *(_negative(found, bounds) if found.converged else ()))
+
+
+def misfit(estimate: Estimate) -> tuple[str, ...]:
+    """A warning where residuals this large are improbable (0.1 %) for the stated errors."""
+    from scipy.special import chdtrc
+
+    if estimate.chi_square is None or estimate.dof < 1:
+        return ()
+    if chdtrc(estimate.dof, estimate.chi_square) > 1e-3:
+        return ()
+    ratio = float(np.sqrt(estimate.chi_square / estimate.dof))
+    return (
+        f"residuals are {ratio:.2g} times as large as the stated errors explain: the model, a reading, or "
+        "the errors stated are wrong, or a better minimum lies elsewhere (try another start)",
+    )
+
+
+def left_over(model: HarmonicModel, experiments: Experiments, theta: FloatArray) -> float | None:
+    """Root mean square of what the model leaves of each output's readings and of natural frequencies.
+
+    Relative to the root mean square of the readings; None where the model predicts none.
+    """
+    try:
+        comparison = compare(operator_of(model), experiments)
+        predicted, natural = comparison.predict(theta)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    gap = np.abs(predicted - comparison.measured) ** 2
+    size = np.where(np.isnan(gap), 0.0, np.abs(comparison.measured) ** 2).sum(axis=0)
+    shares = (np.nansum(gap, axis=0)[size > 0] / size[size > 0]).tolist()
+    if len(comparison.free):
+        w = experiments.frequencies[comparison.free]
+        # a mode that the model does not have is left whole
+        shares.append(float(np.mean(np.nan_to_num(natural[comparison.free] / w - 1, nan=1.0) ** 2)))
+    return float(np.sqrt(np.mean(shares))) if shares else None
+
+
+def _other_reading(found: Identification, left: float, refit: Refit) -> list[str]:
+    """Units of the frequency and a sign of the phase with which the model fits much better."""
+    data = replace(found.experiments, errors=None, covariances={})
+    w = data.frequencies
+    turned = {name: np.conj(z) for name, z in data.signals.items()}
+    others = {"phases of the other sign": replace(data, signals=turned)}
+    for unit, factor in UNITS.items():
+        others[f"frequencies in {unit}, not rad/s,"] = replace(data, frequencies=w * factor)
+        others[f"frequencies in rad/s, not {unit},"] = replace(data, frequencies=w / factor)
+    words = []
+    for what, other in others.items():
+        try:
+            solutions = refit(other)
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        rest = left_over(found.model, other, solutions[0]) if solutions else None
+        if rest is not None and rest < min(EXPLAINS * left, LARGE):
+            words.append(
+                f"with {what} the model leaves {100 * rest:.2g} % of the readings, not {100 * left:.0f} %"
+            )
+    return words
+
+
+def _negative(found: Identification, bounds: Bounds | None) -> list[str]:
+    """Masses, dampers and springs whose value is negative beyond its interval."""
+    interval, kinds = found.ci95, passive_elements(found.model)
+    pk = multipliers([0, 1, 2], [()] * 3, np.array([found.experiments.frequencies.max()]))
+    force = max((abs(found.value(n) * pk[0, k]) for n, k in kinds.items()), default=0.0)
+    named: list[tuple[str, int]] = []
+    for name, kind in kinds.items():
+        i, (low, _) = found.parameters.index(name), (bounds or {}).get(name, (0.0, None))
+        high = found.values[i] if interval is None or np.isnan(interval[i, 1]) else interval[i, 1]
+        rounding = abs(found.values[i] * pk[0, kind]) <= 1e-9 * force
+        if high < 0 and not rounding and low is not None and low >= 0:
+            named.append((name, kind))
+    if not named:
+        return []
+    known = [kind for name, kind in kinds.items() if np.isfinite(found.value(name))]
+    if len(named) == len(known) and len({k for _, k in named}) > 1:
+        why = "does a force or a reading have the other sign?"
+    elif all(kind == 1 for _, kind in named) and len(named) == known.count(1):
+        why = "are the phases counted the other way (lag, not lead)?"
+    else:
+        why = "a sign, a unit or the model may be wrong"
+    listed = ", ".join(f"{name} = {found.value(name):.6g}" for name, _ in named)
+    words = " or ".join(dict.fromkeys(KINDS[kind] for _, kind in named))
+    verb = "is" if len(named) == 1 else "are"
+    return [f"{listed} {verb} negative, which no passive {words} is: {why}"]
+
+
+def passive_elements(model: HarmonicModel) -> dict[str, int]:
+    """Parameters that stand as a mass (2), damper (1) or spring (0): the power of p.
+
+    Such a one multiplies one power of p and a symmetric matrix of the outputs that is positive semidefinite,
+    where the equations are turned so that masses that are known or estimated stand positive.
+    """
+    e = len(model.equations)
+    if len(model.outputs) != e:
+        return {}
+    operator = operator_of(model)
+    equation, signal, power = operator.equation, operator.signal, operator.power
+    own = (signal == equation) & (power >= 0) & (power <= 2)
+    diagonal = np.zeros((e, 3))
+    np.add.at(diagonal, (equation[own], power[own]), model.coefficients.sum(axis=1)[own])
+    sign = np.array([next((np.sign(x) for x in row[::-1] if x), 1.0) for row in diagonal])
+    found = {}
+    for j, name in enumerate(model.parameters):
+        (monomials,) = np.nonzero(model.exponents[:, j])
+        if len(monomials) != 1 or model.exponents[monomials[0], j] != 1:
+            continue
+        alone = model.coefficients[:, monomials[0]]
+        used = np.flatnonzero(alone)
+        kinds = {int(k) for k in power[used]}
+        if np.abs(model.exponents[monomials[0]]).sum() != 1 or len(kinds) != 1 or not kinds <= {0, 1, 2}:
+            continue
+        S = np.zeros((e, e))
+        for f in used[signal[used] < e]:
+            S[equation[f], signal[f]] = sign[equation[f]] * alone[f]
+        passive = S.any() and (S == S.T).all() and np.linalg.eigvalsh(S)[0] >= -1e-9 * np.abs(S).max()
+        if passive and not any(model.features[f].varying for f in used):
+            found[name] = kinds.pop()
+    return found
+
+
+def what_more_can_tell(model: HarmonicModel, experiments: Experiments, now: int) -> str:
+    """Whether experiments of the same kind could determine more than `now` combinations of the parameters.
+
+    The rank of the derivatives of all predicted amplitudes (or modes) at many frequencies, at general values.
+    """
+    rng = np.random.default_rng(3)
+    n, most = len(model.parameters), 0
+    kinds = np.tile(np.arange(len(experiments)), 1 + 8 * n // len(experiments))
+    for scale in (1.0, 1.0, 1e-2, 1e2):
+        theta = rng.uniform(0.6, 1.7, n)
+        many = experiments.take(kinds)
+        w = scale * 10 ** rng.uniform(-1, 1, len(kinds))
+        varying = {name: v * rng.uniform(0.5, 1.5, len(v)) for name, v in many.varying.items()}
+        signals = {
+            name: z * rng.uniform(0.5, 1.5, len(z))
+            if name in model.inputs
+            else np.where(np.isnan(z), z, rng.standard_normal(len(z)))
+            for name, z in many.signals.items()
+        }
+        try:
+            plan = replace(many, frequencies=w, signals=signals, varying=varying, errors=None, covariances={})
+            comparison = compare(operator_of(model), plan)
+            exact = comparison.predict(theta)[0]
+            both = {name: exact[:, j] for j, name in enumerate(model.outputs) if name in signals}
+            seen = {name: np.where(np.isnan(signals[name]), np.nan, z) for name, z in both.items()}
+            J = compare(operator_of(model), replace(plan, signals={**signals, **seen})).jacobian(theta)
+        except (ValueError, np.linalg.LinAlgError):
+            continue
+        J = J[np.isfinite(J).all(axis=1)] * theta
+        size = np.linalg.norm(J, axis=0)
+        s = np.linalg.svd(J / np.where(size > 0, size, 1.0), compute_uv=False)
+        most = max(most, int(np.count_nonzero(s > 1e-9 * s.max(initial=0.0))))
+    if 0 < most <= now:
+        return "no experiment of this kind tells more: make a parameter known, or excite or measure elsewhere"
+    return "more experiments, at other frequencies, may determine the rest"
