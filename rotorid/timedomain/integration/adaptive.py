@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.timedomain.integration import compiled_steps
 from rotorid.timedomain.integration.system import Augmented
 from rotorid.timedomain.models.errors import LARGEST, SimulationError, diverged
 
@@ -53,6 +54,12 @@ def integrate(
     if atol is not None and not atol > 0:
         raise ValueError(f"atol must be above 0, not {atol:g}")
     z0, n = system.pack(x0, s0), len(system.t)
+    if method in ("auto", "dop853") and atol is None and n > 1:
+        with np.errstate(all="ignore"):
+            longest = longest_step(system.t) if system.model.timed else np.inf
+            quick = compiled_steps.integrate(system, z0, _first_scale(system, z0), rtol, longest)
+        if quick is not None:
+            return *system.unpack(quick), "dop853"
     if method == "auto":
         try:
             return *_solve(system, z0, "dop853", rtol, atol, max(TRIAL_STEPS, 4 * n)), "dop853"

@@ -12,7 +12,7 @@ from rotorid.timedomain.integration import adaptive, propagation
 from rotorid.timedomain.integration.system import Augmented
 from rotorid.timedomain.models.errors import SimulationError, check_finite
 from rotorid.timedomain.models.model import OdeModel
-from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.record import Record, from_t0
 
 METHODS = ("auto", "expm", "dop853", "lsoda", "heun", "rk4")
 
@@ -92,6 +92,10 @@ def simulate(
         raise ValueError(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
+    longer = record if x0 is not None else from_t0(model, record)
+    if longer is not record:
+        run = simulate(model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities)
+        return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
     used: str = method
     t = record.t

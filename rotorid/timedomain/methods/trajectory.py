@@ -15,6 +15,8 @@ from rotorid.timedomain.models.record import Record
 
 Curve = Callable[[FloatArray], FloatArray]
 """States (*B, n_x) at times (*B,)."""
+FINER = 4
+"""Points of the model's own solution between two samples."""
 
 
 def given_trajectory(model: OdeModel, given: Mapping[str, str | float | ArrayLike], record: Record) -> Curve:
@@ -57,7 +59,7 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
 
 
 def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
-    """The model's own solution over one of the records; of "heun" at the samples, straight between them.
+    """The model's own solution over one of the records, smooth between its samples; of "heun" straight.
 
     Raises
     ------
@@ -69,24 +71,18 @@ def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
     if problem.integrator == "heun" or len(t) == 1 or not model.states:
         x = simulate(model, theta, record, method=problem.integrator, sensitivities=False).x
         return _straight(t, x)
-    from scipy.integrate import solve_ivp
+    from scipy.interpolate import CubicHermiteSpline
 
-    u = inputs_of(model, record)
-    x0 = model.x0(theta)
-
-    def rate(time: float, x: FloatArray) -> FloatArray:
-        return model.rate(time, x, theta, np.array([np.interp(time, t, column) for column in u.T]))
-
-    with np.errstate(all="ignore"):
-        run = solve_ivp(
-            rate, (t[0], t[-1]), x0, "DOP853", dense_output=True, rtol=problem.rtol, atol=problem.rtol
-        )
-    if not run.success or not np.isfinite(run.y).all():
-        raise SimulationError(
-            f"the states diverge at t = {run.t[-1]:g} with the starting values; start from measured data or "
-            "from a trajectory"
-        )
-    return lambda at: np.asarray(np.moveaxis(run.sol(at), 0, -1))
+    fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
+    inputs = {name: np.interp(fine, t, column) for name, column in record.inputs.items()}
+    longer = Record(fine, {}, inputs, None, record.name)
+    x = simulate(
+        model, theta, longer, method=problem.integrator, rtol=problem.rtol, sensitivities=False
+    ).x
+    slopes = model.f(fine, x, theta, inputs_of(model, longer))
+    if not np.isfinite(slopes).all():
+        return _straight(fine, x)
+    return CubicHermiteSpline(fine, x, slopes)  # type: ignore[no-any-return]
 
 
 def _straight(t: FloatArray, x: FloatArray) -> Curve:
