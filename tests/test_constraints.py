@@ -21,7 +21,9 @@ PYTHONS = [
 
 def promised(groups):
     """What the project, its build and these groups ask for."""
+    extras = PROJECT["project"]["optional-dependencies"]
     texts = [*PROJECT["project"]["dependencies"], *PROJECT["build-system"]["requires"]]
+    texts += [text for extra in extras.values() for text in extra]
     texts += [text for group in groups for text in GROUPS[group] if isinstance(text, str)]
     return [Requirement(text) for text in texts]
 

@@ -1,4 +1,4 @@
-"""What residuals point at: offset, drift and hum of the sensors, and initial values that are not those of the record.
+"""What residuals point at: offset, drift and hum of the sensors, and wrong initial values.
 
 Each of them is a column beside the sensitivities to the parameters. It is named where it takes more of the
 residuals than chance would let it, counting neighbouring residuals that are still correlated without it.
@@ -32,7 +32,7 @@ AS_GOOD = 0.9
 
 @dataclass(frozen=True, eq=False)
 class _Cause:
-    """Columns (m, q), what to do, where {0} is the size of the first one, and whether only noise may be left."""
+    """Columns (m, q), what to do ({0}: size of the first), and whether only noise may be left."""
 
     columns: FloatArray
     words: str
@@ -132,7 +132,7 @@ def _of_sensors(problem: Problem, r: FloatArray) -> Iterator[_Cause]:
 
 
 def _strongest_line(t: FloatArray, r: FloatArray) -> tuple[float, float]:
-    """Share of a sinusoid in the residuals' squares, and its frequency in Hz; that of the mains where it may be."""
+    """Share of a sinusoid in the residuals' squares, and its frequency, Hz; of the mains where it may be."""
     n = len(t)
     if n < 20 or not r.any():
         return 0.0, 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,11 +33,12 @@ SECONDS = 60.0
 """Of a search, by default."""
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
-Searching = Callable[[FloatArray], Path]
+Searching = Callable[[Problem, FloatArray], Path]
 Trajectories = str | Mapping[str, str | float | ArrayLike]
 
 
-def fit(  # noqa: C901, PLR0913
+@np.errstate(all="ignore")  # what is not finite is looked for
+def fit(  # noqa: PLR0913
     model: OdeModel,
     records: Record | Sequence[Record],
     *,
@@ -138,36 +140,15 @@ def fit(  # noqa: C901, PLR0913
     begin = inside(begin, limits[:, 0], limits[:, 1])
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
-    def search(theta: FloatArray) -> Path:
-        problem.best = None
-        try:
-            return one_search(theta)
-        except OutOfTime:
-            return _so_far(problem, theta)
-
-    def one_search(theta: FloatArray) -> Path:
-        if method == "gauss-newton":
-            return gauss_newton(problem, theta, max_iterations=max_iterations, tolerance=tolerance)
-        if method == "quasilinearization":
-            curves = _curves(problem, theta, kind)
-            return quasilinearization(
-                problem, theta, curves, max_iterations=max_iterations, tolerance=tolerance
-            )
-        first = theta
-        if method == "multiple-shooting":
-            curves = _curves(problem, theta, kind)
-            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=pieces)
-        path = _levenberg_marquardt(problem, first, limits, loss, max_iterations)
-        return path if first is theta else path.after(theta[None])
-
-    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), names, problem)
+    search = _Search(method, limits, loss, kind, pieces, max_iterations, tolerance)
+    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
     for _ in range(WEIGHINGS if weigh and path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, len(names))
         if errors is None or settled(errors, problem.errors):
             break
         left = problem.limit - time.monotonic()
         problem = Problem(model, several, integrator, rtol, errors, left)
-        path = search(path.estimate.solution).after(path.history)
+        path = search(problem, path.estimate.solution).after(path.history)
     problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
@@ -200,8 +181,42 @@ def fit(  # noqa: C901, PLR0913
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One search by one of the methods, within the problem's limit of time."""
+
+    method: str
+    limits: FloatArray
+    loss: str
+    trajectory: Trajectories
+    pieces: int | None
+    max_iterations: int
+    tolerance: float
+
+    def __call__(self, problem: Problem, theta: FloatArray) -> Path:
+        problem.best = None
+        try:
+            return self.whole(problem, theta)
+        except OutOfTime:
+            return _so_far(problem, theta)
+
+    def whole(self, problem: Problem, theta: FloatArray) -> Path:
+        steps, tolerance, limits = self.max_iterations, self.tolerance, self.limits
+        if self.method == "gauss-newton":
+            return gauss_newton(problem, theta, max_iterations=steps, tolerance=tolerance)
+        if self.method == "quasilinearization":
+            curves = _curves(problem, theta, self.trajectory)
+            return quasilinearization(problem, theta, curves, max_iterations=steps, tolerance=tolerance)
+        first = theta
+        if self.method == "multiple-shooting":
+            curves = _curves(problem, theta, self.trajectory)
+            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=self.pieces)
+        path = _levenberg_marquardt(problem, first, limits, self.loss, steps)
+        return path if first is theta else path.after(theta[None])
+
+
 def search_all(
-    search: Searching, begins: Sequence[FloatArray], names: tuple[str, ...], problem: Problem
+    search: Searching, begins: Sequence[FloatArray], problem: Problem
 ) -> tuple[Path, tuple[Minimum, ...]]:
     """The best of several searches, and all minima; a start from which the states diverge is left out."""
     paths: list[Path] = []
@@ -210,7 +225,7 @@ def search_all(
         if paths and problem.late:
             break
         try:
-            paths.append(search(begin))
+            paths.append(search(problem, begin))
         except SimulationError as error:
             failure = failure or error
     if not paths:
@@ -218,7 +233,7 @@ def search_all(
         raise failure
     # one that did not converge is no minimum; where it describes the record better, it is given, and said
     best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
-    return best, merge([p for p in paths if p.converged], names) if len(begins) > 1 else ()
+    return best, merge([p for p in paths if p.converged], problem.model.parameters) if len(begins) > 1 else ()
 
 
 def _so_far(problem: Problem, start: FloatArray) -> Path:
@@ -230,8 +245,8 @@ def _so_far(problem: Problem, start: FloatArray) -> Path:
     sigma = 1.0 if problem.stated else None
     found = least_squares(J, -r, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
     words = (
-        f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start nearer "
-        "or take another method"
+        f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start "
+        "nearer or take another method"
     )
     costs = np.array([np.nan, half_square(r)])
     return Path(at(found, theta, r), np.stack([start, theta]), costs, False, words)

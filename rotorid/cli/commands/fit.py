@@ -92,7 +92,9 @@ RtolOption = Annotated[
 ]
 SecondsOption = Annotated[
     float,
-    typer.Option(metavar="S", min=0.01, help="Limit of the search; what it has found by then has no intervals."),
+    typer.Option(
+        metavar="S", min=0.01, help="Limit of the search; what it has found by then has no intervals."
+    ),
 ]
 MissingOption = Annotated[
     bool, typer.Option("--allow-missing", help="Blank cells, NaN and absent outputs were not measured.")

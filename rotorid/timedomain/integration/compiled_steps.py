@@ -1,8 +1,8 @@
-"""The integration of a model with its sensitivities as machine code, where the extra `rotorid[fast]` is installed.
+"""The integration of a model with its sensitivities as machine code, with the extra `rotorid[fast]`.
 
-The method of Dormand and Prince of order 8(5,3) with the tolerances of `adaptive`, one step or more from sample to
-sample. `rotorid.timedomain.integration.translation` compiles `advance` and `tolerances` below, which are also
-plain Python, and the rates of the model.
+The method of Dormand and Prince of order 8(5,3) with the tolerances of `adaptive`, one step or more from
+sample to sample. `translation` compiles `advance` and `tolerances` below, which are also plain Python, and
+the rates of the model.
 """
 
 from __future__ import annotations
@@ -180,8 +180,10 @@ def advance(  # noqa: C901, PLR0913, PLR0915  one function for the compiler
     return bad
 
 
-def integrate(system: Augmented, z0: FloatArray, scale: FloatArray, rtol: float, longest: float) -> FloatArray | None:
-    """States and sensitivities (n, size); None without the extra, or where the ordinary way has to say why not."""
+def integrate(
+    system: Augmented, z0: FloatArray, scale: FloatArray, rtol: float, longest: float
+) -> FloatArray | None:
+    """States and sensitivities (n, size); None without the extra, or where the ordinary way must say why."""
     run = _machine(system)
     if run is None:
         return None
@@ -201,9 +203,10 @@ def integrate(system: Augmented, z0: FloatArray, scale: FloatArray, rtol: float,
         "tableau": _tableau(),
     }
     p = {name: array.ctypes.data for name, array in arrays.items()}
+    inputs, budget = system.u.shape[1], BUDGET + 10 * len(t)
     failed = run(
-        p["t"], len(t), p["z"], system.nx, system.np, p["q"], p["u"], system.u.shape[1], p["table"],
-        p["scale"], p["per"], p["work"], p["tableau"], rtol, min(longest, 1e300), LARGEST, BUDGET + 10 * len(t),
+        p["t"], len(t), p["z"], system.nx, system.np, p["q"], p["u"], inputs, p["table"], p["scale"],
+        p["per"], p["work"], p["tableau"], rtol, min(longest, 1e300), LARGEST, budget,
     )  # fmt: skip
     return None if failed or not np.isfinite(table).all() else table
 
@@ -230,7 +233,9 @@ def _machine(system: Augmented) -> Callable[..., int] | None:
         written = model.source()
         if written is not None:
             try:
-                store["machine"] = Machine("\n".join([written, *map(inspect.getsource, (tolerances, advance))]))
+                store["machine"] = Machine(
+                    "\n".join([written, *map(inspect.getsource, (tolerances, advance))])
+                )
             except (ImportError, OSError, AttributeError):
                 return None
             a, i, f = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double

@@ -94,7 +94,9 @@ def simulate(
         )
     longer = record if x0 is not None else from_t0(model, record)
     if longer is not record:
-        run = simulate(model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities)
+        run = simulate(
+            model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities
+        )
         return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
     used: str = method

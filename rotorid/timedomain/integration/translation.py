@@ -1,7 +1,7 @@
 """A small part of Python as machine code, by llvmlite: numbers, arrays, loops and conditions.
 
-Functions have annotated arguments (`float`, `int`, `Array`: of floats, one dimension) and return an `int`. What
-they hold is what the integration needs: assignments, `for … in range(…)`, `while`, `if`, arithmetic,
+Functions have annotated arguments (`float`, `int`, `Array`: of floats, one dimension) and return an `int`.
+What they hold is what the integration needs: assignments, `for … in range(…)`, `while`, `if`, arithmetic,
 comparisons, functions of mathematics, calls of each other, and `shifted(array, i)`, the array from i on.
 """
 
@@ -56,8 +56,7 @@ class Machine:
 
     def function(self, name: str, arguments: Sequence[type]) -> Callable[..., int]:
         """A compiled function, to be called with ctypes' types."""
-        made = ctypes.CFUNCTYPE(ctypes.c_int64, *arguments)(self._engine.get_function_address(name))
-        return made  # type: ignore[no-any-return, unused-ignore]
+        return ctypes.CFUNCTYPE(ctypes.c_int64, *arguments)(self._engine.get_function_address(name))  # type: ignore[no-any-return, unused-ignore]
 
 
 class _Function:
@@ -221,7 +220,9 @@ class _Function:
             up, down = (self.b.fcmp_ordered(sign, values[0], zero) for sign in (">", "<"))
             return self.b.fsub(self.b.select(up, one, zero), self.b.select(down, one, zero))
         if name in ("sqrt", "abs", "RealAbs"):
-            inside = self.module.declare_intrinsic(f"llvm.{'sqrt' if name == 'sqrt' else 'fabs'}", [self.real])
+            inside = self.module.declare_intrinsic(
+                f"llvm.{'sqrt' if name == 'sqrt' else 'fabs'}", [self.real]
+            )
             return self.b.call(inside, [self.floating(values[0])])
         if name in UNARY:
             return self.external(name, [self.floating(value) for value in values])

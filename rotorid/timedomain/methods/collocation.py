@@ -1,4 +1,4 @@
-"""Linear differential equations dW/dt = A(t) W + B(t) by Chebyshev collocation between the samples of a record.
+"""Linear differential equations dW/dt = A(t) W + B(t) by Chebyshev collocation between samples.
 
 All intervals are solved at once, and then joined. They are halved until the last coefficients of their
 polynomials are negligible. Source: Trefethen, "Spectral Methods in MATLAB" (2000).
@@ -7,6 +7,7 @@ polynomials are negligible. Source: Trefethen, "Spectral Methods in MATLAB" (200
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -60,9 +61,9 @@ def solve_linear(equations: Equations, t: FloatArray, first: FloatArray) -> tupl
             )
         if resolved:
             samples = np.concatenate([table[:: 2**halving, 0], table[-1:, -1]])
-            return samples, lambda at: _between(at, edges, nodes, table)
+            return samples, partial(_between, edges=edges, nodes=nodes, table=table)
     raise SimulationError(
-        "the linearised equations vary too fast between the samples; use levenberg-marquardt or give more of them"
+        "the linearised equations vary too fast between the samples; use levenberg-marquardt, or give more"
     )
 
 

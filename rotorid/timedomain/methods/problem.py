@@ -14,6 +14,8 @@ from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record, from_t0
 from rotorid.timedomain.models.several import models_of
 
+LARGEST = 1e140
+"""Residuals and sensitivities beyond this size have no sum of squares."""
 RTOL = 1e-10
 """Of the integration during a fit."""
 
@@ -81,6 +83,11 @@ class Problem:
         self.weights = [1.0 / sigma for _, sigma, _ in tables]
         if self.rows == 0:
             raise ValueError("the records have no samples of an output beside those that known values fix")
+        if np.abs(self.data).max() > LARGEST or 0 < np.abs(self.data).max() < 1 / LARGEST:
+            raise ValueError(
+                f"the records reach {np.abs(self.data).max():.3g} (over the standard deviations, where these "
+                "are stated): no sum of squares can be made of such numbers; take other units"
+            )
         self._last: tuple[bytes, FloatArray, FloatArray] | None = None
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
@@ -149,17 +156,20 @@ class Problem:
         if self._last is None or self._last[0] != key:
             if self.best is not None and self.late:
                 raise OutOfTime
+            if not np.isfinite(theta).all():
+                raise SimulationError("the parameters grow beyond all bounds")
             runs = [
                 simulate(model, theta, record, method=self.integrator, rtol=self.rtol)
                 for model, record in zip(self.models, self.records, strict=True)
             ]
             r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
             J = self.vector([run.y_theta for run in runs])
-            if not (np.isfinite(r).all() and np.isfinite(J).all()):
-                raise SimulationError("the outputs of the model are not finite")
+            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+                raise SimulationError(
+                    "the outputs of the model, or their sensitivities, are beyond all bounds"
+                )
             self._last, self.runs = (key, r, J), tuple(runs)
-            with np.errstate(over="ignore"):
-                square = float(r @ r)
+            square = float(r @ r)
             if self.best is None or square < self.best[0]:
                 self.best = square, theta.copy()
         return self._last[1], self._last[2]

@@ -19,7 +19,7 @@ from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
 from rotorid.timedomain.methods.path import Path, at, half_square, negligible
-from rotorid.timedomain.methods.problem import Problem
+from rotorid.timedomain.methods.problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
@@ -33,8 +33,8 @@ def quasilinearization(
     Parameters
     ----------
     problem
-        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, with any other
-        the linear equations are solved by collocation.
+        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, with any
+        other the linear equations are solved by collocation.
     start
         First parameters (n,).
     curves
@@ -51,7 +51,9 @@ def quasilinearization(
     """
     model, theta = problem.model, start.copy()
     states = tuple(curve(record.t) for curve, record in zip(curves, problem.records, strict=True))
-    history, costs, trajectories = [theta], [_cost(problem, theta, states)], [states]
+    if not np.isfinite(first := _cost(problem, theta, states)):
+        raise SimulationError("the starting trajectory is beyond all bounds; start from another one")
+    history, costs, trajectories = [theta], [first], [states]
     found: Estimate | None = None
     step: FloatArray | None = None
     converged, message = False, f"not converged in {max_iterations} iterations"
@@ -167,8 +169,8 @@ def _solve(
         outputs.append(data - y)
         slopes.append(C @ W[..., 1:] + model.h_theta(record.t, x, theta, u))
     K, Y = problem.vector(slopes), problem.vector(outputs)
-    if not (np.isfinite(K).all() and np.isfinite(Y).all()):
-        raise SimulationError("the linearised outputs are not finite; start from another trajectory")
+    if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
+        raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
     sigma = 1.0 if problem.stated else None
     return least_squares(K, Y, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.integration.simulate import SimulationError, inputs_of, simulate
+from rotorid.timedomain.integration.simulate import inputs_of, simulate
 from rotorid.timedomain.methods.problem import Problem
 from rotorid.timedomain.models.model import OdeModel, ode_model
 from rotorid.timedomain.models.record import Record
@@ -42,6 +42,8 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
     values; what the outputs do not tell stays there.
     """
     t = record.t
+    if not model.states:
+        return _straight(t, np.zeros((len(t), 0)))
     u = inputs_of(model, record)
     y = np.stack([_filled(t, record.outputs.get(name)) for name in model.outputs], axis=-1)
     seen = ~np.isnan(y)
@@ -49,8 +51,9 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
     for _ in range(20):
         miss = np.where(seen, y - model.h(t, x, theta, u), 0.0)
         slopes = np.where(seen[..., None], model.h_x(t, x, theta, u), 0.0)
-        step = np.einsum("tij,tj->ti", np.linalg.pinv(slopes, rcond=1e-8), miss)
-        if not np.isfinite(step).all():
+        finite = np.isfinite(slopes).all() and np.isfinite(miss).all()
+        step = np.einsum("tij,tj->ti", np.linalg.pinv(slopes, rcond=1e-8), miss) if finite else None
+        if step is None or not np.isfinite(step).all():
             raise ValueError(f"{record.name}: no states explain the measured outputs")
         x = x + step
         if np.abs(step).max() <= 1e-9 * (1 + np.abs(x).max()):
@@ -76,9 +79,7 @@ def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
     fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
     inputs = {name: np.interp(fine, t, column) for name, column in record.inputs.items()}
     longer = Record(fine, {}, inputs, None, record.name)
-    x = simulate(
-        model, theta, longer, method=problem.integrator, rtol=problem.rtol, sensitivities=False
-    ).x
+    x = simulate(model, theta, longer, method=problem.integrator, rtol=problem.rtol, sensitivities=False).x
     slopes = model.f(fine, x, theta, inputs_of(model, longer))
     if not np.isfinite(slopes).all():
         return _straight(fine, x)

@@ -333,7 +333,7 @@ def _jacobian(exprs: Sequence[Any], by: Sequence[Any]) -> list[Any]:
     return [e.diff(symbol) for e in exprs for symbol in by]
 
 
-def ode_model(
+def ode_model(  # noqa: PLR0913
     states: Mapping[str, str],
     *,
     estimate: Mapping[str, float],

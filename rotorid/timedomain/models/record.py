@@ -108,8 +108,8 @@ def from_t0(model: OdeModel, record: Record) -> Record:
         )
     if model.driven:
         raise ValueError(
-            f"{record.name} begins at t = {record.t[0]:g} s: its inputs are not known from t0 = {model.t0:g} s "
-            "on; begin the record there"
+            f"{record.name} begins at t = {record.t[0]:g} s: its inputs are not known from t0 = "
+            f"{model.t0:g} s on; begin the record there"
         )
 
     def longer(column: FloatArray, first: float) -> FloatArray:

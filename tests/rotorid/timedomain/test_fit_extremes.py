@@ -9,7 +9,7 @@ from rotorid.timedomain.models.model import ode_model
 from rotorid.timedomain.models.record import Record
 
 RATES = ("-a*x", "a*x", "exp(a*x) - b", "-a*x**3 + b", "b/(x - a)", "a*sinh(b*x)", "-x**a", "log(x)*a + t*b")
-SIZES = (0.0, 1e-300, 1e-12, 1.0, -3.0, 40.0, 1e5, 1e150, 1e300)
+SIZES = (0.0, 0.5, 1.0, 1.5, -3.0, 2.0, 40.0, 1e5, 1e-12, 1e-300, 1e150, 1e300)
 
 
 def drawn(seed):
@@ -23,30 +23,33 @@ def drawn(seed):
     model = ode_model(
         {"x": str(rng.choice(RATES))},
         initial=initial,
-        outputs={"y": str(rng.choice(["x", "1e300*x", "exp(x)", "x*b"]))},
+        outputs={"y": str(rng.choice(["x", "x", "1e300*x", "exp(x)", "x*b"]))},
         estimate={"a": number(), "b": number()},
     )
-    t = np.cumsum(rng.uniform(0.5, 1.5, 8)) * rng.choice([1e-6, 1.0, 1e6])
-    y = rng.standard_normal(8) * rng.choice([1e-200, 1.0, 1e100, 1e200])
-    return model, Record(t, {"y": y}, sigma={"y": float(rng.choice([1e-3, 1e-200, 1e200]))} if rng.random() < 0.3 else None)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 8)) * rng.choice([1e-6, 1.0, 1.0, 1e6])
+    y = rng.standard_normal(8) * rng.choice([1e-200, 1.0, 1.0, 1e100, 1e200])
+    sigma = {"y": float(rng.choice([1e-3, 0.1, 1e-200, 1e200]))} if rng.random() < 0.3 else None
+    return model, Record(t, {"y": y}, sigma=sigma)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
-    answered = 0
+    answered, refused = 0, []
     for seed in range(400 if FULL else 40):
         model, record = drawn(seed)
         try:
             found = fit(model, record, method=method, max_iterations=20, max_seconds=5.0)
+        except np.linalg.LinAlgError as error:  # a ValueError, but no words
+            raise AssertionError(f"seed {seed}") from error
         except ValueError as error:
-            assert type(error) is not np.linalg.LinAlgError, f"seed {seed}"
-            assert len(str(error)) > 20, f"seed {seed}"
+            refused.append(str(error))
             continue
         answered += 1
         found.summary()
         found.to_dict()
         assert found.converged or found.std is None, f"seed {seed}"
-    assert answered > 0
+    assert answered > 10
+    assert all(len(words) > 20 and "array" not in words for words in refused)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -55,10 +58,10 @@ def test_a_curve_without_states_is_fitted_by_every_method(method, integrator):
     model = ode_model({}, outputs={"y": "a*exp(-b*t) + c"}, estimate={"a": 1.5, "b": 0.5, "c": 0.0})
     t = np.linspace(0.0, 5.0, 21)
     y = 2.0 * np.exp(-0.8 * t) + 0.3 + 1e-3 * np.cos(9.0 * t)
-    try:
-        found = fit(model, Record(t, {"y": y}), method=method, integrator=integrator)
-    except ValueError as error:
-        assert "quasilinearization integrates" in str(error)
+    if (method, integrator) == ("quasilinearization", "rk4"):
+        with pytest.raises(ValueError, match="quasilinearization integrates"):
+            fit(model, Record(t, {"y": y}), method=method, integrator=integrator)
         return
+    found = fit(model, Record(t, {"y": y}), method=method, integrator=integrator)
     np.testing.assert_allclose(found.values, [2.0, 0.8, 0.3], rtol=0.02)
     assert found.converged
