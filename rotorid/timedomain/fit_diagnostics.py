@@ -12,7 +12,7 @@ from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.causes import causes, known_initial
 from rotorid.timedomain.combinations import combined
-from rotorid.timedomain.integration.adaptive import longest_step
+from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.path import Path
 from rotorid.timedomain.methods.problem import RTOL, Problem
@@ -161,10 +161,10 @@ def _pulses(problem: Problem, theta: FloatArray) -> list[str]:
     """Words where the rates change with the time so fast that an integration may miss it."""
     for model, record, run in zip(problem.models, problem.records, problem.runs, strict=True):
         t = record.t
-        if not model.timed or run.method not in ("dop853", "lsoda") or len(t) < 2:
+        if not model.timed or run.method not in ("dop853", "lsoda", "taylor") or len(t) < 2:
             continue
         u, x = inputs_of(model, record)[:1], run.x[:1]
-        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / longest_step(t))) + 1)
+        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / shortest_pulse(t))) + 1)
         fine = np.linspace(t[0], t[-1], PROBES)
         at_coarse, at_fine = (
             model.f(times, np.repeat(x, len(times), 0), theta, np.repeat(u, len(times), 0))

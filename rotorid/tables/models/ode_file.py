@@ -14,7 +14,7 @@ from rotorid.tables.models.harmonic_file import pair, read_errors
 from rotorid.tables.models.matrix_form import Matrices, read_matrices
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.timedomain.models.nuisance import Nuisance
+from rotorid.timedomain.models.nuisance import with_nuisance
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
@@ -66,7 +66,7 @@ class TimeForm:
     t0
         Time to which the initial values belong, "first" or None.
     nuisance
-        Offset, drift and hum of the outputs.
+        Whether there is an offset and a drift of the outputs, and the frequencies of hum, Hz.
     """
 
     states: dict[str, str]
@@ -82,7 +82,7 @@ class TimeForm:
     errors: AmplitudeErrors | None
     speed: float
     t0: float | str | None
-    nuisance: Nuisance
+    nuisance: tuple[bool, bool, list[float]]
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -132,7 +132,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
         from rotorid.timedomain.models.second_order import second_order
 
         names = form.states if form.matrices is None else form.matrices.coordinates
-        outputs, factors = form.nuisance.added(form.outputs or {name: name for name in names})
+        outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)
         given: dict[str, Any] = {
             "initial": form.initial,
             "outputs": outputs if factors else form.outputs or None,
@@ -352,10 +352,10 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
-def _nuisance(section: Section) -> Nuisance:
+def _nuisance(section: Section) -> tuple[bool, bool, list[float]]:
     inner = section.section("nuisance")
     if inner is None:
-        return Nuisance()
+        return False, False, []
     value = inner.take("hum_Hz")
     hum = value if isinstance(value, list) else [] if value is None else [value]
     if not all(_is_number(one) and one > 0 for one in hum) or len(set(hum)) < len(hum):
@@ -363,7 +363,7 @@ def _nuisance(section: Section) -> Nuisance:
         hum = []
     offset, drift = inner.flag("offset"), inner.flag("drift")
     inner.finish()
-    return Nuisance(offset, drift, [float(one) for one in hum])
+    return offset, drift, [float(one) for one in hum]
 
 
 def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:

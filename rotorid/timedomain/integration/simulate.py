@@ -32,7 +32,7 @@ class Trajectory:
     S, y_theta
         Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
     method
-        The integrator used: "none" without states.
+        The integrator used: "none" without states, "taylor" with the extra `rotorid[fast]`.
     """
 
     t: FloatArray
@@ -68,7 +68,7 @@ def simulate(
         "expm": the exact solution of a linear model with constant coefficients (inputs allowed); "dop853",
         "lsoda" (stiff models): error control, of states and sensitivities; "heun" ([Q]), "rk4": one step
         from sample to sample. "auto": "expm" if possible, else "dop853", and "lsoda" where that needs too
-        many steps.
+        many steps; with the extra `rotorid[fast]` "taylor" for a model that has needed many.
     rtol, atol
         Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
     sensitivities

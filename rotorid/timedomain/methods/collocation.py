@@ -107,7 +107,7 @@ def _inverse(matrices: FloatArray) -> FloatArray:
     if not np.isfinite(matrices).all():
         return np.full_like(matrices, np.nan)
     try:
-        return np.linalg.inv(matrices)
+        return np.asarray(np.linalg.inv(matrices))
     except np.linalg.LinAlgError:
         return np.full_like(matrices, np.nan)
 

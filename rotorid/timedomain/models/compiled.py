@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import math
-import textwrap
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
@@ -110,20 +107,3 @@ class Compiled:
         except (ValueError, OverflowError, ZeroDivisionError, TypeError):  # TypeError: a complex power
             return self.many((), [np.float64(value) for value in arguments])
         return out.reshape(self.shape)
-
-    def source(self, states: int) -> str:
-        """Python's source of `rates(t, z, q, out)`: time, `states` arguments z, and the others as q."""
-        if self._scalar is None:
-            self._scalar = _lambdify(self._symbols, self._exprs, "math")
-        (function,) = ast.parse(textwrap.dedent(inspect.getsource(self._scalar))).body
-        assert isinstance(function, ast.FunctionDef)
-        assert isinstance(function.body[-1], ast.Return)
-        assert isinstance(function.body[-1].value, ast.List)
-        time, *others = (argument.arg for argument in function.args.args)
-        lines = ["def rates(t: float, z: Array, q: Array, out: Array) -> int:", f"    {time} = t"]
-        for i, name in enumerate(others):
-            lines.append(f"    {name} = " + (f"z[{i}]" if i < states else f"q[{i - states}]"))
-        lines += [f"    {ast.unparse(part)}" for part in function.body[:-1]]
-        found = dict(zip(self.places.tolist(), map(ast.unparse, function.body[-1].value.elts), strict=True))
-        lines += [f"    out[{i}] = {found.get(i, '0.0')}" for i in range(self.size)]
-        return "\n".join([*lines, "    return 0"])

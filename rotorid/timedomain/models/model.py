@@ -214,10 +214,10 @@ class OdeModel:
         """Where an integration keeps what it has compiled of this model."""
         return {}
 
-    def source(self) -> str | None:
-        """Python's source of `augmented`; None where it is not written out."""
-        made = self._compiled_augmented
-        return None if made is None else made.source(len(self.states) * (1 + len(self.parameters)))
+    @property
+    def rates_alone(self) -> bool:
+        """Whether `rates` are the whole right side."""
+        return True
 
     @cached_property
     def with_free_start(self) -> OdeModel:

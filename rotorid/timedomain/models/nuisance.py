@@ -4,51 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
-class Nuisance:
-    """What is added to every output, for every record anew.
+def with_nuisance(
+    outputs: Mapping[str, str], offset: bool, drift: bool, hum_Hz: Sequence[float]
+) -> tuple[dict[str, str], list[str]]:
+    """Outputs with a constant, a part that grows with t, and sinusoids, each with a factor of its own.
 
-    Attributes
-    ----------
-    offset, drift
-        Whether there is a constant, and one that grows with the time t.
-    hum_Hz
-        Frequencies of interference, Hz.
+    Returns
+    -------
+    Their expressions, and the names of the factors, which are to be estimated from 0 for every record.
+
+    Examples
+    --------
+    >>> with_nuisance({"x": "1e6*x"}, True, False, [50])[1]
+    ['offset_x', 'hum50_cos_x', 'hum50_sin_x']
     """
-
-    offset: bool = False
-    drift: bool = False
-    hum_Hz: Sequence[float] = ()
-
-    def terms(self) -> dict[str, str]:
-        """Expression of t by the first part of a parameter's name.
-
-        Examples
-        --------
-        >>> Nuisance(drift=True, hum_Hz=[50]).terms()
-        {'drift': 't', 'hum50_cos': 'cos(314.1592653589793*t)', 'hum50_sin': 'sin(314.1592653589793*t)'}
-        """
-        found = {"offset": "1"} if self.offset else {}
-        found |= {"drift": "t"} if self.drift else {}
-        for frequency in self.hum_Hz:
-            name = f"hum{frequency:g}".replace(".", "_").replace("-", "_").replace("+", "")
-            found |= {f"{name}_{wave}": f"{wave}({2 * math.pi * frequency!r}*t)" for wave in ("cos", "sin")}
-        return found
-
-    def added(self, outputs: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
-        """Outputs with these terms, and the names of their factors, which are to be estimated from 0.
-
-        Examples
-        --------
-        >>> Nuisance(offset=True).added({"x": "1e6*x"})
-        ({'x': '(1e6*x) + offset_x*(1)'}, ['offset_x'])
-        """
-        terms = self.terms()
-        texts = {
-            output: " + ".join([f"({text})", *(f"{name}_{output}*({term})" for name, term in terms.items())])
-            for output, text in outputs.items()
-        }
-        return texts, [f"{name}_{output}" for output in outputs for name in terms]
+    terms = {"offset": "1"} if offset else {}
+    terms |= {"drift": "t"} if drift else {}
+    for frequency in hum_Hz:
+        name = f"hum{frequency:g}".replace(".", "_").replace("-", "_").replace("+", "")
+        terms |= {f"{name}_{wave}": f"{wave}({2 * math.pi * frequency!r}*t)" for wave in ("cos", "sin")}
+    texts = {
+        output: " + ".join([f"({text})", *(f"{name}_{output}*{term}" for name, term in terms.items())])
+        for output, text in outputs.items()
+    }
+    return texts, [f"{name}_{output}" for output in outputs for name in terms]

@@ -78,6 +78,11 @@ class SecondOrderModel(OdeModel):
     def _last(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
         return {}
 
+    @property
+    def rates_alone(self) -> bool:
+        """No: E belongs to them."""
+        return False
+
     @cached_property
     def _compiled_augmented(self) -> None:
         """Not written out: E is solved numerically."""

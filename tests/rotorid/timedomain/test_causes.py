@@ -8,7 +8,7 @@ from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import METHODS, fit
 from rotorid.timedomain.integration.simulate import simulate
 from rotorid.timedomain.models.model import ode_model
-from rotorid.timedomain.models.nuisance import Nuisance
+from rotorid.timedomain.models.nuisance import with_nuisance
 from rotorid.timedomain.models.record import Record
 
 T = np.linspace(0.0, 4.0, 501)
@@ -16,7 +16,7 @@ TRUTH = [100.0, 0.4]
 
 
 def oscillator(position="1", speed="0", nuisance=None, estimate=None, **options):
-    outputs, factors = (nuisance or Nuisance()).added({"x": "x"})
+    outputs, factors = with_nuisance({"x": "x"}, *(nuisance or (False, False, [])))
     return ode_model(
         {"x": "v", "v": "-k*x - c*v"},
         initial={"x": position, "v": speed},
@@ -42,10 +42,10 @@ HUM = np.sqrt(2 * 0.002 * 0.2) * np.sin(2 * np.pi * 50 * T + 1.0)
 @pytest.mark.parametrize(
     ("extra", "said", "nuisance"),
     [
-        (0.03, "[nuisance] offset = true", Nuisance(offset=True)),
-        (0.03 * T, "[nuisance] drift = true", Nuisance(drift=True)),
-        (HUM, "[nuisance] hum_Hz = 50)", Nuisance(hum_Hz=[50])),
-        (0.02 + 0.03 * T + HUM, "[nuisance]", Nuisance(offset=True, drift=True, hum_Hz=[50.0])),
+        (0.03, "[nuisance] offset = true", (True, False, [])),
+        (0.03 * T, "[nuisance] drift = true", (False, True, [])),
+        (HUM, "[nuisance] hum_Hz = 50)", (False, False, [50])),
+        (0.02 + 0.03 * T + HUM, "[nuisance]", (True, True, [50.0])),
     ],
 )
 def test_what_a_sensor_adds_is_proposed_and_then_estimated(extra, said, nuisance):
@@ -151,3 +151,26 @@ def test_a_search_ends_with_a_sentence_when_its_time_is_over(method):
     assert not found.converged
     assert found.std is None
     assert "--max-seconds" in found.summary()
+
+
+def test_a_file_asks_for_nuisance_terms_and_t0(tmp_path):
+    text = (
+        'per_record = []\n[states]\nx = "v"\nv = "-k*x - c*v"\n[initial]\nx = 1\nv = 0\nt0 = {t0}\n'
+        '[outputs]\nx = "x"\n[estimate]\nk = 90\nc = 0.5\n[nuisance]\noffset = true\nhum_Hz = {hum}\n'
+    )
+    path = tmp_path / "model.toml"
+    path.write_text(text.format(t0=0, hum="[50, 16.7]"))
+    model = read_ode_model(path)
+    assert model.t0 == 0
+    hums = [f"hum{f}_{wave}_x" for f in ("50", "16_7") for wave in ("cos", "sin")]
+    assert model.parameters == ("k", "c", "offset_x", *hums)
+    data = record(0, extra=HUM + 0.1)
+    assert within(fit(model, [data, data]))
+    for t0, hum, place in (
+        ('"now"', "50", "initial.t0"),
+        ("0", "-50", "nuisance.hum_Hz"),
+        ("0", "[5, 5]", "hum"),
+    ):
+        path.write_text(text.format(t0=t0, hum=hum))
+        with pytest.raises(ValueError, match=place):
+            read_ode_model(path)
