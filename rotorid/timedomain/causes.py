@@ -139,19 +139,14 @@ def _strongest_line(t: FloatArray, r: FloatArray) -> tuple[float, float]:
     span = float(t[-1] - t[0])
     even = np.interp(np.linspace(t[0], t[-1], n), t, r)
     peak = 2 + int(np.argmax(np.abs(np.fft.rfft(even - even.mean())[2:])))
-
-    def power(frequency: float) -> float:
-        phase = 2 * np.pi * frequency * t
-        waves = np.stack([np.cos(phase), np.sin(phase), np.ones(n)], axis=1)
-        return float(np.sum((waves @ np.linalg.lstsq(waves, r, rcond=None)[0]) ** 2) / (r @ r))
-
     near = (peak + np.linspace(-1, 1, 41)) / span
-    best = float(near[np.argmax([power(f) for f in near])])
+    power = np.abs(np.exp(2j * np.pi * near[:, None] * t) @ r) ** 2
+    best = float(near[np.argmax(power)])
     for mains in MAINS:
         whole = mains * max(1, round(best / mains))
         if abs(whole - best) < 0.5 / span:
             best = whole
-    return power(best), best
+    return 2 * float(power.max()) / (n * float(r @ r)), best
 
 
 def _of_initial_values(problem: Problem, theta: FloatArray) -> Iterator[_Cause]:

@@ -14,7 +14,6 @@ from rotorid.tables.models.harmonic_file import pair, read_errors
 from rotorid.tables.models.matrix_form import Matrices, read_matrices
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.timedomain.models.nuisance import with_nuisance
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
@@ -63,8 +62,6 @@ class TimeForm:
         Stated errors of amplitudes, for harmonic tests only.
     speed
         At which the matrices hold, rad/s.
-    t0
-        Time to which the initial values belong, "first" or None.
     nuisance
         Whether there is an offset and a drift of the outputs, and the frequencies of hum, Hz.
     """
@@ -81,7 +78,6 @@ class TimeForm:
     bounds: dict[str, tuple[float, float]]
     errors: AmplitudeErrors | None
     speed: float
-    t0: float | str | None
     nuisance: tuple[bool, bool, list[float]]
 
 
@@ -129,6 +125,7 @@ def read_ode_model(path: str | Path) -> OdeModel:
     model = None
     if not len(problems):
         from rotorid.timedomain.models.model import ode_model
+        from rotorid.timedomain.models.nuisance import with_nuisance
         from rotorid.timedomain.models.second_order import second_order
 
         names = form.states if form.matrices is None else form.matrices.coordinates
@@ -141,7 +138,6 @@ def read_ode_model(path: str | Path) -> OdeModel:
             "inputs": form.inputs,
             "bounds": form.bounds,
             "per_record": [*form.per_record, *factors],
-            "t0": form.t0,
         }
         try:
             if form.matrices is None:
@@ -191,7 +187,7 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     everything = ["t", *states, *constants, *inputs]
     _readable(section, "states", states, everything, problems)
     _readable(section, "outputs", outputs, everything, problems)
-    begin, t0 = _initial(section, states, constants, problems, complete=initial and matrices is None)
+    begin = _initial(section, states, constants, problems, complete=initial and matrices is None)
     force = {} if matrices is None else _texts(section, "force")
     _readable(section, "force", force, everything, problems)
     for name in force:
@@ -217,7 +213,6 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
         bounds=bounds,
         errors=errors,
         speed=speed,
-        t0=t0,
         nuisance=nuisance,
     )
 
@@ -318,17 +313,16 @@ def _readable(
 
 def _initial(
     section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
-) -> tuple[dict[str, float | str], float | str | None]:
+) -> dict[str, float | str]:
     """Initial values, `complete` if those of all states must be given, and the time they belong to."""
     inner = section.section("initial")
     found: dict[str, float | str] = {}
-    t0: float | str | None = None
     for name in () if inner is None else inner.keys:
         if inner is None:
             continue
         value = inner.take(name)
         if name == "t0" and name not in states:
-            t0 = value
+            found[name] = value
             if value != "first" and not _is_number(value):
                 inner.complain(name, 'the time of the initial values in s, such as 0, or "first"')
         elif name not in states:
@@ -339,13 +333,13 @@ def _initial(
             found[name] = inner.number(name, 0.0) or 0.0
         else:
             inner.complain(name, "a number, or an expression of parameters in quotes")
-    texts = {name: value for name, value in found.items() if isinstance(value, str)}
+    texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
     _readable(section, "initial", texts, constants, problems)
     given = () if inner is None else inner.keys
     for name in states if complete else ():
         if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
             section.missing(f"initial.{name}", f"the value of {name} at the first time of the record")
-    return found, t0
+    return found
 
 
 def _is_number(value: object) -> bool:

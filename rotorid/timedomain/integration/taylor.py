@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes about a second, and so it is done for a model that has cost as much by the ordinary way.
+Compiling takes about a second, and so it is done for a model that has cost twice that the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rotorid.timedomain.integration.system import Augmented
     from rotorid.timedomain.models.model import OdeModel
 
-WORK = 5_000
+WORK = 20_000
 """Steps of the ordinary way after which a model is compiled."""
 TOLERANCE = 1e-13
 SAME = 1e-7

@@ -333,7 +333,7 @@ def _jacobian(exprs: Sequence[Any], by: Sequence[Any]) -> list[Any]:
     return [e.diff(symbol) for e in exprs for symbol in by]
 
 
-def ode_model(  # noqa: PLR0913
+def ode_model(
     states: Mapping[str, str],
     *,
     estimate: Mapping[str, float],
@@ -343,7 +343,6 @@ def ode_model(  # noqa: PLR0913
     inputs: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     per_record: Sequence[str] = (),
-    t0: float | str | None = None,
 ) -> OdeModel:
     """Make a model of text.
 
@@ -356,7 +355,7 @@ def ode_model(  # noqa: PLR0913
         Parameters to be estimated, with starting values.
     initial
         Value of each state at the first time of a record: a number, or an expression of parameters (the name
-        of one: an unknown initial state).
+        of one: an unknown initial state). "t0": the time to which they belong instead, s, or "first".
     outputs
         What is measured; by default the states.
     known
@@ -368,9 +367,6 @@ def ode_model(  # noqa: PLR0913
     per_record
         Parameters, usually initial states, of which every record has its own: x0 of the second record is then
         called x0_2.
-    t0
-        Time to which the initial values belong, s, perhaps before a record; "first" or None (not stated): the
-        first time of each record.
 
     Raises
     ------
@@ -385,6 +381,9 @@ def ode_model(  # noqa: PLR0913
     True
     """
     known, initial = dict(known or {}), dict(initial or {})
+    t0 = None if "t0" in states else initial.pop("t0", None)
+    if t0 is not None and t0 != "first" and (isinstance(t0, str) or not np.isfinite(t0)):
+        raise ValueError(f'initial: t0 is the time of the initial values in s, or "first", not {t0!r}')
     if not states and not outputs:
         raise ValueError("a model needs states, or outputs of the time")
     check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs})

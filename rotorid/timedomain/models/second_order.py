@@ -121,7 +121,6 @@ def second_order(  # noqa: PLR0913
     inputs: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
     per_record: Sequence[str] = (),
-    t0: float | str | None = None,
     names: Sequence[str] | None = None,
     masses: Mapping[str, float | str] | None = None,
     dampers: Mapping[str, float | str] | None = None,
@@ -137,10 +136,10 @@ def second_order(  # noqa: PLR0913
     ----------
     mass, damping, stiffness
         M, C, K, (n, n): numbers, or expressions of parameters such as "c1 + c2".
-    estimate, known, inputs, bounds, per_record, t0
+    estimate, known, inputs, bounds, per_record
         As in `ode_model`.
     initial
-        Values of displacements and velocities at the first time; 0 where none is given.
+        Values of displacements and velocities at the first time (or "t0"); 0 where none is given.
     force
         f by displacement: expressions of time, inputs, parameters and states; 0 where none is given.
     outputs
@@ -195,7 +194,7 @@ def second_order(  # noqa: PLR0913
     start = dict.fromkeys(states, 0.0) | dict(initial or {})
     observed = dict(outputs) if outputs else {name: name for name in dofs}
     shared: dict[str, Any] = {"known": known, "estimate": estimate, "inputs": inputs, "bounds": bounds}
-    shared |= {"per_record": per_record, "t0": t0}
+    shared["per_record"] = per_record
     plain = ode_model(states, initial=start, outputs=observed, **shared)
     read = Reader({name: Fraction(repr(value)) for name, value in plain.known.items()})
     cells = [[read(m[i][j], f"mass matrix, row {i + 1}", set(estimate)) for j in range(n)] for i in range(n)]

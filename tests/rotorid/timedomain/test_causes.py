@@ -15,11 +15,11 @@ T = np.linspace(0.0, 4.0, 501)
 TRUTH = [100.0, 0.4]
 
 
-def oscillator(position="1", speed="0", nuisance=None, estimate=None, **options):
+def oscillator(position="1", speed="0", nuisance=None, estimate=None, t0=None, **options):
     outputs, factors = with_nuisance({"x": "x"}, *(nuisance or (False, False, [])))
     return ode_model(
         {"x": "v", "v": "-k*x - c*v"},
-        initial={"x": position, "v": speed},
+        initial={"x": position, "v": speed} | ({} if t0 is None else {"t0": t0}),
         outputs=outputs,
         estimate={"k": 90.0, "c": 0.5} | (estimate or {}) | dict.fromkeys(factors, 0.0),
         **options,
