@@ -169,7 +169,7 @@ def shell() -> Row:
         peer_seconds=without_it,
         difference=0.0,
         allowed=0.0,
-        required_ratio=1.0,
+        required_ratio=0.9,
     )
 
 

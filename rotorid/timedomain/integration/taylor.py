@@ -1,6 +1,6 @@
 """Taylor integration of a model with its sensitivities by heyoka, with the extra `rotorid[fast]`.
 
-Compiling takes about a second, and so it is done for a model that has cost twice that the ordinary way.
+Compiling takes a second or two, and so it is done for a model that has cost that much the ordinary way.
 States and parameters are scaled by their sizes there, and what is compiled has to repeat the last ordinary
 solution. Source: Biscani and Izzo, "Revisiting high-order Taylor methods for astrodynamics and celestial
 mechanics", MNRAS 504 (2021) 2614.
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 WORK = 20_000
 """Steps of the ordinary way after which a model is compiled."""
-TOLERANCE = 1e-13
+TOLERANCE = 1e-12
+LARGE = 40
+"""States and sensitivities above which the code is smaller and slower: compiling would take long."""
 SAME = 1e-7
 """Difference from the ordinary solution, relative to each component, above which it is not used."""
 STEPS = 20_000
@@ -82,7 +84,12 @@ class _Taylor:
         rates[0] = (rates[0][0], rates[0][1] + 1e-300 * hy.par[k + 2 * nu - 1])
         with_slopes = hy.var_ode_sys(rates, [hy.par[i] for i in range(k)], order=1)
         self.solver = hy.taylor_adaptive(
-            with_slopes, [0.0] * n, pars=[0.0] * (k + 2 * nu), tol=TOLERANCE, compact_mode=True, opt_level=1
+            with_slopes,
+            [0.0] * n,
+            pars=[0.0] * (k + 2 * nu),
+            tol=TOLERANCE,
+            compact_mode=n * (1 + k) > LARGE,
+            opt_level=1,
         )
         self.done = hy.taylor_outcome.time_limit
 
