@@ -19,9 +19,10 @@ PYTHONS = [
 ]
 
 
-def promised(groups):
-    """What the project, its build and these groups ask for."""
+def promised(groups, extras=()):
+    """What the project, its build, these groups and these extras ask for."""
     texts = [*PROJECT["project"]["dependencies"], *PROJECT["build-system"]["requires"]]
+    texts += [text for extra in extras for text in PROJECT["project"]["optional-dependencies"][extra]]
     texts += [text for group in groups for text in GROUPS[group] if isinstance(text, str)]
     return [Requirement(text) for text in texts]
 
@@ -52,7 +53,7 @@ def pins(python):
 @pytest.mark.parametrize("python", PYTHONS)
 def test_everything_that_is_asked_for_has_a_tested_version_that_keeps_the_promise(python):
     found = pins(python)
-    for wanted in promised(GROUPS):
+    for wanted in promised(GROUPS, PROJECT["project"]["optional-dependencies"]):
         version = found.get(canonicalize_name(wanted.name))
         assert version is not None, f"{wanted.name} is not in constraints.txt: run `make constraints`"
         assert wanted.specifier.contains(version), f"{wanted} against {version}: run `make constraints`"

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
 from rotorid.regression.nonlinear import nonlinear_least_squares
-from rotorid.regression.search import inside
+from rotorid.regression.search import RCOND, inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.gauss_newton import gauss_newton
-from rotorid.timedomain.methods.path import Path
-from rotorid.timedomain.methods.problem import RTOL, Problem
+from rotorid.timedomain.methods.path import Path, at, half_square
+from rotorid.timedomain.methods.problem import RTOL, OutOfTime, Problem
 from rotorid.timedomain.methods.quasilinearization import quasilinearization
 from rotorid.timedomain.methods.shooting import shoot
 from rotorid.timedomain.methods.starts import merge, spread_starts
@@ -26,13 +29,16 @@ from rotorid.timedomain.residuals import output_errors, settled
 from rotorid.timedomain.result import Fit, Minimum
 
 METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
+SECONDS = 60.0
+"""Of a search, by default."""
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
-Searching = Callable[[FloatArray], Path]
+Searching = Callable[[Problem, FloatArray], Path]
 Trajectories = str | Mapping[str, str | float | ArrayLike]
 
 
-def fit(  # noqa: C901, PLR0913
+@np.errstate(all="ignore")  # what is not finite is looked for
+def fit(  # noqa: PLR0913
     model: OdeModel,
     records: Record | Sequence[Record],
     *,
@@ -49,6 +55,7 @@ def fit(  # noqa: C901, PLR0913
     rtol: float = RTOL,
     seed: int = 0,
     weigh: bool = False,
+    max_seconds: float = SECONDS,
 ) -> Fit:
     """Estimate the parameters of a model from time records.
 
@@ -89,6 +96,8 @@ def fit(  # noqa: C901, PLR0913
     weigh
         Estimate the standard deviation of each output from its residuals and weigh by it, until it stays.
         Without stated errors all samples count alike otherwise, whatever their unit.
+    max_seconds
+        Limit of time of the search; what it has found by then is given, without intervals.
 
     Raises
     ------
@@ -119,40 +128,28 @@ def fit(  # noqa: C901, PLR0913
         raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
         raise ValueError("quasilinearization integrates with heun, or with error control (auto)")
-    if starts < 1 or max_iterations < 1:
-        raise ValueError("starts and max_iterations must be at least 1")
+    if starts < 1 or max_iterations < 1 or not max_seconds > 0:
+        raise ValueError("starts and max_iterations must be at least 1, max_seconds above 0")
     several = (records,) if isinstance(records, Record) else tuple(records)
     if weigh and any(record.sigma is not None for record in several):
         raise ValueError("standard deviations are stated: there is nothing to estimate them for")
-    problem = Problem(model, several, integrator, rtol)
+    problem = Problem(model, several, integrator, rtol, seconds=max_seconds)
     names = problem.model.parameters
     limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
     begin = _start(problem.model, for_copies(model, len(several), start or {}))
     begin = inside(begin, limits[:, 0], limits[:, 1])
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
-    def search(theta: FloatArray) -> Path:
-        if method == "gauss-newton":
-            return gauss_newton(problem, theta, max_iterations=max_iterations, tolerance=tolerance)
-        if method == "quasilinearization":
-            curves = _curves(problem, theta, kind)
-            return quasilinearization(
-                problem, theta, curves, max_iterations=max_iterations, tolerance=tolerance
-            )
-        first = theta
-        if method == "multiple-shooting":
-            curves = _curves(problem, theta, kind)
-            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=pieces)
-        path = _levenberg_marquardt(problem, first, limits, loss, max_iterations)
-        return path if first is theta else path.after(theta[None])
-
-    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), names)
-    for _ in range(WEIGHINGS if weigh else 0):
+    search = _Search(method, limits, loss, kind, pieces, max_iterations, tolerance)
+    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
+    for _ in range(WEIGHINGS if weigh and path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, len(names))
         if errors is None or settled(errors, problem.errors):
             break
-        problem = Problem(model, several, integrator, rtol, errors)
-        path = search(path.estimate.solution).after(path.history)
+        left = problem.limit - time.monotonic()
+        problem = Problem(model, several, integrator, rtol, errors, left)
+        path = search(problem, path.estimate.solution).after(path.history)
+    problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
     warnings = judged.warnings
@@ -162,7 +159,7 @@ def fit(  # noqa: C901, PLR0913
         warnings = (*warnings, f"{method} knows no bounds, and the result lies outside those of the model")
     return Fit(
         models=problem.models,
-        records=several,
+        records=problem.records,
         method=method,
         integrator=simulations[0].method if simulations else integrator,
         loss=loss,
@@ -184,15 +181,51 @@ def fit(  # noqa: C901, PLR0913
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One search by one of the methods, within the problem's limit of time."""
+
+    method: str
+    limits: FloatArray
+    loss: str
+    trajectory: Trajectories
+    pieces: int | None
+    max_iterations: int
+    tolerance: float
+
+    def __call__(self, problem: Problem, theta: FloatArray) -> Path:
+        problem.best = None
+        try:
+            return self.whole(problem, theta)
+        except OutOfTime:
+            return _so_far(problem, theta)
+
+    def whole(self, problem: Problem, theta: FloatArray) -> Path:
+        steps, tolerance, limits = self.max_iterations, self.tolerance, self.limits
+        if self.method == "gauss-newton":
+            return gauss_newton(problem, theta, max_iterations=steps, tolerance=tolerance)
+        if self.method == "quasilinearization":
+            curves = _curves(problem, theta, self.trajectory)
+            return quasilinearization(problem, theta, curves, max_iterations=steps, tolerance=tolerance)
+        first = theta
+        if self.method == "multiple-shooting":
+            curves = _curves(problem, theta, self.trajectory)
+            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=self.pieces)
+        path = _levenberg_marquardt(problem, first, limits, self.loss, steps)
+        return path if first is theta else path.after(theta[None])
+
+
 def search_all(
-    search: Searching, begins: Sequence[FloatArray], names: tuple[str, ...]
+    search: Searching, begins: Sequence[FloatArray], problem: Problem
 ) -> tuple[Path, tuple[Minimum, ...]]:
     """The best of several searches, and all minima; a start from which the states diverge is left out."""
     paths: list[Path] = []
     failure: SimulationError | None = None
     for begin in begins:
+        if paths and problem.late:
+            break
         try:
-            paths.append(search(begin))
+            paths.append(search(problem, begin))
         except SimulationError as error:
             failure = failure or error
     if not paths:
@@ -200,7 +233,23 @@ def search_all(
         raise failure
     # one that did not converge is no minimum; where it describes the record better, it is given, and said
     best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
-    return best, merge([p for p in paths if p.converged], names) if len(begins) > 1 else ()
+    return best, merge([p for p in paths if p.converged], problem.model.parameters) if len(begins) > 1 else ()
+
+
+def _so_far(problem: Problem, start: FloatArray) -> Path:
+    """The best point of a search that ran out of time."""
+    seconds, problem.limit = problem.seconds, np.inf
+    theta = start if problem.best is None else problem.best[1]
+    r, J = problem.evaluate(theta)
+    problem.limit = 0.0
+    sigma = 1.0 if problem.stated else None
+    found = least_squares(J, -r, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
+    words = (
+        f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start "
+        "nearer or take another method"
+    )
+    costs = np.array([np.nan, half_square(r)])
+    return Path(at(found, theta, r), np.stack([start, theta]), costs, False, words)
 
 
 def _levenberg_marquardt(

@@ -10,8 +10,9 @@ from rotorid.base.arrays import FloatArray
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
+from rotorid.timedomain.causes import causes, known_initial
 from rotorid.timedomain.combinations import combined
-from rotorid.timedomain.integration.adaptive import longest_step
+from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.path import Path
 from rotorid.timedomain.methods.problem import RTOL, Problem
@@ -60,11 +61,15 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:  # noqa: C901, 
         spread = None if problem.stated or loss != "linear" else unequal(problem, len(names), r)
         if spread is not None:
             warnings.append(_unequal_words(problem, found, J, spread))
+        if path.converged and loss == "linear":
+            pointed, wrong = causes(problem, found.solution, J, r)
+            warnings += pointed
+            reliable &= not wrong
         change = _integration_change(problem, found, J)
     except SimulationError as error:
         warnings.append(f"the model cannot be simulated with the result: {error}")
         reliable = False
-    if not found.full_rank:
+    if not found.full_rank and path.converged:
         warnings.append(found.describe_rank())
     if not problem.data.any():
         warnings.append("the record is zero throughout: a sensor without a signal?")
@@ -84,9 +89,22 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:  # noqa: C901, 
     if missed:
         warnings += missed
         reliable = False
+    warnings += _begins_later(problem)
     if not reliable:
-        found = replace(found, covariance=None, solution_covariance=None)
+        curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
+        found = replace(found, covariance=None, solution_covariance=None, curved=curved)
     return Judgement(found, reliable, tuple(warnings), change, None if seen is None else seen.neighbours)
+
+
+def _begins_later(problem: Problem) -> list[str]:
+    """Ask where the known initial values belong, if the record does not begin at 0."""
+    model, late = problem.model, [record for record in problem.records if record.t[0] != 0]
+    if model.t0 is not None or not late or not known_initial(model):
+        return []
+    return [
+        f"{late[0].name} begins at t = {late[0].t[0]:.6g} s, and the initial values were put there: state "
+        'where they belong, t0 = 0 in [initial] (the time 0) or t0 = "first" (the first time of each record)'
+    ]
 
 
 def _insensitive(problem: Problem, J: FloatArray, found: Estimate) -> list[str]:
@@ -143,10 +161,10 @@ def _pulses(problem: Problem, theta: FloatArray) -> list[str]:
     """Words where the rates change with the time so fast that an integration may miss it."""
     for model, record, run in zip(problem.models, problem.records, problem.runs, strict=True):
         t = record.t
-        if not model.timed or run.method not in ("dop853", "lsoda") or len(t) < 2:
+        if not model.timed or run.method not in ("dop853", "lsoda", "taylor") or len(t) < 2:
             continue
         u, x = inputs_of(model, record)[:1], run.x[:1]
-        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / longest_step(t))) + 1)
+        coarse = np.linspace(t[0], t[-1], 4 * int(np.ceil((t[-1] - t[0]) / shortest_pulse(t))) + 1)
         fine = np.linspace(t[0], t[-1], PROBES)
         at_coarse, at_fine = (
             model.f(times, np.repeat(x, len(times), 0), theta, np.repeat(u, len(times), 0))

@@ -176,6 +176,8 @@ class Fit:
     def summary(self) -> str:
         """Text for an engineer: method, values ± standard deviations, intervals, and what to beware of."""
         lines = self.estimate.summary(self.at_bounds).splitlines()
+        if not self.converged:  # nothing is said of a place that is no minimum
+            lines = [line for line in lines if line != self.estimate.describe_rank()]
         if self.estimate.covariance is None and self.estimate.dof > 0:
             lines = [line for line in lines if not line.startswith("no intervals: ")]
         lines.insert(0, f"{self.method}, integrator {self.integrator}: {self.message}")

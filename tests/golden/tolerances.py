@@ -42,6 +42,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("fit-quasi*", "parameters.*.std", _EXACT, absolute=1e-13),
     Tolerance("fit-quasi*", "residual_rms", _EXACT, absolute=1e-12),
     Tolerance("fit-quasi-method", "rotorid: *", _EXACT, absolute=1e-12),
+    Tolerance("fit-quasi-method", "theta*", _EXACT, absolute=1e-12),
     Tolerance("fit-*", "integration_change.*", "the difference of two integrations", absolute=1e-12),
     Tolerance("*", "*correlation.*", "of parameters that do not hang together", absolute=1e-12),
     Tolerance("campbell-rotor23", "*log_decrement*", "the rotor has no damping", absolute=1e-12),

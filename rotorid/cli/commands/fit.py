@@ -90,6 +90,12 @@ RtolOption = Annotated[
         metavar="X", help="Relative tolerance of the integration; default: 1e-10.", show_default=False
     ),
 ]
+SecondsOption = Annotated[
+    float,
+    typer.Option(
+        metavar="S", min=0.01, help="Limit of the search; what it has found by then has no intervals."
+    ),
+]
 MissingOption = Annotated[
     bool, typer.Option("--allow-missing", help="Blank cells, NaN and absent outputs were not measured.")
 ]
@@ -114,6 +120,7 @@ def fit(
     starts: StartsOption = 1,
     seed: SeedOption = None,
     max_iterations: IterationsOption = 100,
+    max_seconds: SecondsOption = 60.0,
     trajectory: TrajectoryOption = None,
     pieces: PiecesOption = None,
     rtol: RtolOption = None,
@@ -158,6 +165,7 @@ def fit(
             starts=starts,
             seed=seed or 0,
             max_iterations=max_iterations,
+            max_seconds=max_seconds,
             trajectory=trajectory,
             pieces=pieces,
             rtol=RTOL if rtol is None else rtol,
@@ -182,6 +190,7 @@ def fit(
             "starts": starts,
             "seed": seed,
             "max_iterations": max_iterations,
+            "max_seconds": max_seconds,
             "trajectory": trajectory,
             "pieces": pieces,
             "rtol": rtol,

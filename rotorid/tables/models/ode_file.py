@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid import expressions
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.expressions import ExpressionError, is_name
+from rotorid.expressions import LARGEST, ExpressionError, is_name
 from rotorid.tables.models.harmonic_file import pair, read_errors
 from rotorid.tables.models.matrix_form import Matrices, read_matrices
 from rotorid.tables.reader.problems import Problems
@@ -35,6 +34,7 @@ _KEYS = (
     "known",
     "bounds",
     "errors",
+    "nuisance",
     "speed_rad_s",
 )
 _A_NAME = "names: a letter, then letters, digits and _; not t and no function"
@@ -62,6 +62,8 @@ class TimeForm:
         Stated errors of amplitudes, for harmonic tests only.
     speed
         At which the matrices hold, rad/s.
+    nuisance
+        Whether there is an offset and a drift of the outputs, and the frequencies of hum, Hz.
     """
 
     states: dict[str, str]
@@ -76,6 +78,7 @@ class TimeForm:
     bounds: dict[str, tuple[float, float]]
     errors: AmplitudeErrors | None
     speed: float
+    nuisance: tuple[bool, bool, list[float]]
 
 
 def read_ode_model(path: str | Path) -> OdeModel:
@@ -86,7 +89,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     starting value; empty where a model is only to be simulated), optional `[known]` (name = number) and
     `[bounds]` (name = [lowest, highest]), `inputs`, a list of measured inputs (columns of the record), and
     `per_record`, a list of parameters (such as unknown initial values) that every one of several records has
-    for itself. Without states the outputs are functions of the time.
+    for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first"); `[nuisance]`
+    adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every output, with
+    factors to be estimated for every record. Without states the outputs are functions of the time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
@@ -122,16 +127,19 @@ def read_ode_model(path: str | Path) -> OdeModel:
     model = None
     if not len(problems):
         from rotorid.timedomain.models.model import ode_model
+        from rotorid.timedomain.models.nuisance import with_nuisance
         from rotorid.timedomain.models.second_order import second_order
 
+        names = form.states if form.matrices is None else form.matrices.coordinates
+        outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)
         given: dict[str, Any] = {
             "initial": form.initial,
-            "outputs": form.outputs or None,
-            "estimate": form.estimate,
+            "outputs": outputs if factors else form.outputs or None,
+            "estimate": form.estimate | dict.fromkeys(factors, 0.0),
             "known": form.known,
             "inputs": form.inputs,
             "bounds": form.bounds,
-            "per_record": form.per_record,
+            "per_record": [*form.per_record, *factors],
         }
         try:
             if form.matrices is None:
@@ -192,9 +200,22 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     bounds = _bounds(section, estimate)
     errors = read_errors(section)
     speed = section.number("speed_rad_s", 0.0, low=0.0) or 0.0
+    nuisance = _nuisance(section)
     section.finish()
     return TimeForm(
-        states, matrices, begin, outputs, force, estimate, known, inputs, own, bounds, errors, speed
+        states=states,
+        matrices=matrices,
+        initial=begin,
+        outputs=outputs,
+        force=force,
+        estimate=estimate,
+        known=known,
+        inputs=inputs,
+        per_record=own,
+        bounds=bounds,
+        errors=errors,
+        speed=speed,
+        nuisance=nuisance,
     )
 
 
@@ -227,7 +248,7 @@ def _texts(section: Section, table: str) -> dict[str, str]:
         value = inner.take(name)
         if isinstance(value, str) and value.strip():
             found[name] = value
-        elif isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value):
+        elif _is_number(value):
             found[name] = repr(float(value))
         else:
             inner.complain(name, 'an expression in quotes, such as "-a*x"')
@@ -295,14 +316,18 @@ def _readable(
 def _initial(
     section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
 ) -> dict[str, float | str]:
-    """Initial values, `complete` if those of all states must be given."""
+    """Initial values, `complete` if those of all states must be given, and the time they belong to."""
     inner = section.section("initial")
     found: dict[str, float | str] = {}
     for name in () if inner is None else inner.keys:
         if inner is None:
             continue
         value = inner.take(name)
-        if name not in states:
+        if name == "t0" and name not in states:
+            found[name] = value
+            if value != "first" and not _is_number(value):
+                inner.complain(name, 'the time of the initial values in s, such as 0, or "first"')
+        elif name not in states:
             inner.complain(name, f"a name of [states]{did_you_mean(name, states)}", value=False)
         elif isinstance(value, str) and value.strip():
             found[name] = value
@@ -310,13 +335,31 @@ def _initial(
             found[name] = inner.number(name, 0.0) or 0.0
         else:
             inner.complain(name, "a number, or an expression of parameters in quotes")
-    texts = {name: value for name, value in found.items() if isinstance(value, str)}
+    texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
     _readable(section, "initial", texts, constants, problems)
     given = () if inner is None else inner.keys
     for name in states if complete else ():
         if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
             section.missing(f"initial.{name}", f"the value of {name} at the first time of the record")
     return found
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
+
+
+def _nuisance(section: Section) -> tuple[bool, bool, list[float]]:
+    inner = section.section("nuisance")
+    if inner is None:
+        return False, False, []
+    value = inner.take("hum_Hz")
+    hum = value if isinstance(value, list) else [] if value is None else [value]
+    if not all(_is_number(one) and one > 0 for one in hum) or len(set(hum)) < len(hum):
+        inner.complain("hum_Hz", "a frequency above 0, or a list of different ones, such as hum_Hz = 50")
+        hum = []
+    offset, drift = inner.flag("offset"), inner.flag("drift")
+    inner.finish()
+    return offset, drift, [float(one) for one in hum]
 
 
 def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:

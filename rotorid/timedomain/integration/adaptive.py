@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.timedomain.integration import taylor
 from rotorid.timedomain.integration.system import Augmented
 from rotorid.timedomain.models.errors import LARGEST, SimulationError, diverged
 
@@ -54,6 +55,10 @@ def integrate(
         raise ValueError(f"atol must be above 0, not {atol:g}")
     z0, n = system.pack(x0, s0), len(system.t)
     if method == "auto":
+        usual = rtol >= taylor.TOLERANCE and atol is None
+        quick = taylor.integrate(system, x0, s0, longest_step(system)) if usual else None
+        if quick is not None:
+            return *system.unpack(quick), "taylor"
         try:
             return *_solve(system, z0, "dop853", rtol, atol, max(TRIAL_STEPS, 4 * n)), "dop853"
         except _TooManySteps:
@@ -69,7 +74,7 @@ def _solve(
     table[0] = z0
     # inputs have corners at the samples: no step may cross one
     ends = list(range(1, len(t))) if system.model.driven else [len(t) - 1] if len(t) > 1 else []
-    first, begin = None, 0
+    first, begin, steps_left = None, 0, budget
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
         scale = _first_scale(system, z0)
@@ -77,6 +82,8 @@ def _solve(
             steps, first = _segment(system, table, begin, end, method, (rtol, atol), scale, first, budget)
             budget -= steps
             begin = end
+    if method == "dop853":
+        taylor.learn(system, table, steps_left - budget, longest_step(system))
     return system.unpack(table)
 
 
@@ -96,7 +103,7 @@ def _segment(  # noqa: PLR0913
     rtol, atol = tolerances
     first = None if first is None else min(first, span)
     limits = _atol(system, scale if method == "dop853" else _levelled(system, scale), rtol, atol)
-    options = (rtol, first, longest_step(t) if system.model.timed else np.inf)
+    options = (rtol, first, longest_step(system))
     solver = _solver(system, method, float(t[begin]), table[begin], float(t[end]), limits, options)
     row, steps, longest = begin + 1, 0, 0.0
     while row <= end:
@@ -125,8 +132,14 @@ def _segment(  # noqa: PLR0913
     return steps, longest
 
 
-def longest_step(t: FloatArray) -> float:
+def longest_step(system: Augmented) -> float:
     """Of a model that depends on the time itself: a pulse must not be stepped over."""
+    t = system.t
+    return shortest_pulse(t) if system.model.timed and len(t) > 1 else np.inf
+
+
+def shortest_pulse(t: FloatArray) -> float:
+    """That is not stepped over, s."""
     return max(float(np.diff(t).min()), float(t[-1] - t[0]) / 1000)
 
 

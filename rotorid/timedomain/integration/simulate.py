@@ -12,7 +12,7 @@ from rotorid.timedomain.integration import adaptive, propagation
 from rotorid.timedomain.integration.system import Augmented
 from rotorid.timedomain.models.errors import SimulationError, check_finite
 from rotorid.timedomain.models.model import OdeModel
-from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.record import Record, from_t0
 
 METHODS = ("auto", "expm", "dop853", "lsoda", "heun", "rk4")
 
@@ -32,7 +32,7 @@ class Trajectory:
     S, y_theta
         Derivatives by the parameters, (n, n_x, n_p) and (n, n_y, n_p); zeros without sensitivities.
     method
-        The integrator used: "none" without states.
+        The integrator used: "none" without states, "taylor" with the extra `rotorid[fast]`.
     """
 
     t: FloatArray
@@ -68,7 +68,7 @@ def simulate(
         "expm": the exact solution of a linear model with constant coefficients (inputs allowed); "dop853",
         "lsoda" (stiff models): error control, of states and sensitivities; "heun" ([Q]), "rk4": one step
         from sample to sample. "auto": "expm" if possible, else "dop853", and "lsoda" where that needs too
-        many steps.
+        many steps; with the extra `rotorid[fast]` "taylor" for a model that has needed many.
     rtol, atol
         Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
     sensitivities
@@ -92,6 +92,12 @@ def simulate(
         raise ValueError(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
+    longer = record if x0 is not None else from_t0(model, record)
+    if longer is not record:
+        run = simulate(
+            model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities
+        )
+        return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
     used: str = method
     t = record.t

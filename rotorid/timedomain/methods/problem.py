@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
@@ -10,17 +11,25 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.integration.simulate import SimulationError, Trajectory, simulate
 from rotorid.timedomain.models.model import OdeModel
-from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.record import Record, from_t0
 from rotorid.timedomain.models.several import models_of
 
+LARGEST = 1e140
+"""Residuals and sensitivities beyond this size have no sum of squares."""
 RTOL = 1e-10
 """Of the integration during a fit."""
+
+
+class OutOfTime(Exception):
+    """The limit of time has come."""
 
 
 class Problem:
     """Residuals y(t, θ) − measured, divided by the standard deviations where these are stated.
 
-    Rows are ordered record by record, output by output, sample by sample; missing samples have none.
+    Rows are ordered record by record, output by output, sample by sample; missing samples have none, and none
+    has the first sample of an output that known initial values fix: it tells nothing of the parameters, and
+    would count as a degree of freedom.
 
     Parameters
     ----------
@@ -32,6 +41,8 @@ class Problem:
         Its tolerance.
     errors
         Estimated standard deviation of each output, to weigh by; not stated ones.
+    seconds
+        Limit of time of the search, which begins now.
 
     Raises
     ------
@@ -47,10 +58,14 @@ class Problem:
         integrator: str = "auto",
         rtol: float = RTOL,
         errors: Mapping[str, float] | None = None,
+        seconds: float = np.inf,
     ) -> None:
-        self.records, self._given = tuple(records), model
+        self.records, self._given = tuple(from_t0(model, record) for record in records), model
         self.integrator, self.rtol = integrator, rtol
         self.errors = dict(errors or {})
+        self.limit = time.monotonic() + seconds
+        """When the search has to end."""
+        self.seconds = seconds
         if not self.records:
             raise ValueError("a fit needs at least one record")
         self.models = models_of(model, len(self.records))
@@ -63,13 +78,27 @@ class Problem:
         self.stated = known == {True}
         self.measured = [data for data, _, _ in tables]
         self.masks = [~np.isnan(data.T) for data, _, _ in tables]
+        for one, mask in zip(self.models, self.masks, strict=True):
+            mask[one.fixed_at_first, :1] = False
         self.weights = [1.0 / sigma for _, sigma, _ in tables]
         if self.rows == 0:
-            raise ValueError("the records have no samples of an output")
+            raise ValueError("the records have no samples of an output beside those that known values fix")
+        if np.abs(self.data).max() > LARGEST or 0 < np.abs(self.data).max() < 1 / LARGEST:
+            raise ValueError(
+                f"the records reach {np.abs(self.data).max():.3g} (over the standard deviations, where these "
+                "are stated): no sum of squares can be made of such numbers; take other units"
+            )
         self._last: tuple[bytes, FloatArray, FloatArray] | None = None
         self.runs: tuple[Trajectory, ...] = ()
         """Of the last evaluation, one per record."""
+        self.best: tuple[float, FloatArray] | None = None
+        """Smallest sum of squares so far, and the parameters there."""
         self.failure = ""
+
+    @property
+    def late(self) -> bool:
+        """Whether the limit of time has come."""
+        return time.monotonic() > self.limit
 
     def again(self, integrator: str, rtol: float) -> Problem:
         """The same problem, integrated otherwise."""
@@ -120,18 +149,29 @@ class Problem:
         ------
         SimulationError
             The states diverge.
+        OutOfTime
+            The limit of time has come; never at the first evaluation.
         """
         key = theta.tobytes()
         if self._last is None or self._last[0] != key:
+            if self.best is not None and self.late:
+                raise OutOfTime
+            if not np.isfinite(theta).all():
+                raise SimulationError("the parameters grow beyond all bounds")
             runs = [
                 simulate(model, theta, record, method=self.integrator, rtol=self.rtol)
                 for model, record in zip(self.models, self.records, strict=True)
             ]
             r = self.vector([run.y - data for run, data in zip(runs, self.measured, strict=True)])
             J = self.vector([run.y_theta for run in runs])
-            if not (np.isfinite(r).all() and np.isfinite(J).all()):
-                raise SimulationError("the outputs of the model are not finite")
+            if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
+                raise SimulationError(
+                    "the outputs of the model, or their sensitivities, are beyond all bounds"
+                )
             self._last, self.runs = (key, r, J), tuple(runs)
+            square = float(r @ r)
+            if self.best is None or square < self.best[0]:
+                self.best = square, theta.copy()
         return self._last[1], self._last[2]
 
     def residual(self, theta: FloatArray) -> FloatArray:

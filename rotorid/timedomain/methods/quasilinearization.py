@@ -17,8 +17,9 @@ from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.methods.collocation import solve_linear
 from rotorid.timedomain.methods.path import Path, at, half_square, negligible
-from rotorid.timedomain.methods.problem import Problem
+from rotorid.timedomain.methods.problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
@@ -32,8 +33,8 @@ def quasilinearization(
     Parameters
     ----------
     problem
-        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, any other
-        integrates with error control.
+        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, with any
+        other the linear equations are solved by collocation.
     start
         First parameters (n,).
     curves
@@ -50,11 +51,18 @@ def quasilinearization(
     """
     model, theta = problem.model, start.copy()
     states = tuple(curve(record.t) for curve, record in zip(curves, problem.records, strict=True))
-    history, costs, trajectories = [theta], [_cost(problem, theta, states)], [states]
+    if not np.isfinite(first := _cost(problem, theta, states)):
+        raise SimulationError("the starting trajectory is beyond all bounds; start from another one")
+    history, costs, trajectories = [theta], [first], [states]
     found: Estimate | None = None
     step: FloatArray | None = None
     converged, message = False, f"not converged in {max_iterations} iterations"
     for _ in range(max_iterations):
+        if found is not None and problem.late:
+            message = (
+                f"not converged: quasilinearization was stopped after {problem.seconds:.3g} s (--max-seconds)"
+            )
+            break
         try:
             if not np.isfinite(theta).all():
                 raise SimulationError("the parameters grow beyond all bounds")
@@ -110,7 +118,7 @@ def linear_solutions(
             return np.stack(columns, axis=-1).reshape(*np.shape(at), *shape)
 
         return table, straight
-    return _adaptive(model, theta, curve, record, first, problem.rtol)
+    return _collocated(model, theta, curve, record, first)
 
 
 def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray) -> FloatArray:
@@ -132,41 +140,20 @@ def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, fir
     return table
 
 
-def _adaptive(
-    model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray, rtol: float
+def _collocated(
+    model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray
 ) -> tuple[FloatArray, Curve]:
-    from scipy.integrate import solve_ivp
+    u = inputs_of(model, record)
+    constant = model.matrices(theta)[0] if model.linear_driven else None
 
-    t = record.t
-    u, shape, n = inputs_of(model, record), first.shape, len(model.states)
+    def equations(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        x = curve(t)
+        at = (t, x, theta, np.stack([np.interp(t, record.t, column) for column in u.T], -1) if u.size else ())
+        A = model.f_x(*at) if constant is None else constant
+        b = model.f(*at) - (A @ x[..., None])[..., 0]
+        return A, np.concatenate((b[..., None], model.f_theta(*at)), axis=-1)
 
-    def slope(time: float, w: FloatArray) -> FloatArray:
-        x = curve(np.array(time))
-        inputs = np.array([np.interp(time, t, column) for column in u.T])
-        point = model.point(time, x, theta, inputs)
-        A = point[:, 1 : 1 + n]
-        out = A @ w.reshape(shape)
-        out[:, 0] += point[:, 0] - A @ x
-        out[:, 1:] += point[:, 1 + n :]
-        return out.ravel()
-
-    size = np.maximum(np.abs(curve(t)).max(axis=0), np.abs(first[:, 0])).max()
-    atol = rtol * max(float(size), 1e-300)
-    with np.errstate(all="ignore"):
-        run = solve_ivp(
-            slope, (t[0], t[-1]), first.ravel(), "DOP853", dense_output=True, rtol=rtol, atol=atol
-        )
-    if not run.success or not np.isfinite(run.y).all():
-        raise SimulationError(
-            f"the linearised equations have no finite solution beyond t = {run.t[-1]:g}; start from another "
-            "trajectory"
-        )
-
-    def dense(at: FloatArray) -> FloatArray:
-        values = run.sol(at)
-        return np.asarray(np.moveaxis(values, 0, -1).reshape(*np.shape(at), *shape))
-
-    return dense(t), dense
+    return solve_linear(equations, record.t, first)
 
 
 def _solve(
@@ -182,8 +169,8 @@ def _solve(
         outputs.append(data - y)
         slopes.append(C @ W[..., 1:] + model.h_theta(record.t, x, theta, u))
     K, Y = problem.vector(slopes), problem.vector(outputs)
-    if not (np.isfinite(K).all() and np.isfinite(Y).all()):
-        raise SimulationError("the linearised outputs are not finite; start from another trajectory")
+    if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
+        raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
     sigma = 1.0 if problem.stated else None
     return least_squares(K, Y, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
 

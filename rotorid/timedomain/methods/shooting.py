@@ -8,15 +8,14 @@ this finds is where the search over the whole record begins.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.integration.simulate import SimulationError, simulate
-from rotorid.timedomain.methods.problem import Problem
+from rotorid.timedomain.methods.problem import OutOfTime, Problem
 from rotorid.timedomain.methods.trajectory import Curve
-from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
 
 PIECES = 12
@@ -72,6 +71,8 @@ def shoot(
     ------
     SimulationError
         A piece diverges with the starting values.
+    OutOfTime
+        The problem's limit of time has come.
     """
     from scipy.optimize import least_squares
 
@@ -108,7 +109,7 @@ class _Pieces:
 
     def __init__(self, problem: Problem, parts: list[_Piece], nodes: FloatArray) -> None:
         self.problem, self.parts = problem, parts
-        self.free = [_free(model) for model in problem.models]
+        self.free = [model.with_free_start for model in problem.models]
         self.weight = STRICTNESS[0]
         data = problem.data
         self.unit = (float(np.sqrt(np.mean(data**2))) or 1.0) * np.sqrt(len(data))
@@ -141,6 +142,8 @@ class _Pieces:
         slopes = [np.zeros((*data.shape, len(z))) for data in problem.measured]
         joints, joint_slopes = [], []
         for p in self.parts:
+            if problem.late:
+                raise OutOfTime
             own = slice(n + p.node * k, n + (p.node + 1) * k)  # of a piece that begins with a node
             begins = p.first > 0
             theta = np.concatenate((z[:n], z[own])) if begins else z[:n]
@@ -171,23 +174,6 @@ class _Pieces:
         J = problem.vector(slopes) / self.unit
         w = self.weight / np.sqrt(max(len(joints) * k, 1))
         return np.concatenate((r, w * np.ravel(joints))), np.vstack((J, w * np.vstack(joint_slopes)))
-
-
-def _free(model: OdeModel) -> OdeModel:
-    """The model with its initial states as further parameters."""
-    import sympy
-
-    names = tuple(f"{name}_at_node" for name in model.states)
-    while set(names) & {*model.parameters, *model.states, *model.inputs}:
-        names = tuple(f"{name}_" for name in names)
-    k = len(names)
-    return replace(
-        model,
-        parameters=(*model.parameters, *names),
-        start=np.concatenate((model.start, np.zeros(k))),
-        bounds=np.vstack((model.bounds, np.tile([-np.inf, np.inf], (k, 1)))),
-        initial=tuple(sympy.Symbol(name) for name in names),
-    )
 
 
 def _cut(records: Sequence[Record], pieces: int | None) -> list[_Piece]:

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.integration.simulate import SimulationError, inputs_of, simulate
+from rotorid.timedomain.integration.simulate import inputs_of, simulate
 from rotorid.timedomain.methods.problem import Problem
 from rotorid.timedomain.models.model import OdeModel, ode_model
 from rotorid.timedomain.models.record import Record
 
 Curve = Callable[[FloatArray], FloatArray]
 """States (*B, n_x) at times (*B,)."""
+FINER = 4
+"""Points of the model's own solution between two samples."""
 
 
 def given_trajectory(model: OdeModel, given: Mapping[str, str | float | ArrayLike], record: Record) -> Curve:
@@ -40,6 +42,8 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
     values; what the outputs do not tell stays there.
     """
     t = record.t
+    if not model.states:
+        return _straight(t, np.zeros((len(t), 0)))
     u = inputs_of(model, record)
     y = np.stack([_filled(t, record.outputs.get(name)) for name in model.outputs], axis=-1)
     seen = ~np.isnan(y)
@@ -47,8 +51,9 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
     for _ in range(20):
         miss = np.where(seen, y - model.h(t, x, theta, u), 0.0)
         slopes = np.where(seen[..., None], model.h_x(t, x, theta, u), 0.0)
-        step = np.einsum("tij,tj->ti", np.linalg.pinv(slopes, rcond=1e-8), miss)
-        if not np.isfinite(step).all():
+        finite = np.isfinite(slopes).all() and np.isfinite(miss).all()
+        step = np.einsum("tij,tj->ti", np.linalg.pinv(slopes, rcond=1e-8), miss) if finite else None
+        if step is None or not np.isfinite(step).all():
             raise ValueError(f"{record.name}: no states explain the measured outputs")
         x = x + step
         if np.abs(step).max() <= 1e-9 * (1 + np.abs(x).max()):
@@ -57,7 +62,7 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
 
 
 def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
-    """The model's own solution over one of the records; of "heun" at the samples, straight between them.
+    """The model's own solution over one of the records, smooth between its samples; of "heun" straight.
 
     Raises
     ------
@@ -69,24 +74,16 @@ def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
     if problem.integrator == "heun" or len(t) == 1 or not model.states:
         x = simulate(model, theta, record, method=problem.integrator, sensitivities=False).x
         return _straight(t, x)
-    from scipy.integrate import solve_ivp
+    from scipy.interpolate import CubicHermiteSpline
 
-    u = inputs_of(model, record)
-    x0 = model.x0(theta)
-
-    def rate(time: float, x: FloatArray) -> FloatArray:
-        return model.rate(time, x, theta, np.array([np.interp(time, t, column) for column in u.T]))
-
-    with np.errstate(all="ignore"):
-        run = solve_ivp(
-            rate, (t[0], t[-1]), x0, "DOP853", dense_output=True, rtol=problem.rtol, atol=problem.rtol
-        )
-    if not run.success or not np.isfinite(run.y).all():
-        raise SimulationError(
-            f"the states diverge at t = {run.t[-1]:g} with the starting values; start from measured data or "
-            "from a trajectory"
-        )
-    return lambda at: np.asarray(np.moveaxis(run.sol(at), 0, -1))
+    fine = np.interp(np.arange(FINER * (len(t) - 1) + 1) / FINER, np.arange(len(t)), t)
+    inputs = {name: np.interp(fine, t, column) for name, column in record.inputs.items()}
+    longer = Record(fine, {}, inputs, None, record.name)
+    x = simulate(model, theta, longer, method=problem.integrator, rtol=problem.rtol, sensitivities=False).x
+    slopes = model.f(fine, x, theta, inputs_of(model, longer))
+    if not np.isfinite(slopes).all():
+        return _straight(fine, x)
+    return CubicHermiteSpline(fine, x, slopes)  # type: ignore[no-any-return]
 
 
 def _straight(t: FloatArray, x: FloatArray) -> Curve:

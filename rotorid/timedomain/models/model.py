@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -45,6 +45,8 @@ class OdeModel:
         f, x(0) and h as expressions, one for each state or output.
     per_record
         Parameters that every one of several records has for itself.
+    t0
+        Time to which the initial values belong, s; "first" or None (not stated): the first of each record.
     """
 
     states: tuple[str, ...]
@@ -59,6 +61,7 @@ class OdeModel:
     initial: tuple[Expression, ...] = field(repr=False)
     observed: tuple[Expression, ...] = field(repr=False)
     per_record: tuple[str, ...] = ()
+    t0: float | str | None = None
 
     def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Rates of the states, (*B, n_x)."""
@@ -196,6 +199,44 @@ class OdeModel:
     def _a_exprs(self) -> list[Any]:
         return _jacobian(self.rates, self._arguments[0])
 
+    @cached_property
+    def fixed_at_first(self) -> list[int]:
+        """Outputs that known initial values fix at the first time: no parameter stands in them there."""
+        put = dict(zip(self._arguments[0], self.initial, strict=True))
+        return [
+            i
+            for i, e in enumerate(self.observed if self.states else ())
+            if not expressions.names(e.subs(put)) & set(self.parameters)
+        ]
+
+    @cached_property
+    def machine(self) -> dict[str, Any]:
+        """Where an integration keeps what it has compiled of this model."""
+        return {}
+
+    @property
+    def rates_alone(self) -> bool:
+        """Whether `rates` are the whole right side."""
+        return True
+
+    @cached_property
+    def with_free_start(self) -> OdeModel:
+        """The model with its initial states as further parameters, behind the others."""
+        import sympy
+
+        names = tuple(f"{name}_at_node" for name in self.states)
+        while set(names) & {*self.parameters, *self.states, *self.inputs}:
+            names = tuple(f"{name}_" for name in names)
+        k = len(names)
+        return replace(
+            self,
+            parameters=(*self.parameters, *names),
+            start=np.concatenate((self.start, np.zeros(k))),
+            bounds=np.vstack((self.bounds, np.tile([-np.inf, np.inf], (k, 1)))),
+            initial=tuple(sympy.Symbol(name) for name in names),
+            t0=None,
+        )
+
     @property
     def _input_symbols(self) -> list[Any]:
         return self._arguments[2][1 + len(self.states) + len(self.parameters) :]
@@ -314,7 +355,7 @@ def ode_model(
         Parameters to be estimated, with starting values.
     initial
         Value of each state at the first time of a record: a number, or an expression of parameters (the name
-        of one: an unknown initial state).
+        of one: an unknown initial state). "t0": the time to which they belong instead, s, or "first".
     outputs
         What is measured; by default the states.
     known
@@ -340,6 +381,9 @@ def ode_model(
     True
     """
     known, initial = dict(known or {}), dict(initial or {})
+    t0 = None if "t0" in states else initial.pop("t0", None)
+    if t0 is not None and t0 != "first" and (isinstance(t0, str) or not np.isfinite(t0)):
+        raise ValueError(f'initial: t0 is the time of the initial values in s, or "first", not {t0!r}')
     if not states and not outputs:
         raise ValueError("a model needs states, or outputs of the time")
     check_names({"state": states, "parameter": estimate, "known value": known, "input": inputs})
@@ -371,4 +415,5 @@ def ode_model(
         observed=tuple(read(e, f"output {name}", everything) for name, e in outputs.items()),
         texts=read.texts,
         per_record=tuple(dict.fromkeys(per_record)),
+        t0=t0,
     )

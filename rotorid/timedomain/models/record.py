@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from rotorid.timedomain.models.model import OdeModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +90,37 @@ class Record:
         if array.ndim == 0:
             return float(array)
         return array
+
+
+def from_t0(model: OdeModel, record: Record) -> Record:
+    """The record with one more time, without samples, where the initial values belong to an earlier one.
+
+    Raises
+    ------
+    ValueError
+        A record that begins before that time, or one with inputs, which are not known there.
+    """
+    if model.t0 is None or isinstance(model.t0, str) or model.t0 == record.t[0] or not model.states:
+        return record
+    if record.t[0] < model.t0:
+        raise ValueError(
+            f"{record.name} begins at t = {record.t[0]:g} s, before t0 = {model.t0:g} s of [initial]"
+        )
+    if model.driven:
+        raise ValueError(
+            f"{record.name} begins at t = {record.t[0]:g} s: its inputs are not known from t0 = "
+            f"{model.t0:g} s on; begin the record there"
+        )
+
+    def longer(column: FloatArray, first: float) -> FloatArray:
+        return np.append(first, column)
+
+    sigma = record.sigma and {
+        name: longer(s, np.nan) if isinstance(s, np.ndarray) else s for name, s in record.sigma.items()
+    }
+    outputs = {name: longer(column, np.nan) for name, column in record.outputs.items()}
+    inputs = {name: longer(column, column[0]) for name, column in record.inputs.items()}
+    return Record(longer(record.t, model.t0), outputs, inputs, sigma, record.name)
 
 
 def _column(value: ArrayLike, what: str) -> FloatArray:

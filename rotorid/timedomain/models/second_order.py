@@ -78,6 +78,11 @@ class SecondOrderModel(OdeModel):
     def _last(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
         return {}
 
+    @property
+    def rates_alone(self) -> bool:
+        """No: E belongs to them."""
+        return False
+
     @cached_property
     def _compiled_augmented(self) -> None:
         """Not written out: E is solved numerically."""
@@ -134,7 +139,7 @@ def second_order(  # noqa: PLR0913
     estimate, known, inputs, bounds, per_record
         As in `ode_model`.
     initial
-        Values of displacements and velocities at the first time; 0 where none is given.
+        Values of displacements and velocities at the first time (or "t0"); 0 where none is given.
     force
         f by displacement: expressions of time, inputs, parameters and states; 0 where none is given.
     outputs

@@ -67,7 +67,7 @@ def test_small_sensitivities_are_seen_on_a_logarithmic_axis():
 
 
 def test_a_single_sample_has_plain_axes_and_words():
-    model = ode_model({"x": "-a*x"}, initial={"x": 3.0}, estimate={"a": 0.5})
+    model = ode_model({"x": "-a*x"}, initial={"x": "2 + sign(a)"}, estimate={"a": 0.5})
     result = fit(model, Record(np.array([2.0]), {"x": np.array([2.0])}))
     axes = drawn(result)
     assert all(a.yaxis.get_offset_text().get_text() == "" for a in axes)
