@@ -91,7 +91,8 @@ def warn_of_value(source: str, key: str, stem: str, value: float) -> None:
 def warn_of_rotor(source: str, rotor: Rotor) -> None:
     """What only the whole rotor shows: its shape, and how its bearings carry it."""
     span, thin = float(rotor.positions[-1]), float(rotor.outer_diameter.min())
-    if span < thin and rotor.density.any():  # a shaft without mass is a model, not a body
+    # a shaft without mass is a model, not a body; a diameter beyond any was asked about already
+    if span < thin <= USUAL["diameter"].high and rotor.density.any():
         _warn(
             f"{source}: the shaft is {span:.4g} m long in all and {thin:.4g} m thick at least; are length "
             "and diameter exchanged?"

@@ -67,7 +67,7 @@ def test_numbers_that_differ_end_with_status_1_and_are_named(cli, some, monkeypa
 
 def test_help_says_what_the_status_means(cli):
     text = " ".join(cli("validate", "--help").out.split())
-    assert "Exit status 0 if no number differs, 1 if one does." in text
+    assert "Exit status 0 if no number differs and no group fails, else 1." in text
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import each_of
+from exact_solutions import exactly, whirl_exactly
 from fem_rotors import rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -88,7 +89,7 @@ def test_a_rotor_that_is_a_few_masses_is_its_own_small_model(rotor, speed):
             assert np.abs(others - value).min() < 1e-8 * abs(value)
     omega = np.array([speed + 40.0])
     W = small.response(omega)
-    full = fem.influence(rotor, nodes, nodes, omega, method="exact").W
+    full = exactly(fem.influence, rotor, nodes, nodes, omega).W
     np.testing.assert_allclose(W, full, rtol=0, atol=1e-8 * np.abs(full).max())
 
 
@@ -117,7 +118,7 @@ def full_machine(**changes):
 def test_whirl_modes_of_bearings_pedestals_and_material_damping(speed):
     rotor = full_machine()
     small = small_rotor(rotor, (4, "wheel"), (30.0, 20.0))
-    mine, whirl = small.eigenvalues(speed), fem.whirl_modes(rotor, speed, 6, method="exact")
+    mine, whirl = small.eigenvalues(speed), whirl_exactly(rotor, speed, 6)
     for value in whirl.eigenvalues:
         assert np.abs(mine - value).min() < 1e-10 * abs(value)
     assert small.nodes == (4, 8)
@@ -131,7 +132,7 @@ def test_static_slopes_make_gyroscopic_terms_right_to_first_order_in_speed():
     still = small_rotor(full_machine(model=fem.Model()), (4, 8), (30.0, 20.0))
 
     def error(model, speed):
-        mine, theirs = model.eigenvalues(speed), fem.whirl_modes(rotor, speed, 4, method="exact").eigenvalues
+        mine, theirs = model.eigenvalues(speed), whirl_exactly(rotor, speed, 4).eigenvalues
         return np.array([np.abs(mine - value).min() / abs(value) for value in theirs])
 
     slow, fast = error(small, 60.0), error(small, 120.0)

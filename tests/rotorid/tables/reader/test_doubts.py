@@ -132,8 +132,8 @@ def test_sizes_that_no_instrument_shows(tmp_path, files, value):
     [
         ("length_m", 1000, "row 2, column length_m: 1000 means 1000 m; is this in mm?"),
         ("diameter_m", 110, "column diameter_m: 110 means 110 m; is this in mm?"),
-        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in another unit?"),
-        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in another unit?"),
+        ("youngs_modulus_Pa", 210, "column youngs_modulus_Pa: 210 means 210 Pa; is this in GPa?"),
+        ("density_kg_per_m3", 7.8, "column density_kg_per_m3: 7.8 means 7.8 kg/m³; is this in g/cm³?"),
     ],
 )
 def test_millimetres_taken_for_metres_are_asked_about(tmp_path, column, value, words):

@@ -10,6 +10,7 @@ import itertools
 
 import numpy as np
 import pytest
+from exact_solutions import exactly
 from fem_rotors import rotor23
 from tables_data import write_csv
 from whirl_rotors import machine
@@ -72,7 +73,7 @@ def motion(rotor):
         total = {
             node: UNBALANCE[name] + radius * weights.get(name, 0) for name, (node, radius) in PLANES.items()
         }
-        response = fem.unbalance_response(rotor, total, np.array(SPEEDS_RPM) * np.pi / 30, method="exact")
+        response = exactly(fem.unbalance_response, rotor, total, np.array(SPEEDS_RPM) * np.pi / 30)
         along = [[response.at((node, angle)) for angle in (0.0, 90.0)] for node in NODES.values()]
         out[run] = np.moveaxis(np.array(along), 2, 0)
     return out
