@@ -100,6 +100,18 @@ def test_stable_is_said():
     assert "stable from 0 to 1000" in found.summary()
 
 
+def test_the_margin_is_the_least_decrement_of_the_range():
+    """Internal damping takes away from the forward whirl, the more the faster the rotor runs."""
+    material = 1e-4
+    rotor = jeffcott(fem.Support(2, 0.0, 5 * material * STIFFNESS), material=material)
+    found = fem.stability_threshold(rotor, 4 * CRITICAL)  # the threshold lies at 6 times
+    last = whirl_exactly(rotor, 4 * CRITICAL, 2).eigenvalues
+    expected = (-2 * np.pi * last.real / np.abs(last.imag)).min()
+    assert found.status == "stable"
+    assert found.margin == pytest.approx(expected, rel=1e-6)
+    assert found.margin < 0.6 * fem.stability_threshold(rotor, CRITICAL).margin
+
+
 def test_undamped_is_not_unstable():
     assert fem.stability_threshold(rotor23(), 1000.0).status == "stable"
 

@@ -101,6 +101,10 @@ def test_the_bound_is_the_optimum_where_the_dual_vector_is_the_best_one():
     whole = problem([[1.0], [1.0]], [3.0, 5.0], minmax=True)
     bound = lower_bound(whole, np.array([-0.5, 0.5 + 0j]), np.zeros(2, dtype=complex))
     assert bound.value == pytest.approx(1.0, rel=1e-14)
+    # whatever its size: each reading has half of the maximum
+    larger = lower_bound(whole, 3 * np.array([-0.5, 0.5 + 0j]), np.zeros(2, dtype=complex))
+    assert larger.value == pytest.approx(1.0, rel=1e-14)
+    assert larger.residual_prices.tolist() == pytest.approx([0.5, 0.5])
     # a dual vector that is not feasible is corrected, not believed
     wrong = lower_bound(whole, np.array([-0.4, 0.6 + 0j]), np.zeros(2, dtype=complex))
     assert wrong.value == pytest.approx(1.0, rel=1e-3)

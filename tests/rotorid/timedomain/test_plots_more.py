@@ -26,6 +26,10 @@ def drawn(result):
     return figure.axes
 
 
+def sensitivity(axes):
+    return next(a for a in axes if a.get_title().startswith("sensitivity"))
+
+
 def test_outputs_of_very_different_size_are_drawn_over_their_largest_value():
     rates = {"x": "-a*x", "z": "-b*z"}
     model = ode_model(rates, initial={"x": 300.0, "z": 1.2e-4}, estimate={"a": 0.8, "b": 0.5})
@@ -34,6 +38,7 @@ def test_outputs_of_very_different_size_are_drawn_over_their_largest_value():
     axes = drawn(fit(model, record, weigh=True))
     assert axes[0].get_ylabel() == "output / largest value"
     assert words(axes[0])[1].startswith("z (1.2e-04")
+    assert sensitivity(axes).get_ylabel() == "change of outputs / largest value\n(root sum of squares)"
     points = [line.get_ydata() for line in axes[0].lines[::2]]
     assert [max(abs(y)) for y in points] == pytest.approx([1, 1])
     assert "own rms" in axes[1].get_ylabel()
@@ -49,6 +54,7 @@ def test_the_legend_names_the_records_by_mark_and_line():
     ]
     axes = drawn(fit(model, records))
     assert sorted(words(axes[0])) == ["run_1.0.csv", "run_2.0.csv", "x"]
+    assert sensitivity(axes).get_ylabel() == "change of outputs\n(root sum of squares)"
     keys = axes[0].get_legend().legend_handles
     lines = axes[0].lines
     assert [key.get_marker() for key in keys] == [lines[0].get_marker(), lines[2].get_marker()]
