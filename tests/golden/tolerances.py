@@ -41,6 +41,7 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("identify-task_8_2", "residual*", "as many equations as unknowns: " + _EXACT, absolute=1e-12),
     Tolerance("fit-quasi*", "parameters.*.std", _EXACT, absolute=1e-13),
     Tolerance("fit-quasi*", "residual_rms", _EXACT, absolute=1e-12),
+    Tolerance("fit-quasi*", "residual rms *", _EXACT, absolute=1e-12),
     Tolerance("fit-quasi-method", "rotorid: *", _EXACT, absolute=1e-12),
     Tolerance("fit-quasi-method", "theta*", _EXACT, absolute=1e-12),
     Tolerance("fit-*", "integration_change.*", "the difference of two integrations", absolute=1e-12),
