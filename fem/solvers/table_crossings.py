@@ -63,11 +63,14 @@ class TableSearch:
         self.rotor, self.A = rotor, A
         self.top = 1.01 * min(s.speeds[-1] for s in rotor.supports if s.speeds) ** 2
         self.known: dict[float, tuple[int, Found]] = {}
+        self.listed = 1  # modes up to the end of the tables, as far as is known
 
     def solve(self, rotor: Rotor, speed: float, n: int = 1) -> Found:
         """Modes on other supports up to the end of the tables, n at least."""
         A = self.A if rotor is self.rotor else assemble(rotor)
-        return positive_modes(whole_rotor(rotor, A, speed), n, self.top)
+        found = positive_modes(whole_rotor(rotor, A, speed), max(n, self.listed), self.top)
+        self.listed = max(1, int((found.squares <= self.top).sum()) + 1)
+        return found
 
     def at(self, speed: float, n: int = 1) -> Found:
         """Modes at a speed up to the end of the tables, n at least if the model has so many."""
