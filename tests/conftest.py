@@ -71,6 +71,10 @@ SLOW_FIRST = (
     "rotorid/report/test_balance.py",
     "rotorid/harmonic/test_coverage.py",
     "balancing/correction/test_coverage.py",
+    "balancing/correction/test_check.py",
+    "rotorid/report/test_rotor.py",
+    "fem/matrices/test_lateral_planes.py",
+    "fuzz/test_mutants.py",
     "balancing/mounting/test_discrete.py",
     "fem/test_campbell.py",
 )

@@ -66,7 +66,7 @@ def test_errors_twice_as_large_as_stated(example):
     found = example.simulate(n // 3, "stated, spare runs", "independent", told=2.0)
     said = [bool(one.words) for one in found if one.inside is not None and one.redundant >= 8]
     assert np.mean(said) >= lowest_share(len(said), 0.95)
-    inside = silent(example.simulate(n, "stated", "common to a run", told=2.0))
+    inside = silent(example.simulate(n // 2, "stated", "common to a run", told=2.0))
     assert np.mean(inside) < lowest_share(len(inside), 0.93)
 
 
