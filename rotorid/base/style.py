@@ -12,6 +12,7 @@ from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe and Ito: told apart by every eye.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -27,6 +28,15 @@ def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
 
     _, ax = plt.subplots(figsize=size, layout="constrained")
     return ax
+
+
+def on_figure(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Figure:
+    """A new figure, size in inches, with what a function draws on its axes; it needs no screen."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    draw(figure.add_subplot())
+    return figure
 
 
 def legend_above(ax: Axes, columns: int = 3, marker_scale: float = 1.0) -> None:

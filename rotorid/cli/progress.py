@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rotorid.cli.suggest import dumb
-from rotorid.cli.verbose import span
 
 PATIENCE = 1.0
 """Seconds without a sign, on a terminal."""
@@ -64,7 +63,6 @@ def steps(what: str, total: int | None = None) -> Iterator[Advance]:
     finally:
         done.set()
         thread.join()
-        span(what, time.perf_counter() - count.begun)
 
 
 class _Count:

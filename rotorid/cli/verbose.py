@@ -1,21 +1,18 @@
-"""`--verbose`: the numbers behind a result, on standard error, so that `--json` stays one document."""
+"""`--verbose`: what is logged about a result, on standard error, so that `--json` stays one document."""
 
 from __future__ import annotations
 
 import functools
 import inspect
+import logging
 import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextvars import ContextVar
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from contextlib import contextmanager
+from typing import Annotated, Any, get_type_hints
 
 import typer
-
-if TYPE_CHECKING:
-    from fem import Rotor
 
 VerboseOption = Annotated[
     bool,
@@ -69,22 +66,23 @@ SHOWN = (
 """Keys of the JSON documents that say how a result came about, at any depth."""
 MOST = 12
 """So many numbers of a list are printed."""
+log = logging.getLogger("rotorid.workflows")
 
 
-@dataclass
-class Notes:
-    """What a command that runs with `--verbose` has said so far."""
+class _Kept(logging.Handler):
+    """Messages for after the result."""
 
-    begun: float
-    numbers: dict[str, str] = field(default_factory=dict)
-    spans: list[tuple[str, float]] = field(default_factory=list)
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: list[str] = []
 
-
-_NOTES: ContextVar[Notes | None] = ContextVar("notes", default=None)
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep one."""
+        self.lines.append(record.getMessage())
 
 
 def verbosely(command: Callable[..., None]) -> Callable[..., None]:
-    """The same command with an option `--verbose`; what was noted is printed after its result."""
+    """The same command with an option `--verbose`; what was logged is printed after its result."""
 
     @functools.wraps(command)
     def wrapper(*args: Any, verbose: bool = False, **kwargs: Any) -> None:  # noqa: ANN401 - any command
@@ -97,22 +95,10 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
                 raise ValueError(f"--{name} takes a number up to {LARGEST_STATED:g} in size, not {value:g}")
         with each_file_once():
             if verbose:
-                with_notes(*args, **kwargs)
+                with _told():
+                    command(*args, **kwargs)
             else:
                 command(*args, **kwargs)
-
-    def with_notes(*args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - any command
-        notes = Notes(time.perf_counter())
-        token = _NOTES.set(notes)
-        try:
-            command(*args, **kwargs)
-        except typer.Exit:  # an exit status is a result, too
-            _tell(notes)
-            raise
-        else:
-            _tell(notes)
-        finally:
-            _NOTES.reset(token)
 
     hints = {**get_type_hints(command, include_extras=True), "verbose": VerboseOption}
     signature = inspect.signature(command)
@@ -125,40 +111,49 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
     return wrapper
 
 
+@contextmanager
+def _told() -> Iterator[None]:
+    """Print what is logged meanwhile after the result, also where both go to one file; times come last."""
+    begun, kept, level = time.perf_counter(), _Kept(), log.level
+    log.addHandler(kept)
+    log.setLevel(logging.INFO)
+    exits = None
+    try:
+        try:
+            yield
+        except typer.Exit as status:  # an exit status is a result, too
+            exits = status
+    finally:
+        log.removeHandler(kept)
+        log.setLevel(level)
+    lines = sorted(dict.fromkeys(kept.lines), key=lambda line: line.startswith("time: "))
+    lines.append(f"time: all {time.perf_counter() - begun:.3f} s")
+    lines.append("versions: " + ", ".join(f"{name} {number}" for name, number in versions().items()))
+    sys.stdout.flush()
+    for line in lines:
+        print(f"rotorid: {line}", file=sys.stderr)
+    if exits is not None:
+        raise exits
+
+
 def note(document: Mapping[str, Any]) -> None:
-    """Keep what a result's document, or a few numbers under names of `SHOWN`, tell; nothing if not asked for.
+    """Log what a result's document, or a few numbers under names of `SHOWN`, tell.
 
     Parameters
     ----------
     document
         As printed by `--json`, or any mapping with such keys; of lists of tables only `history` is looked at.
     """
-    notes = _NOTES.get()
-    if notes is not None:
-        notes.numbers |= dict(_numbers(document))
+    if log.isEnabledFor(logging.INFO):
+        for name, value in _numbers(document):
+            log.info("%s = %s", name, value)
 
 
-def note_rotor(rotor: Rotor, **more: object) -> None:
-    """Keep how large the model of a rotor is, and `more` numbers under names of `SHOWN`."""
-    if _NOTES.get() is None:
-        return
-    stride = 4 if rotor.model.shear else 2
-    note(
-        {
-            "elements": rotor.n_elements,
-            "unknowns_per_plane": 2 * rotor.n_nodes + (stride - 2) * rotor.n_elements,
-            "discs": len(rotor.discs),
-            "supports": len(rotor.supports),
-            **more,
-        }
-    )
+def note_rotor(rotor: Any, **more: object) -> None:  # noqa: ANN401 - until every command has its workflow
+    """As `rotorid.workflows.outcome.log_rotor`."""
+    from rotorid.workflows.outcome import log_rotor
 
-
-def span(what: str, seconds: float) -> None:
-    """Keep how long a part of the work took; nothing if not asked for."""
-    notes = _NOTES.get()
-    if notes is not None:
-        notes.spans.append((what, seconds))
+    log_rotor(rotor, **more)
 
 
 def _numbers(document: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
@@ -183,20 +178,6 @@ def _plain(value: object) -> str:
         more = f", … ({len(value)} in all)" if len(value) > MOST else ""
         return ", ".join(_plain(item) for item in value[:MOST]) + more
     return str(value)
-
-
-def _tell(notes: Notes) -> None:
-    """Print after the result, also where both end in one file."""
-    sys.stdout.flush()
-    for line in _report(notes):
-        print(f"rotorid: {line}", file=sys.stderr)
-
-
-def _report(notes: Notes) -> list[str]:
-    lines = [f"{name} = {value}" for name, value in notes.numbers.items()]
-    lines += [f"time: {what} {seconds:.3f} s" for what, seconds in notes.spans]
-    lines.append(f"time: all {time.perf_counter() - notes.begun:.3f} s")
-    return [*lines, "versions: " + ", ".join(f"{name} {number}" for name, number in versions().items())]
 
 
 def versions() -> dict[str, str]:

@@ -13,9 +13,13 @@ from rotorid.cli.common import (
     OutputOption,
     PlotOption,
     ReportOption,
+    emit,
+)
+from rotorid.cli.output import (
     check_inputs,
     check_targets,
-    emit,
+)
+from rotorid.workflows.parameters import (
     names,
     speeds,
 )

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rotorid.cli.common import check_targets, provenance
+from rotorid.cli.common import provenance
+from rotorid.cli.output import check_targets
 
 if TYPE_CHECKING:
     from rotorid.cli.commands.balance_report import Report

@@ -12,15 +12,19 @@ from rotorid.cli.common import (
     OutputOption,
     PlotOption,
     RotorArgument,
-    band,
-    check_targets,
     emit,
-    rising_speeds,
+)
+from rotorid.cli.output import check_targets
+from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note_rotor
+from rotorid.workflows.operating import (
     separation,
     separation_text,
 )
-from rotorid.cli.progress import busy
-from rotorid.cli.verbose import note_rotor
+from rotorid.workflows.parameters import (
+    band,
+    rising_speeds,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

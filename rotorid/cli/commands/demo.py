@@ -12,8 +12,12 @@ from typing import Annotated, Any
 import typer
 
 from rotorid.base.suggestions import did_you_mean
-from rotorid.cli.common import JsonOption, json_text, provenance
+from rotorid.cli.common import (
+    JsonOption,
+    provenance,
+)
 from rotorid.cli.demo_samples import SAMPLES, Sample
+from rotorid.cli.output import json_text
 
 COPIED = (".csv", ".toml", ".md", ".txt")
 

@@ -11,7 +11,13 @@ import typer
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note
 

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotorid.base.json import finite
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note
 

@@ -11,14 +11,16 @@ from rotorid.cli.common import (
     OutputOption,
     PlotOption,
     RotorArgument,
-    check_targets,
     emit,
+)
+from rotorid.cli.output import check_targets
+from rotorid.cli.progress import busy
+from rotorid.cli.verbose import note_rotor
+from rotorid.workflows.parameters import (
     nodes,
     rising_speeds,
 )
-from rotorid.cli.common import sensors as parse_sensors
-from rotorid.cli.progress import busy
-from rotorid.cli.verbose import note_rotor
+from rotorid.workflows.parameters import sensors as parse_sensors
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

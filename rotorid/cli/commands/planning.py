@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rotorid.cli.common import speeds
+from rotorid.workflows.parameters import speeds
 
 if TYPE_CHECKING:
     from rotorid.harmonic.design import Design

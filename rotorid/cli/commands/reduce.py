@@ -13,13 +13,15 @@ from rotorid.cli.common import (
     OutputOption,
     PlotOption,
     ReportOption,
-    check_targets,
     emit,
+)
+from rotorid.cli.output import check_targets
+from rotorid.cli.verbose import note
+from rotorid.workflows.parameters import nodes as parse_nodes
+from rotorid.workflows.parameters import (
     one_speed,
     rising_speeds,
 )
-from rotorid.cli.common import nodes as parse_nodes
-from rotorid.cli.verbose import note
 
 
 class Place(StrEnum):

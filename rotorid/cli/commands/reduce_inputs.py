@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.cli.common import band
-from rotorid.cli.common import nodes as parse_nodes
+from rotorid.workflows.parameters import band
+from rotorid.workflows.parameters import nodes as parse_nodes
 
 if TYPE_CHECKING:
     import fem

@@ -20,16 +20,18 @@ from rotorid.cli.common import (
     PlotOption,
     ReportOption,
     RotorArgument,
-    band,
-    check_targets,
     emit,
-    one_speed,
     picture,
-    rising_speeds,
 )
-from rotorid.cli.common import sensors as parse_sensors
+from rotorid.cli.output import check_targets
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note_rotor
+from rotorid.workflows.parameters import (
+    band,
+    one_speed,
+    rising_speeds,
+)
+from rotorid.workflows.parameters import sensors as parse_sensors
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,13 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
 
 _WAYS = ("--holes", "--two", "--drill", "--grind")
 _HOLES, _DRILL, _ROUND = ("--holes",), ("--drill",), ()

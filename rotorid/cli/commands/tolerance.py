@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, one_speed
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
+from rotorid.workflows.parameters import one_speed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotorid.cli.commands.tolerance import quantity, speed_with_unit
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, names
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
 from rotorid.cli.verbose import note
+from rotorid.workflows.parameters import names
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,8 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, check_targets, emit, picture
-from rotorid.cli.common import nodes as parse_nodes
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    emit,
+    picture,
+)
+from rotorid.cli.output import check_targets
+from rotorid.workflows.parameters import nodes as parse_nodes
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance

@@ -6,7 +6,12 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, check_targets, emit
+from rotorid.cli.common import (
+    JsonOption,
+    OutputOption,
+    emit,
+)
+from rotorid.cli.output import check_targets
 from rotorid.cli.progress import busy
 
 

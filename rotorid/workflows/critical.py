@@ -1,0 +1,172 @@
+"""`critical`: critical speeds with their whirl directions, and mode shapes, of a rotor without damping."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.workflows.operating import separation, separation_text
+from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.parameters import Band, band
+from rotorid.workflows.sources import rotor_source
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import MeshCheck, Modes, Rotor, SpeedMap
+
+
+@dataclass(frozen=True)
+class CriticalOptions:
+    """Options of `critical`.
+
+    Attributes
+    ----------
+    number
+        How many critical speeds; rigid-body motions come besides.
+    mesh_check
+        Estimate by refinement how far off the mesh makes each.
+    speed_map
+        Critical speeds over the stiffness of the bearings, too.
+    operating
+        Operating speeds, "5300:6500rpm" or rad/s.
+    """
+
+    number: int = 3
+    mesh_check: bool = False
+    speed_map: bool = False
+    operating: Band | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CriticalSpeeds(Outcome):
+    """Modes, and what was asked for beside them."""
+
+    modes: Modes
+    mesh: MeshCheck | None
+    chart: SpeedMap | None
+    operating: tuple[float, float] | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        document: dict[str, Any] = self.modes.to_dict()
+        if self.operating is not None:
+            document["operating"] = self._separation(self.operating)
+        parts = {"mesh_check": self.mesh, "map": self.chart}
+        return document | {key: part.to_dict() for key, part in parts.items() if part is not None}
+
+    def summary(self) -> str:
+        """For the terminal."""
+        blocks = [self.modes.summary()]
+        if self.operating is not None:
+            blocks.append(separation_text(self._separation(self.operating)))
+        return "\n\n".join([*blocks, *(part.summary() for part in (self.mesh, self.chart) if part)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """The modes, or the map."""
+        return self.modes.to_frame() if self.chart is None else self.chart.to_frame()
+
+    def figure(self) -> Figure:
+        """The mode shapes, or the map."""
+        from fem.plots import draw_modes, draw_speed_map
+        from rotorid.base.style import on_figure
+
+        if self.chart is None:
+            return on_figure(lambda ax: draw_modes(self.modes, ax), 10.0, 5.0)
+        chart = self.chart
+        return on_figure(
+            lambda ax: draw_speed_map(
+                chart.stiffness, chart.speeds, ax, supports=chart.own, operating=self.operating
+            ),
+            10.0,
+            6.0,
+        )
+
+    def sheet(self) -> bytes:
+        """To print: one HTML file."""
+        from rotorid.report.rotor import critical_report
+
+        return critical_report(
+            self.to_dict(),
+            self.modes,
+            provenance=self.provenance,
+            chart=self.chart,
+            operating=self.operating,
+        )
+
+    def _separation(self, operating: tuple[float, float]) -> dict[str, Any]:
+        return separation(self.modes.frequencies.tolist(), operating)
+
+
+@workflow
+def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) -> CriticalSpeeds:
+    """Compute critical speeds with their whirl directions, and mode shapes, of the rotor without damping.
+
+    Parameters
+    ----------
+    rotor
+        A rotor, a rotor table or a rotor file.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a rotor or an option that cannot be.
+    """
+    import fem
+
+    options = options or CriticalOptions()
+    operating = band(options.operating)
+    model, files = rotor_source(rotor)
+    with phase("critical speeds"):
+        modes = fem.critical_speeds(model, options.number)
+        mesh = fem.mesh_check(model, options.number) if options.mesh_check else None
+        chart, left_out = _map(model, options.number) if options.speed_map else (None, [])
+    log_rotor(model)
+    return CriticalSpeeds(
+        modes=dataclasses.replace(modes, warnings=(*modes.warnings, *left_out)),
+        mesh=mesh,
+        chart=chart,
+        operating=operating,
+        provenance=provenance(files, options),
+    )
+
+
+def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
+    """The map of the bearings, two decades around the stiffness they have, and what it leaves out.
+
+    What a seal adds is not known when the stiffness of the bearings is chosen: seals are left out.
+    """
+    import numpy as np
+
+    import fem
+
+    bearings = [support for support in model.supports if support.kind == "bearing"]
+    own = np.concatenate(
+        [np.zeros(1), *(b.at(b.speeds or 0.0)[0][..., [0, 1], [0, 1]].ravel() for b in bearings)]
+    )
+    own = own[own > 0]
+    stiffness = np.geomspace(own.min() / 100, own.max() * 100, 49) if own.size else None
+    chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
+    met = {item.support for item in chart.intersections}
+    said = []
+    for i, support in enumerate(model.supports, start=1):
+        name = repr(support.name) if support.name else f"{i} at node {support.node}"
+        if support.kind == "seal":
+            said.append(f"map: seal {name} is left out, its stiffness is that of no bearing")
+        elif support.pedestal is not None:
+            said.append(
+                f"map: bearing {name} stands on the ground there; of its pedestal the stiffness counts in "
+                "the bearing's own line, mass and damping are left out"
+            )
+    for i, bearing in enumerate(bearings, start=1):
+        if (bearing.name or f"support {i}") not in met:
+            said.append(
+                f"map: no critical speed meets the stiffness of bearing {bearing.name or i!r}: it has "
+                "none, or its table ends before"
+            )
+    return chart, said

@@ -1,0 +1,132 @@
+"""What every workflow gives: a document with its provenance, a text, a table; and how its work is told."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import logging
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+log = logging.getLogger("rotorid.workflows")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome(ABC):
+    """What a workflow gives.
+
+    Attributes
+    ----------
+    provenance
+        Program version, input files with their hashes, date, and every option that differs from its default.
+    """
+
+    provenance: Mapping[str, Any]
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """For the terminal."""
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """The main table."""
+
+    def figure(self) -> Figure:
+        """The main picture."""
+        raise ValueError(f"there is no picture of a {type(self).__name__.lower()}")
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        raise ValueError(f"there is no sheet of a {type(self).__name__.lower()}")
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {**self.to_dict(), "provenance": dict(self.provenance)}
+
+
+def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """While it works each file is read once, so that its hash is that of what was read."""
+
+    @functools.wraps(function)
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        from rotorid.tables.reader.input_file import each_file_once
+
+        with each_file_once():
+            return function(*args, **kwargs)
+
+    return wrapper
+
+
+def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: ANN401 - any options dataclass
+    """Program version, input files with their hashes, date, and options that differ from their defaults.
+
+    Raises
+    ------
+    ValueError
+        For an option that is a number beyond all sizes.
+    """
+    from rotorid import __version__
+    from rotorid.tables.reader.input_file import file_content
+
+    return {
+        "program": "rotorid",
+        "version": __version__,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
+        "options": {
+            field.name: _plain(getattr(options, field.name))
+            for field in dataclasses.fields(options)
+            if getattr(options, field.name) != field.default
+        },
+    }
+
+
+def _plain(value: object) -> object:
+    """An option as JSON has it."""
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, str | int | float) or value is None:
+        return value
+    return [_plain(item) for item in value] if isinstance(value, Iterable) else str(value)
+
+
+@contextmanager
+def phase(what: str) -> Iterator[None]:
+    """Log how long a part of the work takes."""
+    begun = time.perf_counter()
+    yield
+    log.info("time: %s %.3f s", what, time.perf_counter() - begun)
+
+
+def log_rotor(rotor: Rotor, **more: object) -> None:
+    """Log how large the model of a rotor is, and more numbers."""
+    stride = 4 if rotor.model.shear else 2
+    sizes: dict[str, object] = {
+        "elements": rotor.n_elements,
+        "unknowns_per_plane": 2 * rotor.n_nodes + (stride - 2) * rotor.n_elements,
+        "discs": len(rotor.discs),
+        "supports": len(rotor.supports),
+    }
+    for name, value in (sizes | more).items():
+        log.info("%s = %s", name, f"{value:.6g}" if isinstance(value, float) else value)
