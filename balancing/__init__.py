@@ -4,8 +4,10 @@ from balancing.coefficients.combine import combine
 from balancing.coefficients.from_model import modal_shapes, model_influence
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
-from balancing.correction.check import CheckComparison, compare_check
-from balancing.correction.correct import Correction, correct
+from balancing.correction.check import compare_check
+from balancing.correction.check_result import CheckComparison
+from balancing.correction.correct import correct
+from balancing.correction.correction_result import Correction
 from balancing.correction.history import History, history
 from balancing.correction.refine import Trim, refine, trim
 from balancing.correction.subsets import Subsets, best_subsets
@@ -17,7 +19,8 @@ from balancing.data.trials import ReadingErrors, Trials
 from balancing.iso21940 import Tolerance, tolerance
 from balancing.mounting.discrete import Discrete, solve_discrete
 from balancing.mounting.holes import Holes, equal_holes, from_list
-from balancing.mounting.mounted import Mounted, mount
+from balancing.mounting.mounted import mount
+from balancing.mounting.mounted_result import Mounted
 from balancing.mounting.removal import Drill, drill_holes
 from balancing.mounting.split import Split, split
 from balancing.solvers.conditioning import Conditioning, conditioning

@@ -26,7 +26,6 @@ from rotorid.base.units import rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 GRADES = (0.4, 1.0, 2.5, 6.3, 16.0, 40.0, 100.0, 250.0, 630.0, 1600.0, 4000.0)
@@ -167,12 +166,6 @@ class Tolerance:
             where = "" if math.isnan(z) else f"at {z:.6g} mm"
             lines.append(f"{place:24} {where:>16} {limit:14.4g} g·mm")
         return "\n".join([*lines, "", wrap(self.rule)])
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Polar picture with the tolerance circles of the planes, in g·mm."""
-        from balancing.plots.tolerances import tolerance_circles
-
-        return tolerance_circles(self, ax)
 
 
 def parse_grade(text: str | float) -> float:

@@ -15,7 +15,6 @@ from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,18 +131,6 @@ class TrialWeight:
             then = f"{row['after']:.4g} @ {row['after_phase_deg']:.0f}°"
             lines.append(f"{name:24} {now:>18} {then:>18} {row['change']:10.4g}")
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Polar picture of the plane: the weight, and how far its best angle may be away.
-
-        Raises
-        ------
-        ValueError
-            Without an angle.
-        """
-        from balancing.plots.tolerances import trial_arrow
-
-        return trial_arrow(self, ax)
 
     def _expected(self) -> list[dict[str, Any]] | None:
         if self.speeds is None or self.before is None or self.expected is None:

@@ -9,11 +9,9 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.style import BLUE
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 DETERMINED = 0.05
@@ -180,32 +178,6 @@ class Unbalance:
             size = f"{row['unbalance']:>12.5g} {row['angle_deg']:>7.1f}°"
             lines.append(f"{row['station']:<{width}} {size} {std:>10}  {sure}")
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the size of the unbalance at each station: filled, ± 1.96 std, where determined; else open.
-
-        Parameters
-        ----------
-        ax
-            None: those of a new figure.
-        """
-        from matplotlib.figure import Figure
-
-        if ax is None:
-            ax = Figure(figsize=(7.0, 3.6), layout="constrained").add_subplot()
-        size, x, sure = self.labels.weight(self.unbalance)[0], np.arange(len(self.stations)), self.determined
-        for those, colour, label in ((sure, BLUE, "determined"), (~sure, "none", "not determined")):
-            if those.any():
-                ax.bar(x[those], size[those], 0.7, color=colour, edgecolor=BLUE, label=label)
-        if self.std is not None and sure.any():
-            error = 1.96 * self.std[sure] * self.labels.weight_scale
-            ax.errorbar(x[sure], size[sure], yerr=error, fmt="none", ecolor="black", capsize=2, lw=1.2)
-        ax.set_xticks(x, self.stations, rotation=0 if len(x) < 12 else 90)
-        ax.set_xlabel("station")
-        ax.set_ylabel(f"unbalance, {self.labels.weight_unit}")
-        ax.set_title(f"Unbalance of a single run, {self.method}")
-        ax.legend(frameon=False)
-        return ax
 
 
 def _percent(share: float) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 import balancing
 from rotorid import read_job
+from rotorid.plots import plot
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "turbo_job"
 
@@ -42,7 +43,7 @@ def main(picture: str | None = None) -> dict[str, float]:
         print(f"  {plane:7} {1e6 * abs(weight):6.2f} g·mm at {np.angle(weight, deg=True) % 360:5.1f}°")
 
     if picture is not None:
-        correction.plot().figure.savefig(picture)
+        plot(correction).figure.savefig(picture)
     return {
         "left_g_mm": 1e6 * float(abs(correction.weights[0])),
         "left_deg": float(np.angle(correction.weights[0], deg=True)),

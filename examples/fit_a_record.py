@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from rotorid import fit, read_ode_model, read_record
+from rotorid.plots import plot
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "fit" / "run_down"
 TRUTH = {"d_x7": 900.0, "d_x12": 1600.0, "d_x18": 1300.0, "m_x12": 196.617, "blow": 0.05}
@@ -33,7 +34,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     print(f"\nGauss–Newton: {other.message}, residual rms {other.residual_rms:.6g}")
 
     if picture is not None:
-        found.plot().figure.savefig(picture)
+        plot(found).figure.savefig(picture)
     values = dict(zip(found.parameters, map(float, found.values), strict=True))
     return {
         **values,

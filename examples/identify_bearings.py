@@ -12,6 +12,7 @@ import numpy as np
 from rotorid import harmonic_model, identify
 from rotorid.harmonic import AmplitudeErrors
 from rotorid.harmonic.experiments import Experiments, experiments
+from rotorid.plots import plot
 
 EQUATIONS = (
     "(m*p**2 + bxx*p + kxx)*X + (bxy*p + kxy)*Y = FX",
@@ -56,7 +57,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     print("one direction only:", one.summary(), sep="\n")
 
     if picture is not None:
-        found.plot().figure.savefig(picture)
+        plot(found).figure.savefig(picture)
     assert found.std is not None
     assert one.std is not None
     return {

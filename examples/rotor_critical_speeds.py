@@ -12,6 +12,7 @@ import numpy as np
 
 import fem
 from rotorid import read_rotor, read_unbalance
+from rotorid.plots import plot
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "compressor"
 RPM = np.pi / 30
@@ -41,7 +42,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     print(stability.summary())
 
     if picture is not None:
-        campbell.plot().figure.savefig(picture)
+        plot(campbell).figure.savefig(picture)
     first = peaks.peaks[0]
     assert first.amplification is not None
     return {

@@ -26,7 +26,6 @@ from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 HEAVY = 1.28  # log decrement at an amplification factor of 2.5: critically damped after API 684
 _ROUNDS = 4  # of looking for crossings between the speeds
@@ -179,12 +178,6 @@ class Campbell:
         if self.cut:
             lines.append(self.cut)
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the frequencies over speed with the 1× line and the critical speeds; return the axes."""
-        from fem.plots.campbell_diagram import draw_campbell
-
-        return draw_campbell(self, ax, criticals=self.criticals)
 
     def _criticals(self) -> list[tuple[float, int, float, float]]:
         return list(

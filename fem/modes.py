@@ -13,7 +13,6 @@ from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +98,3 @@ class Modes:
             )
         lines += [self.cut] if self.cut else []
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the mode shapes over the rotor with its supports and masses; return the axes."""
-        from fem.plots import draw_modes
-
-        return draw_modes(self, ax)

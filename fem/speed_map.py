@@ -18,7 +18,6 @@ from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 _Criticals = Callable[[float], FloatArray]  # critical speeds for a stiffness
 _DECADES = 4  # of the default range, to both sides of the shaft's own stiffness
@@ -122,12 +121,6 @@ class SpeedMap:
             for item in self.intersections
         ]
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw critical speeds and the supports' own stiffness, both axes logarithmic; return the axes."""
-        from fem.plots.critical_map import draw_speed_map
-
-        return draw_speed_map(self.stiffness, self.speeds, ax, supports=self.own)
 
 
 def speed_map(

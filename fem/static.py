@@ -16,7 +16,6 @@ from rotorid.base.checks import number
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 GRAVITY = 9.80665  # m/s²
 
@@ -90,20 +89,6 @@ class StaticDeflection:
         for support, x, y in zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True):
             lines.append(f"{support.name or f'node {support.node}':>16}{x:16.6g}{y:12.6g}")
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the deflection in x and y along the rotor; return the axes."""
-        from matplotlib import pyplot as plt
-
-        if ax is None:
-            _, ax = plt.subplots(figsize=(10, 4), layout="constrained")
-        for name, values in (("x", self.x), ("y", self.y)):
-            if np.abs(values).max() > 1e-9 * self.deflection.max():
-                ax.plot(self.rotor.positions, 1e6 * values, marker=".", label=name)
-        ax.set(xlabel="position, m", ylabel="static deflection, µm")
-        ax.grid(alpha=0.3)
-        ax.legend(frameon=False)
-        return ax
 
 
 def static_deflection(

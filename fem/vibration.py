@@ -16,7 +16,6 @@ from rotorid.base.units import phase_deg, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +166,6 @@ class Response:
         ]
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
-    def plot(self, ax: Axes | None = None, nodes: Sequence[str | int] | None = None) -> Axes:
-        """Draw amplitude over speed at some nodes; by default stations or supports, and the largest."""
-        from fem.plots import draw_response
-
-        return draw_response(self, ax, nodes)
-
 
 @dataclass(frozen=True, eq=False)
 class BearingForces:
@@ -318,12 +311,6 @@ class InfluenceCoefficients:
                     line += f"{size[0]:14.4g}{phase_degrees(self.W[:, c, p])[0]:17.2f}"
                 lines.append(line)
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the size of each influence coefficient over speed; return the axes."""
-        from fem.plots import draw_influence
-
-        return draw_influence(self, ax)
 
 
 def largest_at(size: FloatArray, steady: BoolArray) -> int | None:

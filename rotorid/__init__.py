@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model
     from rotorid.harmonic import identify as identify
+    from rotorid.plots import plot as plot
     from rotorid.reduction import InputErrors as InputErrors
     from rotorid.reduction import Reduction as Reduction
     from rotorid.reduction import compare_methods as compare_methods
@@ -84,6 +85,8 @@ _HOME = {
     "equivalent_masses": "reduction",
     "natural_frequencies": "reduction",
     "mac": "reduction",
+    # pictures
+    "plot": "plots",
     # files
     "read_rotor": "tables",
     "read_trials": "tables",

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-from balancing.coefficients.resolution import HOPELESS, resolution
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray
 from rotorid.regression import Estimate, least_squares
-
-if TYPE_CHECKING:
-    from balancing.coefficients.influence import Influence
 
 
 class UndeterminedError(ValueError):
@@ -112,72 +107,10 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
             raise UndeterminedError(f"plane {plane!r} has no effect on any reading: leave it out")
     lost = undetermined_columns(W, list(planes))
     if lost:
-        raise UndeterminedError(_alike(W, lost, planes) + _REMEDY)
+        raise UndeterminedError(alike_words(W, lost, planes) + REMEDY)
 
 
-_REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
-
-
-def check_resolution(
-    influence: Influence,
-    *,
-    refuse: bool,
-    counts: BoolArray | None = None,
-    remedies: Callable[[], Sequence[str]] = tuple,
-) -> tuple[str, ...]:
-    """Refuse planes that the coefficients tell apart only by their errors.
-
-    Errors that are assumed refuse nothing: the digits of the readings do, or without an end of them, for
-    coefficients from runs, a condition number that no instrument supports.
-
-    Parameters
-    ----------
-    influence
-        Coefficients at the speeds and sensors and of the planes in question, of full rank.
-    refuse
-        Or warn.
-    counts
-        Readings, speed by speed, that count, (N,); default all.
-    remedies
-        What to do instead, in sentences.
-
-    Returns
-    -------
-    The warning, if there is one.
-
-    Raises
-    ------
-    UndeterminedError
-        Naming the planes that act alike.
-    """
-    if len(influence.planes) < 2:
-        return ()
-    assumed = influence.error_source == "assumed"
-    counts = np.ones(influence.W[..., 0].size, dtype=bool) if counts is None else counts
-    words = _unresolved(influence, influence.digits if assumed else influence.known_covariance, counts)
-    if words and refuse:
-        raise refusal(words, influence.warnings, influence.contradictions, remedies())
-    if not words and assumed:
-        words = _unresolved(influence, influence.covariance, counts)
-    return (words,) if words else ()
-
-
-def _unresolved(influence: Influence, covariance: FloatArray | None, counts: BoolArray) -> str:
-    """Which planes act alike within the errors of a covariance of (Y₀, W); empty where none do."""
-    P = len(influence.planes)
-    W = influence.W.reshape(-1, P)[counts]
-    if covariance is not None and covariance[..., 2:, 2:].any():
-        found = resolution(W, covariance[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts])
-        if found.significant(len(W), influence.dof):
-            return ""
-        ratio = np.sqrt(found.chi_square / found.n)
-        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
-        return _alike(W, _large(found.direction), influence.planes) + within + _REMEDY
-    singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-    if covariance is not None or influence.last_run is None or singular[0] <= HOPELESS * singular[-1]:
-        return ""
-    within = f": no instrument supports a condition number of {singular[0] / singular[-1]:.2g}"
-    return _alike(W, acting_alike(W), influence.planes) + within + _REMEDY
+REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
 
 
 def refusal(
@@ -205,16 +138,18 @@ def refusal(
 
 def acting_alike(W: ComplexArray) -> list[int]:
     """The planes that the weakest combination of W (N, P) is made of."""
-    return _large(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
+    return large(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
 
 
-def _large(direction: ComplexArray) -> list[int]:
+def large(direction: ComplexArray) -> list[int]:
+    """Which planes a combination (P,) is made of."""
     share = np.abs(direction) / np.linalg.norm(direction)
     # of two or more planes at least two
     return [int(p) for p in np.flatnonzero(share >= min(0.3, float(np.sort(share)[-2])))]
 
 
-def _alike(W: ComplexArray, lost: list[int], planes: Sequence[str]) -> str:
+def alike_words(W: ComplexArray, lost: list[int], planes: Sequence[str]) -> str:
+    """That some planes, columns of W (N, P), act alike, and how."""
     group = [planes[i] for i in lost]
     if len(lost) == 2:
         ratio = complex(np.vdot(W[:, lost[1]], W[:, lost[0]]) / np.vdot(W[:, lost[1]], W[:, lost[1]]))

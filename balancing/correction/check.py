@@ -19,8 +19,7 @@ in the correction planes explains is found by fitting d = W δ.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,8 +33,8 @@ from balancing.coefficients.run_errors import (
     run_columns,
     runs_of,
 )
-from balancing.correction.correct import Correction
-from balancing.data.conventions import Labels
+from balancing.correction.check_result import CheckComparison
+from balancing.correction.correction_result import Correction
 from balancing.data.errors import error_model, reading_covariance, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
@@ -43,7 +42,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.regression import stretch
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 
 LEVEL = 0.95
@@ -52,114 +51,6 @@ LEVEL = 0.95
 _DIRECTIONS = 8
 _EXACT = 1e-9
 """Nothing is known better than this share of the largest reading."""
-
-
-@dataclass(frozen=True, eq=False)
-class CheckComparison:
-    """Readings of R check runs beside their prediction.
-
-    Attributes
-    ----------
-    runs, sensors, planes
-        Names, lengths R, C and P.
-    speeds
-        rad/s, shape (S,), those of the check runs.
-    weights
-        What was mounted, for the bare rotor, shape (R, P).
-    as_proposed
-        Whether these are the proposed corrections (the check runs do not say what was mounted).
-    before, predicted, achieved
-        Vibration of the bare rotor (S, C), and with `weights` mounted: predicted and read (mean of the
-        repeats), shape (R, S, C).
-    covariance
-        Of achieved − predicted, real and imaginary part, (R, S, C, 2, 2); None where errors are unknown.
-    distance
-        Of each difference from zero in its standard deviations (a radius in two dimensions: 95 % of all lie
-        below 2.45 where errors are stated), (R, S, C); None where errors are unknown.
-    chi_square, n
-        Of all differences, and its degrees of freedom; chi_square None where errors are unknown.
-    dof
-        Degrees of freedom of the errors; None for stated ones.
-    probability
-        That errors alone make a larger χ²; None where they are unknown.
-    explained
-        Whether the errors explain the differences at 95 %; None where they are unknown.
-    change
-        Weights (P,) in the correction planes that would cause the differences, within the errors, in
-        addition to `weights`; None where the differences are explained, or no such weights explain them.
-    labels
-        Units and conventions to print in.
-    warnings
-        What the user should know.
-    """
-
-    runs: tuple[str, ...]
-    sensors: tuple[str, ...]
-    planes: tuple[str, ...]
-    speeds: FloatArray
-    weights: ComplexArray
-    as_proposed: bool
-    before: ComplexArray
-    predicted: ComplexArray
-    achieved: ComplexArray
-    covariance: FloatArray | None
-    distance: FloatArray | None
-    chi_square: float | None
-    n: int
-    dof: float | None
-    probability: float | None
-    explained: bool | None
-    change: ComplexArray | None
-    labels: Labels
-    warnings: tuple[str, ...]
-
-    @property
-    def difference(self) -> ComplexArray:
-        """Achieved − predicted, shape (R, S, C)."""
-        return np.asarray(self.achieved - self.predicted)
-
-    @property
-    def improvement_predicted(self) -> float | None:
-        """Rms before by rms predicted; None where nothing should be left."""
-        return _factor(self.before, self.predicted)
-
-    @property
-    def improvement_achieved(self) -> float | None:
-        """Rms before by rms achieved; None where nothing was left."""
-        return _factor(self.before, self.achieved)
-
-    @property
-    def worst(self) -> tuple[int, int, int]:
-        """Run, speed and sensor of the reading that differs most: in its errors, or in size without them."""
-        size = np.abs(self.difference) if self.distance is None else self.distance
-        r, s, c = np.unravel_index(int(np.argmax(size)), size.shape)
-        return int(r), int(s), int(c)
-
-    @property
-    def verdict(self) -> str:
-        """One or two sentences: whether the errors explain the differences, and what else may."""
-        from balancing.correction.check_text import verdict
-
-        return verdict(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        from balancing.correction.check_text import check_dict
-
-        return check_dict(self)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
-        import pandas as pd
-
-        frame = pd.DataFrame(self.to_dict()["readings"]).drop(columns="covariance")
-        return frame.astype({"distance": float})
-
-    def summary(self) -> str:
-        """Text of 80 columns: warnings, verdict, readings beside the prediction, improvement."""
-        from balancing.correction.check_text import summary
-
-        return summary(self)
 
 
 def compare_check(
@@ -343,9 +234,3 @@ def _change(
 
 def _vectors(z: ComplexArray) -> FloatArray:
     return np.stack((z.real, z.imag), axis=-1)
-
-
-def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
-    """Ratio of root mean squares; None where nothing but rounding is left."""
-    old, new = (float(np.sqrt(np.mean(np.abs(z) ** 2))) for z in (before, after))
-    return None if new <= 1e-12 * old else old / new

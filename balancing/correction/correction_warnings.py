@@ -14,7 +14,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
-    from balancing.correction.correct import Correction
+    from balancing.correction.correction_result import Correction
     from balancing.solvers.methods import Fitted, Stack
 
 
@@ -30,16 +30,6 @@ _TOUCHES = 2e-3
 def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
     """What to call each reading, speed by speed."""
     return tuple(f"sensor {c!r} at {rpm_text(s)}" for s in speeds for c in sensors)
-
-
-def amplitude_words(labels: Labels, size: float) -> str:
-    """An amplitude in the job's unit."""
-    return f"{size * labels.vibration_scale:.4g} {labels.vibration_unit}".rstrip()
-
-
-def weight_words(labels: Labels, size: float) -> str:
-    """A weight in the job's unit."""
-    return f"{size * labels.weight_scale:.4g} {labels.weight_unit}".rstrip()
 
 
 def binding(stack: Stack, fitted: Fitted) -> tuple[str, ...]:
@@ -144,8 +134,8 @@ def left_out(
     over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
     return words + tuple(
         f"the vibration of {reading_names((influence.sensors[c],), influence.speeds[[rest[s]]])[0]}, a speed "
-        f"left out, is predicted to be {amplitude_words(labels, float(np.abs(after[s, c])))}, more than its "
-        f"limit of {amplitude_words(labels, float(limits.residual[rest[s], c]))}"
+        f"left out, is predicted to be {labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
+        f"limit of {labels.amplitude_words(float(limits.residual[rest[s], c]))}"
         for s, c in np.argwhere(over)[:_RISES_NAMED]
     )
 

@@ -34,7 +34,6 @@ from balancing.coefficients.identifiability import acting_alike
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.resolution import resolution
 from balancing.coefficients.significance import CLEAR
-from balancing.correction.correction_warnings import weight_words
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.solvers.error_propagation import error_form, region_radius
@@ -349,10 +348,10 @@ def _causes(
     found = list(coarse(stakes.influence))
     for p in weak:
         trial = stakes.trial_weight(p)
-        of = "" if trial is None else f" of its trial weight ({weight_words(labels, trial)})"
-        width = "" if widths is None else f" ± {weight_words(labels, float(f'{widths[p]:.2g}'))} (95 %)"
+        of = "" if trial is None else f" of its trial weight ({labels.weight_words(trial)})"
+        width = "" if widths is None else f" ± {labels.weight_words(float(f'{widths[p]:.2g}'))} (95 %)"
         found.append(
-            f"the weight in plane {names[p]!r} is {weight_words(labels, abs(weights[p]))}{width}, for the "
+            f"the weight in plane {names[p]!r} is {labels.weight_words(abs(weights[p]))}{width}, for the "
             f"effect{of} is only {stakes.clearness()[p]:.2g} times its error"
         )
     if not weak and len(names) > 1:
@@ -378,7 +377,7 @@ def _outlook(whole: Choice, stakes: Stakes) -> str:
 def _only(choice: Choice, stakes: Stakes) -> str:
     planes = listing(map(repr, choice.planes), "and")
     named = f"plane {planes} alone" if len(choice.planes) == 1 else f"only planes {planes}"
-    mass = ", ".join(weight_words(stakes.start.labels, float(m)) for m in np.abs(choice.weights))
+    mass = ", ".join(stakes.start.labels.weight_words(float(m)) for m in np.abs(choice.weights))
     return f"{named} (--planes {','.join(choice.planes)}; {mass})"
 
 
@@ -409,9 +408,9 @@ def _trial(p: int, stakes: Stakes) -> str:
     assert now is not None
     labels, name, needed = stakes.start.labels, stakes.names[p], now * CLEAR / ratio
     if stakes.limits is not None and needed > stakes.limits.max_weight[p]:
-        most = weight_words(labels, float(stakes.limits.max_weight[p]))
+        most = labels.weight_words(float(stakes.limits.max_weight[p]))
         return f"leave plane {name!r} out: a clear trial weight would be larger than its largest, {most}"
-    size = weight_words(labels, float(f"{needed:.2g}"))
+    size = labels.weight_words(float(f"{needed:.2g}"))
     return f"repeat the trial run of plane {name!r} with {'at least' if ratio < 2 else 'about'} {size}"
 
 

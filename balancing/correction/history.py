@@ -20,7 +20,7 @@ from rotorid.base.units import rpm
 if TYPE_CHECKING:
     import pandas as pd
 
-    from balancing.correction.correct import Correction
+    from balancing.correction.correction_result import Correction
 
 
 @dataclass(frozen=True, eq=False)

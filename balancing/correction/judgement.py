@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.correction.correct import region_radius
 from balancing.iso21940 import Tolerance
+from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 Kind = Literal["plane", "bearing", "sensor"]

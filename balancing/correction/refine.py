@@ -28,7 +28,7 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
-    from balancing.correction.correct import Correction
+    from balancing.correction.correction_result import Correction
 
 
 MOVED_AMPLITUDE = 0.5

@@ -18,8 +18,6 @@ from rotorid.regression import gain
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Criterion = Literal["rms", "max"]
 
@@ -145,17 +143,6 @@ class TradeOff:
             f"The knee: {figures(self.totals[self.knee] * scale, 3)} {unit} of "
             f"{figures(self.totals[-1] * scale, 3)} {unit} bring {100 * gain_there:.0f} % of the effect."
         )
-
-    def plot(self, ax: Axes | None = None) -> Figure | Axes:
-        """Draw the curve; without `ax` a new figure that also holds the weights of the planes.
-
-        Returns
-        -------
-        The new figure, or `ax`.
-        """
-        from balancing.plots import trade_off_curve as plots_tradeoff
-
-        return plots_tradeoff.overview(self) if ax is None else plots_tradeoff.curve(self, ax)
 
 
 def trade_off(

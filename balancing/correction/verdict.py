@@ -21,7 +21,7 @@ from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import check_planes
 from balancing.coefficients.influence import Influence
 from balancing.correction.choice import plane_indices
-from balancing.correction.correct import Correction
+from balancing.correction.correction_result import Correction
 from balancing.correction.correction_warnings import reading_names
 from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
 from balancing.correction.stack_errors import stack_errors
@@ -36,7 +36,6 @@ from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 _GRAM_MM = 1e6
@@ -115,12 +114,6 @@ class Verdict:
             )
             lines.append(wrap(words))
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Residual unbalance of the planes with regions and tolerance circles, in polar axes."""
-        from balancing.plots.tolerances import residuals
-
-        return residuals(self, ax)
 
     def _row(self, row: Judgement) -> dict[str, Any]:
         size_of = {

@@ -77,6 +77,14 @@ class Labels:
         """Weight in the job's unit and angle in degrees, 0 ≤ angle < 360, as the job counts it."""
         return _polar(weight, self.weight_scale, self.angle_sign)
 
+    def amplitude_words(self, size: float) -> str:
+        """An amplitude, given in SI."""
+        return f"{size * self.vibration_scale:.4g} {self.vibration_unit}".rstrip()
+
+    def weight_words(self, size: float) -> str:
+        """The size of a weight, given in SI."""
+        return f"{size * self.weight_scale:.4g} {self.weight_unit}".rstrip()
+
     def vibration_covariance(self, covariance: FloatArray) -> FloatArray:
         """Covariance (…, 2, 2) of amplitude·cos(phase) and amplitude·sin(phase) as the job writes them."""
         return _mirror(covariance, self.vibration_scale, self.phase_sign)

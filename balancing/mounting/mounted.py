@@ -3,98 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.influence import Influence
-from balancing.correction.correct import Correction
+from balancing.correction.correction_result import Correction
 from balancing.correction.stack_errors import stack_errors
 from balancing.data.trials import Trials
-from balancing.mounting.discrete import Discrete, solve_discrete
+from balancing.mounting.discrete import solve_discrete
 from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.mounted_result import Mounted
 from balancing.mounting.split import split
 from balancing.solvers.error_propagation import prediction_covariance
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-
-AGAINST = 3.0
-"""Pieces that weigh more than this times what they make are said to act against each other."""
-
-
-@dataclass(frozen=True, eq=False)
-class Mounted:
-    """Pieces in holes that leave the least vibration.
-
-    Attributes
-    ----------
-    correction
-        The continuous one, in the same planes.
-    holes
-        Of each plane; None: any weight at any angle.
-    found
-        Pieces of each plane, and how near the optimum they are known to be.
-    after
-        Predicted vibration with them, (S, C).
-    after_covariance
-        Of a reading in a check run around it, (S, C, 2, 2); None where errors are unknown.
-    on_top_of
-        Run whose weights stay mounted; None: everything is removed before.
-    """
-
-    correction: Correction
-    holes: tuple[Holes | None, ...]
-    found: Discrete
-    after: ComplexArray
-    after_covariance: FloatArray | None
-    on_top_of: str | None = None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
-        labels, said = self.correction.labels, []
-        for plane, chosen in zip(self.correction.planes, self.found.mountings, strict=True):
-            if chosen is None:
-                continue
-            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
-            if total > AGAINST * made:
-                shown = [labels.weight(value)[0] for value in (total + 0j, made + 0j)]
-                said.append(
-                    f"plane {plane}: pieces of {float(shown[0]):.4g} {labels.weight_unit} together make "
-                    f"{float(shown[1]):.4g} {labels.weight_unit}, they act against each other: state a "
-                    "stock, or fewer pieces per hole, if fewer would do"
-                )
-        return tuple(said)
-
-    @property
-    def weights(self) -> ComplexArray:
-        """What the pieces of each plane add up to, (P,)."""
-        return self.found.weights
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, in the job's units and conventions."""
-        from balancing.mounting.mounted_text import mounted_dict
-
-        return mounted_dict(self)
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
-        import pandas as pd
-
-        columns = ["plane", "action", "hole", "angle_deg", "mass", "unit", "pieces"]
-        return pd.DataFrame(self.to_dict()["holes"], columns=columns)
-
-    def summary(self) -> str:
-        """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""
-        from balancing.mounting.mounted_text import summary
-
-        return summary(self)
+    pass
 
 
 def mount(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from balancing.correction.correct import Correction
+    from balancing.correction.correction_result import Correction
 
 _HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.66, 1.11, 1.25, 1.8, 1.6
 _LARGEST = 0.13

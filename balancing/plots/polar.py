@@ -21,13 +21,33 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure, SubFigure
     from matplotlib.projections.polar import PolarAxes
 
-    from balancing.correction.correct import Correction
+    from balancing.correction.correction_result import Correction
 
 
 # Okabe and Ito: told apart with every kind of colour vision
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 BEFORE = "#7F7F7F"
 SPEEDS_SHOWN = 6
+
+
+def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
+    """Draw the corrections and the vibration before and after.
+
+    Parameters
+    ----------
+    c
+        The correction.
+    ax
+        None: a new figure with all pictures. Polar axes: the corrections only. Other axes: the amplitudes
+        before and after only.
+
+    Returns
+    -------
+    The new figure, or `ax`.
+    """
+    if ax is None:
+        return overview(c)
+    return corrections(c, ax) if ax.name == "polar" else amplitudes(c, ax)
 
 
 def overview(c: Correction) -> Figure:
@@ -93,7 +113,7 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
 
 def _regions(c: Correction) -> ComplexArray | None:
     """Boundary (P, n) of the 95 % region of each weight; None where errors are unknown."""
-    from balancing.correction.correct import region_radius
+    from balancing.solvers.error_propagation import region_radius
 
     covariance = c.plane_covariance
     if covariance is None:
@@ -172,7 +192,7 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
 
 def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     """Amplitudes before and after for every speed and sensor, with 95 % of a check run where known."""
-    from balancing.correction.correct import region_radius
+    from balancing.solvers.error_propagation import region_radius
 
     if ax is None:
         from matplotlib.figure import Figure

@@ -15,6 +15,11 @@ if TYPE_CHECKING:
     from balancing.correction.trade_off import TradeOff
 
 
+def draw_trade_off(t: TradeOff, ax: Axes | None = None) -> Figure | Axes:
+    """Draw the curve; without `ax` a new figure that also holds the weights of the planes."""
+    return overview(t) if ax is None else curve(t, ax)
+
+
 def overview(t: TradeOff) -> Figure:
     """A new figure: the residual, and below it the weights of the planes, over the total weight."""
     from matplotlib.figure import Figure

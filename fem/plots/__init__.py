@@ -6,6 +6,7 @@ from fem.plots.critical_map import draw_speed_map
 from fem.plots.drawing import draw_rotor
 from fem.plots.mode_shapes import draw_modes
 from fem.plots.orbit_paths import draw_orbits
+from fem.plots.static_line import draw_deflection
 from rotorid.base.style import COLORS, new_axes
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "campbell_figure",
     "draw_bode",
     "draw_campbell",
+    "draw_deflection",
     "draw_influence",
     "draw_log_decrements",
     "draw_modes",

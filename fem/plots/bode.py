@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from fem.vibration import InfluenceCoefficients, Response
 
 
-def draw_response(response: Response, ax: Axes | None, nodes: Sequence[str | int] | None) -> Axes:
+def draw_response(
+    response: Response, ax: Axes | None = None, nodes: Sequence[str | int] | None = None
+) -> Axes:
     """Draw amplitude over speed at some nodes: the longer half axis of their orbits."""
     amplitude = response.major
     if nodes is None:

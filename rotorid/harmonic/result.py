@@ -16,7 +16,6 @@ from rotorid.regression.estimate import coverage_factor
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 METHODS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
@@ -231,12 +230,6 @@ class Identification:
         lines += [f"warning: {text}" for text in self.warnings]
         lines += self.notes
         return "\n".join(lines)
-
-    def plot(self, ax: Any = None) -> Axes:  # noqa: ANN401 - matplotlib's axes
-        """Draw measured and fitted amplitudes over frequency."""
-        from rotorid.harmonic.plots import plot_identification
-
-        return plot_identification(self, ax)
 
     def _line(self, i: int, width: int) -> str:
         name, std, ci95 = self.parameters[i], self.std, self.ci95

@@ -15,7 +15,6 @@ from rotorid.base.json import floats
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 _ACROSS = 3
@@ -182,12 +181,6 @@ class Methods:
                 "and no single mass stands at a node"
             )
         return "\n".join(lines)
-
-    def plot(self, ax: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
-        """Draw frequency errors and MAC of the methods as bars; returns both axes."""
-        from rotorid.reduction.plots import plot_methods
-
-        return plot_methods(self, ax)
 
 
 def _cell(row: Method, k: int) -> str:

@@ -17,7 +17,6 @@ from rotorid.base.json import finite, floats
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 
 ALIKE = 0.9
@@ -278,12 +277,6 @@ class Placement:
                 f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns."
             )
         return fill(text, 110)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the map of error over 1 − MAC with its trade-off; returns the axes."""
-        from rotorid.reduction.placement_map import plot_placement
-
-        return plot_placement(self, ax)
 
     def with_warnings(self, *more: str) -> Placement:
         """The same with further warnings."""

@@ -21,7 +21,6 @@ from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
     from rotorid.reduction.dynamics.small import SmallRotor
 
@@ -278,12 +277,6 @@ class Reduction:
         if self.uncertainty is not None:
             lines += ["", self.uncertainty.summary()]
         return "\n".join(lines)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the shapes of both models over the rotor; returns the axes."""
-        from rotorid.reduction.plots import plot_reduction
-
-        return plot_reduction(self, ax)
 
     def _mass_lines(self) -> list[str]:
         std, positions = self.masses.std, self.positions

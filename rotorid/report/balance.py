@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from balancing.correction.correction_text import method_words
+from balancing.correction.correction_result import method_words
 from rotorid.base.text import sentence
 from rotorid.report import conventions
 from rotorid.report.balance_data import sheet_data
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
-    from balancing.mounting.mounted import Mounted
+    from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
 
 RUNS_ABREAST = 4

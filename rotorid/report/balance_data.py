@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correct import region_radius
-from balancing.correction.correction_text import HELD
+from balancing.correction.correction_result import HELD
+from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
 from rotorid.base.units import rpm
@@ -17,7 +17,7 @@ from rotorid.tables.reader import units
 if TYPE_CHECKING:
     from balancing import Correction, Influence
     from balancing.data.trials import Trials
-    from balancing.mounting.mounted import Mounted
+    from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.units import RPM
+from rotorid.plots import plot
 from rotorid.report.page import inline_svg
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def modes_picture(modes: Modes) -> Drawing:
     """Mode shapes over the rotor."""
 
     def draw(figure: Figure) -> None:
-        _curves_only(modes.plot(figure.add_subplot()), 2)
+        _curves_only(plot(modes, figure.add_subplot()), 2)
 
     return sketch(3.7, draw, "Mode shapes, each to its largest value 1, over the rotor.")
 
@@ -127,7 +128,7 @@ def reduction_picture(result: Reduction, words: str) -> Drawing:
     """Shapes of the small model over those it was made from."""
 
     def draw(figure: Figure) -> None:
-        axes = result.plot(figure.add_subplot())
+        axes = plot(result, figure.add_subplot())
         _curves_only(axes, 1, below=result.rotor is not None)
         axes.set_ylabel("mode shape, largest = 1")
 
@@ -172,7 +173,7 @@ def stability_picture(stability: StabilityCost) -> Drawing:
     """Smallest logarithmic decrement of both models over speed."""
 
     def draw(figure: Figure) -> None:
-        stability.plot(figure.add_subplot())
+        plot(stability, figure.add_subplot())
 
     return sketch(3.6, draw, "Smallest logarithmic decrement over speed; below 0 a motion grows.")
 
@@ -181,7 +182,7 @@ def placement_picture(placement: Placement) -> Drawing:
     """All ranked choices of nodes."""
 
     def draw(figure: Figure) -> None:
-        placement.plot(figure.add_subplot())
+        plot(placement, figure.add_subplot())
 
     return sketch(4.4, draw, "All ranked choices: largest error of a frequency over the largest 1 − MAC.")
 

@@ -13,8 +13,7 @@ from rotorid.tables.models.motion_file import read_motion
 from rotorid.tables.models.ode_file import read_ode_model
 from rotorid.tables.reader.problems import InputError, Problem, TableWarning
 from rotorid.tables.reader.writing import write_table
-from rotorid.tables.rotor.rotor_file import rotor_files
-from rotorid.tables.rotor.rotor_table import read_rotor
+from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 from rotorid.tables.rotor.rotor_writing import write_rotor
 from rotorid.tables.rotor.unbalance_table import read_unbalance
 from rotorid.tables.runs.conventions import Conventions, StatedErrors

@@ -14,7 +14,6 @@ from rotorid.timedomain.models.record import Record
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -190,9 +189,3 @@ class Fit:
             lines.append(f"minimum {i + 1} ({m.starts} starts): {values}; cost {m.cost:.4g}")
         said = set(lines)
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings if text not in said)])
-
-    def plot(self) -> Figure:
-        """Draw record and model, residuals, sensitivities and iterations."""
-        from rotorid.timedomain.plots import figure_fit
-
-        return figure_fit(self)

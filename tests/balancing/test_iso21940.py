@@ -7,6 +7,7 @@ import pytest
 from cases import each_of
 
 from balancing.iso21940 import GRADES, parse_grade, tolerance
+from rotorid.plots import plot
 
 RPM3000 = 100 * pi
 TOTAL = 1000 * 2.5 * 500 / RPM3000  # g·mm, 3978.87
@@ -183,9 +184,9 @@ def test_table_and_picture():
     assert list(frame["place"]) == ["whole rotor", "bearing A", "bearing B", "plane left", "plane right"]
     assert frame.limit_g_mm.to_numpy()[3:] == pytest.approx(found.limits * 1e6)
     assert frame.position_mm.to_numpy()[1:] == pytest.approx([0, 1000, 100, 700])
-    ax = found.plot()
+    ax = plot(found)
     circles = [line.get_ydata()[0] for line in ax.lines]
     assert circles == pytest.approx(found.limits * 1e6)
-    whole = rotor().plot()
+    whole = plot(rotor())
     assert whole.lines[0].get_ydata() == pytest.approx(np.full(361, TOTAL))
     assert max(len(line) for line in found.summary().splitlines()) <= 80

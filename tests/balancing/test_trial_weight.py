@@ -9,6 +9,7 @@ from balancing import Influence, Labels, ReadingErrors
 from balancing.coefficients.from_model import model_influence
 from balancing.trial_angle import expected_lag, opposing_angle
 from balancing.trial_weight import force_amount, trial_from_coefficients, trial_from_force
+from rotorid.plots import plot
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 
@@ -218,11 +219,11 @@ def test_force_with_an_angle_in_the_conventions_of_the_job():
     assert max(len(line) for line in text.splitlines()) <= 80
     frame = found.to_frame()
     assert frame.mass[0] == pytest.approx(24.84, abs=0.005)
-    arrow = found.plot().lines[0]
+    arrow = plot(found).lines[0]
     assert arrow.get_xdata()[1] == pytest.approx(radians(105))
     assert arrow.get_ydata()[1] == pytest.approx(24.84, abs=0.005)
     without = trial_from_force("A", RPM3000, 0.2, rotor_mass=500, labels=labels)
     assert without.to_dict()["angle_deg"] is None
     assert "any angle" in without.summary()
     with pytest.raises(ValueError, match="has no angle to draw"):
-        without.plot()
+        plot(without)

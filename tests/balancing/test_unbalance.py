@@ -14,6 +14,7 @@ from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct
 from balancing.coefficients.from_model import modal_shapes, model_influence
 from balancing.data.errors import reading_covariance
 from balancing.unbalance import estimate_unbalance, unbalance_of_run
+from rotorid.plots import plot
 
 THREE = {"a": 4, "b": 12, "c": 20}
 EVERY = {f"n{node}": node for node in range(1, 25)}
@@ -283,14 +284,14 @@ def test_picture():
     found = estimate_unbalance(
         [[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6j], names=["A", "B", "C"], covariance=covariance, labels=labels
     )
-    ax = found.plot()
+    ax = plot(found)
     assert [bar.get_height() for bar in ax.patches] == pytest.approx([1e6, 1e6, 1e6])
     assert [bar.get_facecolor()[3] for bar in ax.patches] == [1.0, 0.0, 0.0]
     [[(_, low), (_, high)]] = ax.collections[0].get_segments()
     assert (low, high) == pytest.approx((0.804e6, 1.196e6))
     assert [text.get_text() for text in ax.get_xticklabels()] == ["A", "B", "C"]
     assert ax.get_ylabel() == "unbalance, g_mm"
-    assert found.plot(ax) is ax
+    assert plot(found, ax) is ax
 
 
 def test_from_a_run_with_a_weight_mounted(rotor):

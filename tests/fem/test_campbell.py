@@ -11,6 +11,7 @@ from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
 from fem.campbell import went_above
+from rotorid.plots import plot
 
 mpl.use("Agg")
 
@@ -168,7 +169,7 @@ def test_results_speak():
     assert document["damped_critical_speeds"][0]["direction"] in ("forward", "backward", "mixed")
     assert len(found.to_frame()) == 44
     assert "damped critical speeds" in found.summary()
-    assert found.plot().get_xlabel() == "speed, rad/s"
+    assert plot(found).get_xlabel() == "speed, rad/s"
     assert found.criticals[0][0] == found.critical_speeds[0]
 
 

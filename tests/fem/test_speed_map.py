@@ -9,6 +9,7 @@ from fem_rotors import rotor23, uniform
 from whirl_rotors import machine
 
 import fem
+from rotorid.plots import plot
 
 mpl.use("Agg")
 
@@ -102,7 +103,7 @@ def test_results_speak():
     assert "pinned" in found.summary()
     assert found.to_frame().shape == (found.stiffness.size, 4)
     assert len(found.to_dict()["critical_speeds_rad_s"]) == 3
-    assert found.plot().get_xscale() == "log"
+    assert plot(found).get_xscale() == "log"
 
 
 @each_of(

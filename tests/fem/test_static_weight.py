@@ -11,6 +11,7 @@ from fem_rotors import machines, rotor23, uniform
 from hypothesis import given, settings
 
 import fem
+from rotorid.plots import plot
 
 G = 9.80665
 
@@ -99,7 +100,7 @@ def test_results():
     assert "left" in result.summary()
     assert "largest deflection 631.3 µm at node 12" in result.summary()
     mpl.use("Agg")
-    ax = result.plot()
+    ax = plot(result)
     assert ax.get_ylabel() == "static deflection, µm"
     assert len(ax.lines) == 1
     from matplotlib import pyplot as plt

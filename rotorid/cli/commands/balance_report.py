@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Correction, Influence
-    from balancing.correction.check import CheckComparison
+    from balancing.correction.check_result import CheckComparison
     from balancing.correction.history import History
     from balancing.correction.subsets import Subsets
     from balancing.correction.trade_off import TradeOff
     from balancing.correction.verdict import Verdict
-    from balancing.mounting.mounted import Mounted
+    from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
 
 

@@ -16,6 +16,7 @@ from rotorid.cli.common import (
 from rotorid.cli.output import check_targets
 from rotorid.cli.progress import busy
 from rotorid.cli.verbose import note_rotor
+from rotorid.plots import plot
 from rotorid.workflows.parameters import (
     nodes,
     rising_speeds,
@@ -80,5 +81,5 @@ def _figure(rotor: Rotor, result: InfluenceCoefficients) -> Figure:
     figure = Figure(figsize=(10, 8.5), layout="constrained")
     above, below = figure.subplots(2, height_ratios=(2, 3))
     draw_rotor(rotor, above, planes=result.planes, sensors=result.sensors)
-    result.plot(below)
+    plot(result, below)
     return figure

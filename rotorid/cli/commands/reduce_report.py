@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rotorid.plots import plot
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -156,7 +158,7 @@ class Report:
             plot_running(self.response, list(figure.subplots(2, sharex=True, height_ratios=(3, 2))))
         else:
             part = {"stability": self.stability, "placement": self.placement}.get(name) or self.result
-            part.plot(figure.add_subplot())
+            plot(part, figure.add_subplot())
         return figure
 
     def sheet(self, document: dict[str, Any], record: dict[str, Any]) -> bytes:

@@ -160,6 +160,6 @@ def two_positions(text: str) -> tuple[float, float]:
 
 
 def _figure(found: Tolerance) -> Figure:
-    from balancing.plots.tolerances import polar_figure
+    from balancing.plots.tolerances import polar_figure, tolerance_circles
 
-    return polar_figure(found.plot)
+    return polar_figure(lambda ax: tolerance_circles(found, ax))

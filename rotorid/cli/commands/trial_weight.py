@@ -17,6 +17,7 @@ from rotorid.cli.common import (
 )
 from rotorid.cli.output import check_targets
 from rotorid.cli.verbose import note
+from rotorid.plots import plot
 from rotorid.workflows.parameters import names
 
 if TYPE_CHECKING:
@@ -345,5 +346,5 @@ def _figure(found: Sequence[TrialWeight]) -> Figure:
 
     figure = Figure(figsize=(4.5 * len(found), 5.5), layout="constrained")
     for k, t in enumerate(found):
-        t.plot(figure.add_subplot(1, len(found), k + 1, projection="polar"))
+        plot(t, figure.add_subplot(1, len(found), k + 1, projection="polar"))
     return figure

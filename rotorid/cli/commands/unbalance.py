@@ -60,6 +60,7 @@ def unbalance(
 
     Example: rotorid unbalance sample_data/model_job/job.toml --stations 6,12,19
     """
+    from balancing.plots.unbalance_bars import unbalance_bars
     from rotorid.tables import read_job
 
     if method not in METHODS:
@@ -83,7 +84,7 @@ def unbalance(
             "ridge": ridge,
             "model_error": model_error,
         },
-        figure=(plot, picture(result.plot)),
+        figure=(plot, picture(lambda ax: unbalance_bars(result, ax))),
         table=(output, result.to_frame),
     )
 

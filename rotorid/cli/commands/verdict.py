@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
     from balancing.iso21940 import Tolerance
-    from balancing.mounting.mounted import Mounted
+    from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
 
 

@@ -21,7 +21,6 @@ from rotorid.reduction.dynamics.turning import equations
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
     from rotorid.reduction.dynamics.small import SmallRotor
 
@@ -152,12 +151,6 @@ class ResponseCost:
             "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
             "warnings": list(self.warnings),
         }
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the response of both models over speed; return the axes."""
-        from rotorid.reduction.dynamics.running_plots import plot_running
-
-        return plot_running(self, ax)
 
 
 def compare_response(

@@ -20,7 +20,6 @@ from rotorid.reduction.dynamics.turning import whirl_of
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.units import RPM
@@ -169,12 +168,6 @@ class StabilityCost:
             "modes_watched": {"full": self.n_full, "small": self.n_small},
             "warnings": list(self.warnings),
         }
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the smallest logarithmic decrement of both models over speed; return the axes."""
-        from rotorid.reduction.dynamics.running_plots import plot_stability
-
-        return plot_stability(self, ax)
 
 
 def compare_stability(

@@ -12,10 +12,10 @@ from balancing.data.trials import Trials
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.job.job_data import Job
-from rotorid.tables.job.job_holes import make_holes
 from rotorid.tables.job.job_limits import make_limits, make_row_weights
 from rotorid.tables.job.job_model import Model, complain_about_places, read_check, weight_unit_without_weights
 from rotorid.tables.job.keys import PlaneKeys, SensorKeys
+from rotorid.tables.job.plane_holes import make_holes
 from rotorid.tables.job.settings import Extra, Settings
 from rotorid.tables.reader import units
 from rotorid.tables.reader.problems import Problems

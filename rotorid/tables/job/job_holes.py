@@ -7,16 +7,10 @@ that amounts are positive and Σ amounts e^{iφ} is the correction D in either c
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from balancing.data.conventions import Labels
-from balancing.data.limits import Arc, Limits
-from balancing.mounting.holes import Holes, from_list
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.job.quantity import (
     Quantity,
@@ -24,19 +18,18 @@ from rotorid.tables.job.quantity import (
     measured,
     measured_list,
     numbers,
-    to_job_weight,
     whole,
 )
 from rotorid.tables.reader import units
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:
-    from rotorid.tables.job.keys import PlaneKeys
+    pass
 
 MOST_HOLES = 1000
 MOST_IN_ONE = 100
-_TURN = 360.0
-_SAME_DEG = 1e-4
+TURN = 360.0
+SAME_DEG = 1e-4
 _PLACES = ("holes", "holes_deg")
 _OTHERS = ("first_hole_deg", "hole_names", "per_hole", "taken", "stock")
 _WEIGHTS = (("available", "g"), ("step", "g"))
@@ -117,7 +110,7 @@ def _contradictions(
 def _degrees(section: Section) -> tuple[str, tuple[float, ...]]:
     """The key that gives the holes, and their angles in the job's degrees; none with a problem."""
     count = whole(section, "holes", "the number of holes, equally spaced", 1, MOST_HOLES)
-    first = section.number("first_hole_deg", 0.0, low=-_TURN, high=_TURN)
+    first = section.number("first_hole_deg", 0.0, low=-TURN, high=TURN)
     listed = numbers(section, "holes_deg", _DEG)
     if "holes_deg" in section and "holes" in section:
         section.complain("holes", "either holes, equally spaced, or holes_deg, their angles, not both")
@@ -125,23 +118,23 @@ def _degrees(section: Section) -> tuple[str, tuple[float, ...]]:
     if "first_hole_deg" in section and "holes" not in section:
         section.complain("first_hole_deg", "the number of equally spaced holes too, holes = 12")
     if count is not None:
-        return "holes", tuple((first or 0.0) + _TURN * k / count for k in range(count))
+        return "holes", tuple((first or 0.0) + TURN * k / count for k in range(count))
     return ("holes_deg", listed) if listed is not None and _sound(section, listed) else ("", ())
 
 
 def _sound(section: Section, degrees: Sequence[float]) -> bool:
     """Whether listed angles are within one turn, different and ascending; else a problem."""
-    beyond = [angle for angle in degrees if abs(angle) > _TURN]
+    beyond = [angle for angle in degrees if abs(angle) > TURN]
     if beyond:
         section.complain("holes_deg", f"angles from -360 to 360 degrees, not {beyond[0]:g}: {_DEG}")
         return False
     if len(degrees) > MOST_HOLES:
         section.complain("holes_deg", f"at most {MOST_HOLES} holes, not {len(degrees)}", value=False)
         return False
-    order = sorted(range(len(degrees)), key=lambda k: degrees[k] % _TURN)
+    order = sorted(range(len(degrees)), key=lambda k: degrees[k] % TURN)
     for k, following in zip(order, [*order[1:], order[0]], strict=True):
-        gap = (degrees[following] - degrees[k]) % _TURN
-        if following != k and min(gap, _TURN - gap) < _SAME_DEG:
+        gap = (degrees[following] - degrees[k]) % TURN
+        if following != k and min(gap, TURN - gap) < SAME_DEG:
             a, b = sorted((k, following))
             section.complain(
                 "holes_deg",
@@ -198,81 +191,3 @@ def _stock(section: Section, count: int) -> tuple[int, ...] | None:
     else:
         return tuple(int(value) for value in values)
     return None
-
-
-def make_holes(
-    labels: Labels, planes: Sequence[str], keys: Mapping[str, PlaneKeys], limits: Limits | None
-) -> dict[str, Holes]:
-    """Holes of the planes that have some, as the job's weights are (kg or kg·m); problems are noted.
-
-    Parameters
-    ----------
-    labels
-        Of the job: unit of the weights, direction of the angles.
-    planes
-        Names of all planes of the job.
-    keys
-        What the job says about them.
-    limits
-        Of these planes. Holes strictly inside a forbidden arc are left out, unless there is a weight in them
-        already; the plane's largest weight is that of its holes.
-    """
-    made = {}
-    for name, plane in keys.items():
-        if plane.holes is None or name not in planes:
-            continue
-        arcs: Sequence[Arc] = ()
-        largest = math.inf
-        if limits is not None:
-            at = list(planes).index(name)
-            arcs, largest = limits.forbidden[at], float(limits.max_weight[at])
-        holes = _make(plane.holes, labels, plane.radius, arcs, largest, remove=plane.remove)
-        if holes is not None:
-            made[name] = holes
-    return made
-
-
-def _make(
-    keys: HoleKeys, labels: Labels, radius: float | None, arcs: Sequence[Arc], limit: float, *, remove: bool
-) -> Holes | None:
-    weights = [*keys.available, *([keys.step] if keys.step is not None else [])]
-    sizes = [to_job_weight(weight, labels.weight_unit, radius) for weight in weights]
-    if None in sizes:
-        keys.section.complain(weights[0].key, _other_kind(weights[0].key, labels.weight_unit))
-        return None
-    known = [size for size in sizes if size is not None]
-    turn = 180.0 if remove else 0.0
-    angles = [math.radians((labels.angle_sign * angle + turn) % _TURN) for angle in keys.degrees]
-    taken = [keys.taken.get(name, 0.0) / labels.weight_scale for name in keys.names]
-    kept = [k for k, angle in enumerate(angles) if taken[k] > 0 or not inside(angle, arcs)]
-    if not any(taken[k] == 0 for k in kept):
-        keys.section.complain(keys.key, "at least one free hole outside the angles of forbidden_deg")
-        return None
-    count = len(keys.available)
-    try:
-        return from_list(
-            [angles[k] for k in kept],
-            known[:count],
-            per_hole=keys.per_hole,
-            step=known[count] if keys.step is not None and not count else 0.0,
-            taken=[taken[k] for k in kept],
-            stock=None if keys.stock is None else np.array(keys.stock),
-            names=[keys.names[k] for k in kept],
-            max_weight=limit,
-        )
-    except ValueError as error:
-        keys.section.complain(keys.key, f"holes in which something can be mounted: {error}")
-        return None
-
-
-def inside(angle: float, arcs: Sequence[Arc]) -> bool:
-    """Whether an angle lies strictly inside one of the arcs; their ends, to within rounding, do not count."""
-    near = math.radians(_SAME_DEG)
-    return any(near < (angle - start) % (2 * math.pi) < width - near for start, width in arcs)
-
-
-def _other_kind(key: str, weight_unit: str) -> str:
-    stem = key.partition("_")[0]
-    mass = units.weight(weight_unit).kind == "mass"
-    other, are = (f"{stem}_g", "masses") if mass else (f"{stem}_g_mm", "unbalances (mass × radius)")
-    return f"{other}, because the weights of the job are {are}, or radius_mm too, to convert"

@@ -67,8 +67,7 @@ def read_model(
                 key = "station" if isinstance(keys.place, str) else "node"
                 keys.section.complain(key, f'the rotor model of this {key} too, rotor = "rotor.toml"')
         return Model()
-    from rotorid.tables.rotor.rotor_file import rotor_files
-    from rotorid.tables.rotor.rotor_table import read_rotor
+    from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 
     try:
         rotor = read_rotor(path)

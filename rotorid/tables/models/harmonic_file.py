@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.expressions import ExpressionError, is_name, parse_equation
-from rotorid.tables.reader.number import LARGEST
+from rotorid.tables.models.ode_file import read_time_form
+from rotorid.tables.models.shared_keys import pair, read_errors
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.toml_file import Section, read_toml
 
@@ -134,8 +135,6 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
 
 def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile:
     """The operator equations of a model in time."""
-    # odefile takes pair and read_errors from here
-    from rotorid.tables.models.ode_file import read_time_form
     from rotorid.tables.models.operator_form import operator_form
 
     form = read_time_form(section, problems, initial=False)
@@ -171,23 +170,6 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         warnings.warn(message, TableWarning, stacklevel=3)
     bounds = {name: limits for name, limits in form.bounds.items() if name in start}
     return HarmonicFile(model, bounds, start, form.errors, path)
-
-
-def read_errors(section: Section) -> AmplitudeErrors | None:
-    """`[errors]`: None if there is none."""
-    errors = section.section("errors")
-    if errors is None:
-        return None
-    percent = errors.number("amplitude_percent", 0.0, low=0.0, high=1000.0) or 0.0
-    phase = errors.number("phase_deg", 0.0, low=0.0, high=360.0) or 0.0
-    floor = errors.number("floor", 0.0, low=0.0) or 0.0
-    errors.finish()
-    if not (percent or phase or floor):
-        errors.refuse("at least one of amplitude_percent, phase_deg and floor above 0, or no [errors] at all")
-        return None
-    from rotorid.harmonic.experiments import AmplitudeErrors
-
-    return AmplitudeErrors(percent / 100.0, math.radians(phase), floor)
 
 
 def _equations(section: Section) -> list[str] | None:
@@ -268,20 +250,6 @@ def _bounds(section: Section, allowed: list[str] | None) -> dict[str, tuple[floa
         else:
             found[name] = limits
     return found
-
-
-def pair(value: object) -> tuple[float, float] | None:
-    """Two numbers in order, the outer ones perhaps infinite."""
-    if not isinstance(value, list) or len(value) != 2:
-        return None
-    if not all(isinstance(item, (int, float)) and not isinstance(item, bool) for item in value):
-        return None
-    low, high = (
-        float(max(min(item, LARGEST * 10), -LARGEST * 10)) if isinstance(item, int) else item
-        for item in value
-    )
-    sizes_fit = all(abs(item) <= LARGEST or math.isinf(item) for item in (low, high))
-    return (low, high) if sizes_fit and low < high else None
 
 
 def _refused(inner: Section, name: str, allowed: list[str] | None) -> bool:

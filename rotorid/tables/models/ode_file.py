@@ -10,8 +10,8 @@ from rotorid import expressions
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.expressions import LARGEST, ExpressionError, is_name
-from rotorid.tables.models.harmonic_file import pair, read_errors
 from rotorid.tables.models.matrix_form import Matrices, read_matrices
+from rotorid.tables.models.shared_keys import pair, read_errors
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
 

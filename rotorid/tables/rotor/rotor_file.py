@@ -20,6 +20,39 @@ _GEOMETRY = ("width_m", "outer_diameter_m", "inner_diameter_m", "density_kg_per_
 _INERTIA = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
 
 
+def read_rotor(path: str | Path) -> Rotor:
+    """Read a rotor from a rotor table (`.csv`, `.xlsx`) or a rotor file (`.toml`).
+
+    Parameters
+    ----------
+    path
+        The file; in a workbook the sheet `rotor`, or else the first one.
+
+    Returns
+    -------
+    fem.Rotor
+        In SI; nodes are numbered from 1, row *i* is the element between nodes *i* and *i* + 1.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+
+    Warns
+    -----
+    TableWarning
+        About a guessed encoding, and what no rotor is: sizes, materials, bearings in a wrong unit.
+    """
+    path = Path(path)
+    problems = Problems()
+    if path.suffix.lower() == ".toml":
+        return read_rotor_file(path, problems)
+    shaft = read_shaft(path, Material(), problems)
+    problems.stop()
+    assert shaft is not None
+    return build(str(path), shaft, {}, problems)
+
+
 def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
     data = read_toml(path, problems)

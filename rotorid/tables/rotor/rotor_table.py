@@ -70,41 +70,6 @@ class Shaft:
     model: Model = PLAIN
 
 
-def read_rotor(path: str | Path) -> Rotor:
-    """Read a rotor from a rotor table (`.csv`, `.xlsx`) or a rotor file (`.toml`).
-
-    Parameters
-    ----------
-    path
-        The file; in a workbook the sheet `rotor`, or else the first one.
-
-    Returns
-    -------
-    fem.Rotor
-        In SI; nodes are numbered from 1, row *i* is the element between nodes *i* and *i* + 1.
-
-    Raises
-    ------
-    InputError
-        With all problems of the file.
-
-    Warns
-    -----
-    TableWarning
-        About a guessed encoding, and what no rotor is: sizes, materials, bearings in a wrong unit.
-    """
-    from rotorid.tables.rotor.rotor_file import read_rotor_file
-
-    path = Path(path)
-    problems = Problems()
-    if path.suffix.lower() == ".toml":
-        return read_rotor_file(path, problems)
-    shaft = read_shaft(path, Material(), problems)
-    problems.stop()
-    assert shaft is not None
-    return build(str(path), shaft, {}, problems)
-
-
 def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | None:
     """Read a rotor table, or None and problems."""
     table = read_table(path, "rotor", COLUMNS, problems, first=True)

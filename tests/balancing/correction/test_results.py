@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
 from balancing.plots import polar as plots
+from rotorid.plots import plot
 
 ERRORS = ReadingErrors(0.02, np.deg2rad(1))
 KEYS = {
@@ -127,15 +128,15 @@ def test_results_cannot_be_changed(correction):
 
 def test_pictures(correction, tmp_path):
     before = {k: v for k, v in matplotlib.rcParams.items() if k != "backend"}
-    figure = correction.plot()
+    figure = plot(correction)
     assert isinstance(figure, Figure)
     figure.savefig(tmp_path / "sheet.png", dpi=40)
     polar = Figure().add_subplot(projection="polar")
-    assert correction.plot(polar) is polar
+    assert plot(correction, polar) is polar
     texts = [t.get_text() for t in polar.get_legend().get_texts()]
     assert texts[0].startswith("A: 2.951 g at 50.2°")
     bars = Figure().add_subplot()
-    assert correction.plot(bars) is bars
+    assert plot(correction, bars) is bars
     assert len(bars.patches) == 2
     assert {k: v for k, v in matplotlib.rcParams.items() if k != "backend"} == before
     with pytest.raises(ValueError, match="projection='polar'"):
@@ -158,7 +159,7 @@ def test_angles_of_the_picture_run_as_the_job_counts_them(angles, direction):
 def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
     trials, _, _ = synthetic(np.random.default_rng(2), planes=3, sensors=9, speeds=14, errors=ERRORS)
     c = correct(estimate_influence(trials))
-    c.plot().savefig(tmp_path / "many.png", dpi=40)
+    plot(c).savefig(tmp_path / "many.png", dpi=40)
     # of 14 speeds every other has its name, the first among them, from left to right
     ax = plots.amplitudes(c)
     [upper] = ax.child_axes

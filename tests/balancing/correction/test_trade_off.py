@@ -9,6 +9,7 @@ from balancing_data import complex_normal
 from balancing import Labels, UndeterminedError
 from balancing.correction.trade_off import knee, trade_off
 from balancing.solvers.cone import minmax_cone, weight_budget_cone
+from rotorid.plots import plot
 
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)
 
@@ -169,7 +170,7 @@ def test_a_rotor_without_vibration_has_one_point():
 def test_the_picture_holds_the_curve_the_knee_and_the_weights():
     W, Y, _ = case()
     found = trade_off(W * 1e-3, Y * 1e-6, "ABC", labels=LABELS)
-    upper, lower = found.plot().axes
+    upper, lower = plot(found).axes
     curve = next(line for line in upper.lines if line.get_label() == "rms (made as small as possible)")
     np.testing.assert_allclose(curve.get_xdata(), found.totals * 1e3)
     np.testing.assert_allclose(curve.get_ydata(), found.rms * 2e6)
@@ -191,7 +192,7 @@ def test_the_picture_in_given_axes_without_units_or_knee():
     labels = Labels(vibration_unit="", weight_unit="")
     found = trade_off(a[:, None], -2 * a, ["A"], criterion="max", points=4, labels=labels)
     ax = Figure().add_subplot()
-    assert found.plot(ax) is ax
+    assert plot(found, ax) is ax
     assert ax.get_xlabel() == "total weight of all planes"
     assert ax.get_ylabel() == "amplitude after correction"
     assert len(ax.lines) == 2

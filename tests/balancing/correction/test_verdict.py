@@ -12,6 +12,7 @@ from balancing.correction.judgement import judge, judge_unbalance
 from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
 from balancing.data.limits import Limits
 from balancing.iso21940 import tolerance
+from rotorid.plots import plot
 
 RADIUS = 2.447746830680816  # √χ²(2, 0.95)
 ERRORS = ReadingErrors(amplitude=0.01, phase=0.01)
@@ -232,9 +233,9 @@ def test_words_table_and_picture(job):
     assert max(len(line) for line in text.splitlines()) <= 80
     frame = found.to_frame()
     assert list(frame.verdict[:2]) == ["fail", "pass"]
-    ax = found.plot()
+    ax = plot(found)
     assert ax.lines[0].get_ydata() == pytest.approx(np.full(361, 0.15))
     shown = max(np.max(line.get_ydata(), initial=0.0) for line in ax.lines)
     assert 0.2 <= shown < ax.get_rmax() < 3 * shown, "everything is in the picture, and fills it"
     with pytest.raises(ValueError, match="no planes to draw"):
-        verdict_of_check(influence, check, limits=limits).plot()
+        plot(verdict_of_check(influence, check, limits=limits))

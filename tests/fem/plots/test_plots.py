@@ -11,6 +11,7 @@ from fem_rotors import rotor23, uniform
 import fem
 from fem.plots import campbell_figure, draw_bode, draw_orbits, draw_polar, draw_speed_map, new_axes
 from fem.plots.drawing import radii, surface
+from rotorid.plots import plot
 
 mpl.use("Agg")
 
@@ -60,7 +61,7 @@ def test_drawing_as_scenery_leaves_labels_alone():
 def test_mode_shapes_are_drawn_over_the_rotor():
     modes = fem.critical_speeds(rotor23(1e4), n=3)
     ax = new_axes()
-    assert modes.plot(ax) is ax
+    assert plot(modes, ax) is ax
     lines = ax.get_lines()[:3]
     for line, shape in zip(lines, modes.shapes.T, strict=True):
         x, y = line.get_data()
@@ -74,23 +75,23 @@ def test_mode_shapes_are_drawn_over_the_rotor():
 
 
 def test_rigid_modes_are_named():
-    assert "1: rigid body" in labels(fem.critical_speeds(uniform(6), n=3).plot())
+    assert "1: rigid body" in labels(plot(fem.critical_speeds(uniform(6), n=3)))
 
 
 def test_amplitudes_over_speed():
     rotor = rotor23(2e4)
     speeds = np.linspace(1, 700, 50)
     response = fem.unbalance_response(rotor, {12: 1e-3}, speeds)
-    ax = response.plot()
+    ax = plot(response)
     assert labels(ax)[:2] == ["node 2", "node 22"]
     np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), 1e6 * np.abs(response.at(2)))
-    assert labels(response.plot(nodes=[5])) == ["node 5"]
+    assert labels(plot(response, nodes=[5])) == ["node 5"]
     W = fem.influence(rotor, [7], [2, 22], speeds)
-    ax = W.plot()
+    ax = plot(W)
     assert labels(ax) == ["sensor 2, plane 7", "sensor 22, plane 7"]
     np.testing.assert_allclose(ax.get_lines()[1].get_ydata(), np.abs(W.W[:, 1, 0]))
     ax.figure.canvas.draw()
-    assert fem.influence(rotor, [7], [2], 100.0).plot().get_lines()[0].get_marker() == "o"
+    assert plot(fem.influence(rotor, [7], [2], 100.0)).get_lines()[0].get_marker() == "o"
 
 
 def turbine():
@@ -191,7 +192,7 @@ def test_a_campbell_diagram_holds_all_frequencies_speeds_and_decrements():
 def test_a_campbell_diagram_of_a_rotor(tmp_path):
     rotor = fem.Rotor([0.25] * 4, 0.05, supports=[fem.Support(1, 1e6, 50.0), fem.Support(5, 1e6, 50.0)])
     result = fem.campbell(rotor, np.linspace(0, 400, 9), 2)
-    ax = result.plot()
+    ax = plot(result)
     assert ax.get_title() == ""
     assert "1×" in {text.get_text() for text in ax.texts}
 
@@ -307,7 +308,7 @@ def test_names_of_close_planes_stand_in_two_lines():
 def test_mode_shapes_between_nodes_are_those_of_a_beam():
     rotor = fem.Rotor([0.25] * 4, 0.05, supports=[fem.Support(1, 1e13), fem.Support(5, 1e13)])
     modes = fem.critical_speeds(rotor, n=2)
-    ax = modes.plot()
+    ax = plot(modes)
     for k, line in enumerate(ax.get_lines()[:2], start=1):
         x, y = line.get_data()
         assert (len(x), x[0], x[-1]) == (4 * 12 + 1, 0.0, 1.0)
@@ -325,7 +326,7 @@ def test_backward_modes_are_named():
     base = turbine()
     modes = fem.critical_speeds(dataclasses.replace(base, model=fem.Model(True, True, True)), n=2)
     turned = dataclasses.replace(modes, direction=("forward", "backward"))
-    words = [text for text in labels(turned.plot()) if "rpm" in text]
+    words = [text for text in labels(plot(turned)) if "rpm" in text]
     assert [text.endswith(", backward") for text in words] == [False, True]
 
 

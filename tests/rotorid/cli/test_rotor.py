@@ -13,9 +13,9 @@ from tables_data import write_csv
 
 import fem
 from rotorid.cli import progress
-from rotorid.cli.common import band, nodes, sensors
 from rotorid.samples import sample_data
 from rotorid.tables import read_influence, read_rotor, read_unbalance, write_rotor
+from rotorid.workflows.parameters import band, nodes, sensors
 
 ROTOR23 = sample_data() / "rotor23.csv"
 COMPRESSOR = sample_data() / "compressor" / "rotor.toml"

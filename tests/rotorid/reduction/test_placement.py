@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fem
+from rotorid.plots import plot
 from rotorid.reduction import equivalent_masses, mac, natural_frequencies, placement, reduce
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.samples import sample_data
@@ -310,6 +311,6 @@ def test_the_map_of_all_choices(triples):
     from matplotlib.figure import Figure
 
     axes = Figure().subplots()
-    assert triples.plot(axes) is axes
+    assert plot(triples, axes) is axes
     assert axes.get_xlabel()
     assert axes.get_ylabel()

@@ -10,6 +10,7 @@ import pytest
 from fem_rotors import rotor23, uniform
 
 import fem
+from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.running_plots import plot_running, plot_stability
 from rotorid.reduction.methods import compare_methods
@@ -316,8 +317,8 @@ def test_what_runs_away_or_does_not_oscillate_is_drawn():
 
 def test_results_draw_themselves():
     methods = compare_methods(rotor23(), (7, 12, 18))
-    above, below = methods.plot()
+    above, below = plot(methods)
     assert above.figure is below.figure
-    same = dataclasses.replace(methods, warnings=("said",)).plot((above, below))
+    same = plot(dataclasses.replace(methods, warnings=("said",)), (above, below))
     assert same == (above, below)
     assert all(a.get_position().y0 >= b.get_position().y1 for a, b in pairwise((above, below)))

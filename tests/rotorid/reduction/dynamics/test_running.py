@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import fem
 import rotorid
+from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.running import compare_response
 from rotorid.reduction.dynamics.small import small_rotor
@@ -212,7 +213,7 @@ def test_plot():
     rotor = rotorid.read_rotor(ROOT / "sample_data" / "compressor" / "rotor.toml")
     whirling = small_rotor(rotor, (8, 14, 20), reduce(rotor, (8, 14, 20), 1).masses.solution)
     for small in (book(), whirling):
-        axes = compare_response(small, np.linspace(150.0, 480.0, 34)).plot()
+        axes = plot(compare_response(small, np.linspace(150.0, 480.0, 34)))
         assert any(np.shape(line.get_ydata()) == (34,) for line in axes.lines)
 
 

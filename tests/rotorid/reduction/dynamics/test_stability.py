@@ -13,6 +13,7 @@ from whirl_rotors import machine, whirling_rotors
 
 import fem
 import rotorid
+from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.small import small_rotor
 from rotorid.reduction.dynamics.stability import compare_stability, stability_threshold
@@ -410,7 +411,7 @@ def test_plot():
 
     matplotlib.use("Agg")
     cost = compare_stability(jeffcott(fem.Support(2, 0.0, 20.0), material=1e-4), 900.0, steps=9)
-    lines = [line.get_ydata() for line in cost.plot().lines]
+    lines = [line.get_ydata() for line in plot(cost).lines]
     assert any(np.shape(y) == (10,) and np.allclose(y, cost.small_decrement) for y in lines)
 
 

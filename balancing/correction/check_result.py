@@ -1,21 +1,125 @@
-"""A comparison of check runs as people read it, in the job's own units: words, text, and JSON types."""
+"""Readings of check runs beside their prediction: result, words, and JSON types in the job's own units."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_text import DUST
+from balancing.correction.correction_result import DUST
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import figures, sentence, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
-    from balancing.correction.check import CheckComparison
+    import pandas as pd
 
 
-def verdict(c: CheckComparison) -> str:
+@dataclass(frozen=True, eq=False)
+class CheckComparison:
+    """Readings of R check runs beside their prediction.
+
+    Attributes
+    ----------
+    runs, sensors, planes
+        Names, lengths R, C and P.
+    speeds
+        rad/s, shape (S,), those of the check runs.
+    weights
+        What was mounted, for the bare rotor, shape (R, P).
+    as_proposed
+        Whether these are the proposed corrections (the check runs do not say what was mounted).
+    before, predicted, achieved
+        Vibration of the bare rotor (S, C), and with `weights` mounted: predicted and read (mean of the
+        repeats), shape (R, S, C).
+    covariance
+        Of achieved − predicted, real and imaginary part, (R, S, C, 2, 2); None where errors are unknown.
+    distance
+        Of each difference from zero in its standard deviations (a radius in two dimensions: 95 % of all lie
+        below 2.45 where errors are stated), (R, S, C); None where errors are unknown.
+    chi_square, n
+        Of all differences, and its degrees of freedom; chi_square None where errors are unknown.
+    dof
+        Degrees of freedom of the errors; None for stated ones.
+    probability
+        That errors alone make a larger χ²; None where they are unknown.
+    explained
+        Whether the errors explain the differences at 95 %; None where they are unknown.
+    change
+        Weights (P,) in the correction planes that would cause the differences, within the errors, in
+        addition to `weights`; None where the differences are explained, or no such weights explain them.
+    labels
+        Units and conventions to print in.
+    warnings
+        What the user should know.
+    """
+
+    runs: tuple[str, ...]
+    sensors: tuple[str, ...]
+    planes: tuple[str, ...]
+    speeds: FloatArray
+    weights: ComplexArray
+    as_proposed: bool
+    before: ComplexArray
+    predicted: ComplexArray
+    achieved: ComplexArray
+    covariance: FloatArray | None
+    distance: FloatArray | None
+    chi_square: float | None
+    n: int
+    dof: float | None
+    probability: float | None
+    explained: bool | None
+    change: ComplexArray | None
+    labels: Labels
+    warnings: tuple[str, ...]
+
+    @property
+    def difference(self) -> ComplexArray:
+        """Achieved − predicted, shape (R, S, C)."""
+        return np.asarray(self.achieved - self.predicted)
+
+    @property
+    def improvement_predicted(self) -> float | None:
+        """Rms before by rms predicted; None where nothing should be left."""
+        return _factor(self.before, self.predicted)
+
+    @property
+    def improvement_achieved(self) -> float | None:
+        """Rms before by rms achieved; None where nothing was left."""
+        return _factor(self.before, self.achieved)
+
+    @property
+    def worst(self) -> tuple[int, int, int]:
+        """Run, speed and sensor of the reading that differs most: in its errors, or in size without them."""
+        size = np.abs(self.difference) if self.distance is None else self.distance
+        r, s, c = np.unravel_index(int(np.argmax(size)), size.shape)
+        return int(r), int(s), int(c)
+
+    @property
+    def verdict(self) -> str:
+        """One or two sentences: whether the errors explain the differences, and what else may."""
+        return _verdict_words(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's own units and conventions; what is unknown is None."""
+        return _check_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.to_dict()["readings"]).drop(columns="covariance")
+        return frame.astype({"distance": float})
+
+    def summary(self) -> str:
+        """Text of 80 columns: warnings, verdict, readings beside the prediction, improvement."""
+        return _text(self)
+
+
+def _verdict_words(c: CheckComparison) -> str:
     """`CheckComparison.verdict`."""
     r, s, k = c.worst
     where = f"sensor {c.sensors[k]!r} at {rpm(c.speeds[s]):.6g} rpm"
@@ -54,7 +158,7 @@ def verdict(c: CheckComparison) -> str:
     )
 
 
-def check_dict(c: CheckComparison) -> dict[str, Any]:
+def _check_dict(c: CheckComparison) -> dict[str, Any]:
     """`CheckComparison.to_dict`."""
     old, old_phase = c.labels.vibration(c.before)
     planned, planned_phase = c.labels.vibration(c.predicted)
@@ -102,7 +206,7 @@ def check_dict(c: CheckComparison) -> dict[str, Any]:
     }
 
 
-def summary(c: CheckComparison) -> str:
+def _text(c: CheckComparison) -> str:
     """`CheckComparison.summary`."""
     mounted = "the proposed corrections" if c.as_proposed else "what the weights table of the check says"
     blocks = [
@@ -174,3 +278,9 @@ def _percent(probability: float) -> str:
 
 def _rms(amplitudes: FloatArray) -> float:
     return float(np.sqrt(np.mean(amplitudes**2)))
+
+
+def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
+    """Ratio of root mean squares; None where nothing but rounding is left."""
+    old, new = (float(np.sqrt(np.mean(np.abs(z) ** 2))) for z in (before, after))
+    return None if new <= 1e-12 * old else old / new

@@ -1,22 +1,94 @@
-"""Pieces in holes as people read them: text, and JSON types, in the job's units and conventions."""
+"""Pieces in holes: result, text, and JSON types in the job's units and conventions."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_text import small
+from balancing.correction.correction_result import Correction, small
+from balancing.mounting.discrete import Discrete
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
 from rotorid.base.text import figures, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from balancing.mounting.holes import Holes, Mounting
-    from balancing.mounting.mounted import Mounted
+
+AGAINST = 3.0
+"""Pieces that weigh more than this times what they make are said to act against each other."""
 
 
-def mounted_dict(m: Mounted) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class Mounted:
+    """Pieces in holes that leave the least vibration.
+
+    Attributes
+    ----------
+    correction
+        The continuous one, in the same planes.
+    holes
+        Of each plane; None: any weight at any angle.
+    found
+        Pieces of each plane, and how near the optimum they are known to be.
+    after
+        Predicted vibration with them, (S, C).
+    after_covariance
+        Of a reading in a check run around it, (S, C, 2, 2); None where errors are unknown.
+    on_top_of
+        Run whose weights stay mounted; None: everything is removed before.
+    """
+
+    correction: Correction
+    holes: tuple[Holes | None, ...]
+    found: Discrete
+    after: ComplexArray
+    after_covariance: FloatArray | None
+    on_top_of: str | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
+        labels, said = self.correction.labels, []
+        for plane, chosen in zip(self.correction.planes, self.found.mountings, strict=True):
+            if chosen is None:
+                continue
+            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
+            if total > AGAINST * made:
+                shown = [labels.weight(value)[0] for value in (total + 0j, made + 0j)]
+                said.append(
+                    f"plane {plane}: pieces of {float(shown[0]):.4g} {labels.weight_unit} together make "
+                    f"{float(shown[1]):.4g} {labels.weight_unit}, they act against each other: state a "
+                    "stock, or fewer pieces per hole, if fewer would do"
+                )
+        return tuple(said)
+
+    @property
+    def weights(self) -> ComplexArray:
+        """What the pieces of each plane add up to, (P,)."""
+        return self.found.weights
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units and conventions."""
+        return _mounted_dict(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
+        import pandas as pd
+
+        columns = ["plane", "action", "hole", "angle_deg", "mass", "unit", "pieces"]
+        return pd.DataFrame(self.to_dict()["holes"], columns=columns)
+
+    def summary(self) -> str:
+        """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""
+        return _text(self)
+
+
+def _mounted_dict(m: Mounted) -> dict[str, Any]:
     """`Mounted.to_dict`."""
     c, labels = m.correction, m.correction.labels
     size, angle = labels.weight(m.weights)
@@ -57,7 +129,7 @@ def mounted_dict(m: Mounted) -> dict[str, Any]:
     }
 
 
-def summary(m: Mounted) -> str:
+def _text(m: Mounted) -> str:
     """`Mounted.summary`."""
     c, labels = m.correction, m.correction.labels
     unit = labels.weight_unit

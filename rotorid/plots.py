@@ -1,0 +1,108 @@
+"""The picture of a result: pictures know results, and no result its picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+Pictures = Mapping[type, Callable[..., Any]]
+
+
+def plot(result: object, ax: Any = None, **options: Any) -> Any:  # noqa: ANN401 - axes or figures of matplotlib
+    """Draw a result.
+
+    Parameters
+    ----------
+    result
+        Of `fem`, `balancing` or rotorid: modes, a Campbell diagram, a correction, a fit, …
+    ax
+        Axes of matplotlib to draw on; None: those of a new figure, or a new figure with all pictures.
+    options
+        For the function that draws: the picture of a response takes `nodes`.
+
+    Returns
+    -------
+    What that function returns: the axes, or a new figure.
+
+    Raises
+    ------
+    TypeError
+        For what has no picture.
+    """
+    room = type(result).__module__.split(".")
+    pictures = _ROOMS.get(room[0]) or _ROOMS.get(".".join(room[:2]))
+    draw = None if pictures is None else pictures().get(type(result))
+    if draw is None:
+        raise TypeError(f"there is no picture of a {type(result).__name__}")
+    return draw(result, ax, **options)
+
+
+def _rotors() -> Pictures:
+    import fem
+    from fem import plots
+
+    return {
+        fem.Modes: plots.draw_modes,
+        fem.Response: plots.draw_response,
+        fem.InfluenceCoefficients: plots.draw_influence,
+        fem.Campbell: lambda found, ax: plots.draw_campbell(found, ax, criticals=found.criticals),
+        fem.SpeedMap: lambda found, ax: plots.draw_speed_map(
+            found.stiffness, found.speeds, ax, supports=found.own
+        ),
+        fem.StaticDeflection: plots.draw_deflection,
+    }
+
+
+def _balancing() -> Pictures:
+    import balancing
+    from balancing.plots import polar, tolerances, trade_off_curve
+    from balancing.plots.unbalance_bars import unbalance_bars
+    from balancing.trial_result import TrialWeight
+
+    return {
+        balancing.Correction: polar.draw_correction,
+        balancing.TradeOff: trade_off_curve.draw_trade_off,
+        balancing.Verdict: tolerances.residuals,
+        balancing.Tolerance: tolerances.tolerance_circles,
+        balancing.Unbalance: unbalance_bars,
+        TrialWeight: tolerances.trial_arrow,
+    }
+
+
+def _reduction() -> Pictures:
+    from rotorid.reduction import placement_map, plots
+    from rotorid.reduction.dynamics import running, running_plots, stability
+    from rotorid.reduction.methods_result import Methods
+    from rotorid.reduction.placement_result import Placement
+    from rotorid.reduction.result import Reduction
+
+    return {
+        Reduction: plots.plot_reduction,
+        Methods: plots.plot_methods,
+        Placement: placement_map.plot_placement,
+        running.ResponseCost: running_plots.plot_running,
+        stability.StabilityCost: running_plots.plot_stability,
+    }
+
+
+def _harmonic() -> Pictures:
+    from rotorid.harmonic.plots import plot_identification
+    from rotorid.harmonic.result import Identification
+
+    return {Identification: plot_identification}
+
+
+def _timedomain() -> Pictures:
+    from rotorid.timedomain.plots import figure_fit
+    from rotorid.timedomain.result import Fit
+
+    return {Fit: lambda found, ax: figure_fit(found)}
+
+
+_ROOMS: dict[str, Callable[[], Pictures]] = {
+    "fem": _rotors,
+    "balancing": _balancing,
+    "rotorid.reduction": _reduction,
+    "rotorid.harmonic": _harmonic,
+    "rotorid.timedomain": _timedomain,
+}
