@@ -22,6 +22,7 @@ from fem.whirl import available_modes, checked_number, checked_speeds, in_both_p
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
@@ -443,7 +444,7 @@ def _warnings(
         for k in np.flatnonzero(cells.any(axis=0)):
             where = speeds[cells[:, k]]
             texts.append(
-                f"mode {k + 1} {text} at {where.size} of {speeds.size} speeds, "
+                f"mode {k + 1} {text} at {where.size} of {counted(speeds.size, 'speed')}, "
                 f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
             )
     if columns.size < n:

@@ -12,7 +12,7 @@ from balancing.correction.other_readings import OtherReading, assumptions, contr
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
-from rotorid.base.text import capital, figures, table, wrap
+from rotorid.base.text import capital, counted, figures, table, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
@@ -246,7 +246,8 @@ def _quality(c: Correction) -> str:
     if c.chi_square is not None and c.fit_dof:
         lines.append(
             f"What is left of the vibration is {np.sqrt(c.chi_square / c.fit_dof):.2g} times what the "
-            f"errors of the readings explain (χ² {c.chi_square:.1f} with {c.fit_dof} degrees of freedom)."
+            f"errors of the readings explain (χ² {c.chi_square:.1f} with "
+            f"{counted(c.fit_dof, 'degree')} of freedom)."
         )
     if c.covariance is None:
         lines.append(

@@ -15,6 +15,7 @@ from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import counted
 
 __all__ = ["STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
 __all__ += ["Disc", "FloatArray", "Model", "Pedestal", "Rotor", "Support", "whole"]
@@ -114,8 +115,9 @@ class Rotor:
 
     def __repr__(self) -> str:
         return (
-            f"Rotor({self.n_elements} elements, {self.positions[-1]:.4g} m, {self.total_mass:.4g} kg, "
-            f"{len(self.discs)} discs, {len(self.supports)} supports)"
+            f"Rotor({counted(self.n_elements, 'element')}, {self.positions[-1]:.4g} m, "
+            f"{self.total_mass:.4g} kg, {counted(len(self.discs), 'disc')}, "
+            f"{counted(len(self.supports), 'support')})"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

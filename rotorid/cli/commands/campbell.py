@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rotorid.base.text import counted
 from rotorid.cli.common import (
     JsonOption,
     OperatingOption,
@@ -54,7 +55,7 @@ def campbell(
     check_targets(plot, output)
     service = band(operating)
     model, omega = read_rotor(rotor), rising_speeds(speed)
-    with busy(f"whirl at {len(omega)} speeds"):
+    with busy(f"whirl at {counted(len(omega), 'speed')}"):
         result = fem.campbell(model, omega, n)
 
     def picture() -> Figure:

@@ -14,6 +14,7 @@ from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.whirl import available_modes, checked_number
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 from rotorid.reduction.dynamics.running import without_modal_damping
 from rotorid.reduction.dynamics.threshold import STEPS, grid, searched, stability_threshold
 from rotorid.reduction.dynamics.turning import whirl_of
@@ -99,7 +100,7 @@ class StabilityCost:
         """What the reduction costs, in words and a table."""
         lines = [f"Warning: {text}" for text in self.warnings]
         lines.append(self._verdict())
-        lines.append(f"{'':28}{'full rotor':>14}{f'{len(self.nodes)} masses':>14}")
+        lines.append(f"{'':28}{'full rotor':>14}{counted(len(self.nodes), 'mass', 'masses'):>14}")
         both = (self.full, self.small)
         rpm = [None if each.threshold is None else each.threshold * RPM for each in both]
         rows = (
