@@ -48,8 +48,8 @@ OperatingOption = Annotated[
     typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
 ]
 
-FASTEST = 1e9
-"""rad/s; no rotor turns so fast, and squares of larger numbers may overflow."""
+SLOWEST, FASTEST = 1e-9, 1e9
+"""rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
 STATE_SPACES = (".json", ".npz", ".mat")
@@ -320,8 +320,8 @@ def speeds(text: str, unit: str = "rad_s", what: str = "--speeds") -> list[float
         values = list(first + step * np.arange(int(np.floor((last - first) / step * (1 + 1e-12) + 1e-9)) + 1))
         factors = [factors[0]] * len(values)
     found = [float(v) * factor for v, factor in zip(values, factors, strict=True)]
-    if min(found) < 0 or max(found) > FASTEST:
-        raise ValueError(f"{what} {text!r}: speeds must be from 0 to {FASTEST:g} rad/s")
+    if not all(value == 0 or SLOWEST <= value <= FASTEST for value in found):
+        raise ValueError(f"{what} {text!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
     return found
 
 
