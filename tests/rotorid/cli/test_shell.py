@@ -64,7 +64,9 @@ def test_a_closed_pipe_ends_quietly():
 
 
 @pytest.mark.parametrize("redirection", ["2>/dev/full", "2>&-"])
-@pytest.mark.parametrize("words", ["critical nofile.csv", "critical --nope", "critical {} -n 99", "{} --verbose"])
+@pytest.mark.parametrize(
+    "words", ["critical nofile.csv", "critical --nope", "critical {} -n 99", "{} --verbose"]
+)
 def test_a_complaint_that_nobody_can_read_keeps_its_status(redirection, words):
     words = words.format(ROTOR)
     command = f"{sys.executable} -m rotorid {words} {redirection}"
