@@ -118,7 +118,7 @@ def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
 def _same_file(a: Path, b: Path) -> bool:
     if a.exists() and b.exists():
         return a.samefile(b)
-    return a.resolve() == b.resolve()
+    return os.path.realpath(a) == os.path.realpath(b)  # of a circle of links, too
 
 
 def emit(
@@ -138,6 +138,7 @@ def emit(
     The sheet is made from the document and the provenance.
     """
     from rotorid.cli.verbose import note
+    from rotorid.tables.reader.problems import printable
     from rotorid.tables.reader.writing import table_bytes, write_files
 
     note(document)
@@ -157,7 +158,7 @@ def emit(
         return
     typer.echo(text())
     for path in written:
-        typer.echo(f"written: {path}")
+        typer.echo(f"written: {printable(str(path))}")
 
 
 def json_text(document: Mapping[str, Any]) -> str:
