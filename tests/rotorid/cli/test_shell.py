@@ -16,6 +16,7 @@ from rotorid.tables.reader.writing import write_files
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"
+FIT = sample_data() / "fit" / "run_down"
 
 
 def start(*words, **options):
@@ -164,6 +165,23 @@ OPTIONS = {
         "--max-mass": (*EXTREME, "1e30g", "1e-300g"),
         "--speeds": SPEEDS,
     },
+    ("tolerance", "--mass", "500kg", "--grade", "G2.5"): {"--speed": (*SPEEDS, "1e-300rpm", "1e-9")},
+    ("split", "35g@120", "--drill", "8mm", "--radius", "100mm"): {
+        "--spacing": (*EXTREME, "1e-308", "1e-30"),
+        "--tip-angle": (*EXTREME, "1e-30"),
+    },
+    ("trial-weight", "--rotor-mass", "500kg", "--radius", "200mm", "--speed", "3000rpm"): {
+        "--fraction": EXTREME,
+        "--damping": EXTREME,
+        "--critical": SPEEDS,
+    },
+    ("reduce", ROTOR, "--nodes", "7,12,18"): {"--response": ("1e-308", "1e-320", "1e308", "nan")},
+    ("fit", FIT / "model.toml", FIT / "record.csv"): {
+        "--sigma": ("1e-308", "1e-320", "1e308", "nan", "-1"),
+        "--starts": ("9" * 9, "-1", "1e308"),
+        "--max-seconds": ("inf", "nan", "1e-320"),
+        "--rtol": ("inf", "1e-308", "0"),
+    },
 }
 
 
@@ -171,11 +189,7 @@ def test_extreme_options_are_answered_or_refused(cli):
     for words, options in OPTIONS.items():
         for option, values in options.items():
             for value in values if option != "--speeds" or words[0] != "balance" else values[::2]:
-                outcome = cli(
-                    *words,
-                    f"{option}={value}" if option.startswith("--") else option,
-                    *([] if option.startswith("--") else [value]),
-                )
+                outcome = cli(*words, *(f"{option}={value}",) if option[1] == "-" else (option, value))
                 what = (words[0], option, value, outcome.err[-300:])
                 assert outcome.code in (0, 2), what
                 printed = (outcome.out + outcome.err).replace(repr(value), "").replace(value or "-", "")
