@@ -67,7 +67,7 @@ def doubts(
         return (biased,)
     if left is not None and (words or not found.converged):
         words += _other_reading(found, left, refit)
-    return (*words, *(_negative(found, bounds) if found.converged else ()))
+    return (*words, *(_negative(found, bounds, fit) if found.converged else ()))
 
 
 def _refined(refine: Refine, theta: FloatArray) -> tuple[NonlinearEstimate | None, FloatArray]:
@@ -172,8 +172,8 @@ def _left_by_refit(model: HarmonicModel, data: Experiments, refit: Refit) -> flo
     return left_over(model, data, solutions[0]) if solutions else None
 
 
-def _negative(found: Identification, bounds: Bounds | None) -> list[str]:
-    """Masses, dampers and springs whose value is negative beyond its interval."""
+def _negative(found: Identification, bounds: Bounds | None, fit: NonlinearEstimate | None) -> list[str]:
+    """Masses, dampers and springs that are negative beyond their interval, and for output error `fit`, too."""
     interval, kinds = found.ci95, passive_elements(found.model)
     pk = multipliers([0, 1, 2], [()] * 3, np.array([found.experiments.frequencies.max()]))
     force = max((abs(found.value(n) * pk[0, k]) for n, k in kinds.items()), default=0.0)
@@ -182,7 +182,8 @@ def _negative(found: Identification, bounds: Bounds | None) -> list[str]:
         i, (low, _) = found.parameters.index(name), (bounds or {}).get(name, (0.0, None))
         high = found.values[i] if interval is None or np.isnan(interval[i, 1]) else interval[i, 1]
         rounding = abs(found.values[i] * pk[0, kind]) <= 1e-9 * force
-        if high < 0 and not rounding and low is not None and low >= 0:
+        noise = fit is not None and fit.values[i] >= 0
+        if high < 0 and not (rounding or noise) and low is not None and low >= 0:
             named.append((name, kind))
     if not named:
         return []

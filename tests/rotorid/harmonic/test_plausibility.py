@@ -117,6 +117,8 @@ def test_noise_and_a_wrong_model_are_told_apart_by_the_order_of_the_residuals():
     noisy = [readings(seed, 2, AmplitudeErrors(0.2, 0.2), stated=False) for seed in range(8)]
     words = [" ".join(identify(m, d, method="output-error").warnings) for m, d in noisy]
     assert sum("unless they are as noisy as that" in text for text in words) >= 6, words
+    words = [" ".join(identify(m, d).warnings) for m, d in noisy]
+    assert not any("no passive" in text for text in words), words
     one = harmonic_model(ONE, estimate=["m", "b", "k"])
     said = spoken(8, 2, lambda m, d: (one, d), False, "output-error")
     assert sum("not at random over the frequency" in text for text in said) >= 3, said
