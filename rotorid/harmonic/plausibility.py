@@ -173,7 +173,7 @@ def _left_by_refit(model: HarmonicModel, data: Experiments, refit: Refit) -> flo
 
 
 def _negative(found: Identification, bounds: Bounds | None, fit: NonlinearEstimate | None) -> list[str]:
-    """Masses, dampers and springs that are negative beyond their interval, and for output error `fit`, too."""
+    """Masses, dampers and springs negative beyond their interval, and for output error `fit`, too."""
     interval, kinds = found.ci95, passive_elements(found.model)
     pk = multipliers([0, 1, 2], [()] * 3, np.array([found.experiments.frequencies.max()]))
     force = max((abs(found.value(n) * pk[0, k]) for n, k in kinds.items()), default=0.0)
