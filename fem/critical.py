@@ -86,7 +86,7 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    knots = np.unique(np.concatenate([np.array(table) for table in tables]))
+    knots = rotor.knots
     knots = knots[(knots >= first) & (knots <= last)]
     search = TableSearch(rotor, A)
     found = [root for a, b in itertools.pairwise(knots.tolist()) for root in search.between(a, b)]

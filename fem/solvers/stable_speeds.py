@@ -86,11 +86,11 @@ def largest_growth(found: Bases, speeds: FloatArray) -> FloatArray:
     out = np.empty(speeds.size)
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        out[part] = _rates(found, *all_values(found.fine, speeds[part], found.scale)).max(axis=1)
+        out[part] = rates(found, *all_values(found.fine, speeds[part], found.scale)).max(axis=1)
     return out
 
 
-def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray:
+def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolArray:
     """At which speeds a mode grows, shape (S,).
 
     Parameters
@@ -99,11 +99,12 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         The equations.
     speeds
         rad/s, ascending, shape (S,).
-    knots
-        Speeds at which a table changes its slope, rad/s.
+    level
+        Re λ / |λ| above which it does.
     """
     out = np.zeros(speeds.size, dtype=np.intp)
     if speeds.size > _FEW:
+        knots = found.fine.P.rotor.knots
         inner = knots[(knots > speeds[0]) & (knots < speeds[-1])]
         cuts = np.unique(np.concatenate((speeds[[0, -1]], inner)))
         lam, oscillates = all_values(found.fine, cuts, found.scale)
@@ -114,20 +115,20 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         order = np.argsort(np.abs(lam.imag[near]))
         margins = (
             np.concatenate(([0.0], np.abs(lam.imag[near])[order])),
-            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))) - GROWTH,
+            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))) - level,
         )
         out = _certified(found.coarse, speeds, cuts, margins, found.low)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
-        high = np.asarray((np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1))
+        high = np.asarray((np.where(low, -1.0, rates(found, lam, oscillates)) > level).any(axis=1))
         at = np.searchsorted(cuts, speeds)
         out[high[at] | high[np.maximum(at - 1, 0)]] = 0
     left = np.flatnonzero(out == 0)
     if left.size:
-        out[left] = np.where(largest_growth(found, speeds[left]) > GROWTH, 1, -1)
+        out[left] = np.where(largest_growth(found, speeds[left]) > level, 1, -1)
     return np.asarray(out > 0)
 
 
-def _rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
+def rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
     """Growth of motions as `largest_growth` counts it; −1 where the basis does not know them."""
     rate = np.where(oscillates, lam.real / np.abs(lam), lam.real / found.scale * (GROWTH / AWAY))
     # What rounding makes of the motions of a free rotor, which nothing drives, does not count.
