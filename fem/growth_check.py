@@ -13,7 +13,7 @@ from fem.whirl import in_both_planes
 from fem.windows import Window
 from rotorid.base.arrays import BoolArray, FloatArray
 
-_PARTS = 8  # into how many parts the step with an edge is divided
+_PARTS = 4  # into how many parts the step with an edge is divided
 _SLACK = 1e-12  # of the largest entry: rounding
 _AT_REST = 1e-300  # a bound, rad/s, that leaves room for motions that do not oscillate
 _NEAR = 1e-4  # relative step of speed for a slope
@@ -123,13 +123,14 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
     from scipy.linalg import eigvals
     from scipy.optimize import brentq
 
-    if largest_growth(found, np.array([stable]))[0] < -level:
-        level = 0.0
     knots = found.fine.P.rotor.knots
     between = knots[(knots > min(unstable, stable)) & (knots < max(unstable, stable))]
     trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))
     trials = trials if stable > unstable else trials[::-1]
-    over = largest_growth(found, trials) > level
+    growth = largest_growth(found, trials)
+    if growth[-1] < -level:
+        level = 0.0
+    over = growth > level
     k = int(np.argmin(over))
     if over.all() or k == 0:
         return float(unstable), _fastest(found, unstable)

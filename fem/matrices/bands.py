@@ -119,12 +119,13 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
 def multiply(band: FloatArray, X: FloatArray) -> FloatArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
     width = band.shape[0] - 1
-    if X.shape[1] <= _FEW and band.dtype == X.dtype == float:
-        from scipy.linalg.blas import dsbmv
+    if X.shape[1] <= _FEW and band.dtype == X.dtype:
+        from scipy.linalg import blas
 
-        Y = np.empty(X.shape, order="F")
+        product = blas.dsbmv if band.dtype == float else blas.zhbmv
+        band, Y = np.asfortranarray(band), np.empty(X.shape, X.dtype, order="F")
         for k in range(X.shape[1]):
-            dsbmv(width, 1.0, band, X[:, k], y=Y[:, k], overwrite_y=True)
+            product(width, 1.0, band, X[:, k], y=Y[:, k], overwrite_y=True)
         return Y
     Y = band[width, :, None] * X
     for above in range(1, width + 1):

@@ -148,7 +148,7 @@ def _certified(
     depth = 0
     while len(ranges):
         first, last = np.searchsorted(speeds, ranges[:, 0]), np.searchsorted(speeds, ranges[:, 1], "right")
-        ranges = ranges[last - first > _FEW]
+        ranges = ranges[last - first > 1]
         halves = []
         for start in range(0, len(ranges), _CHUNK):
             part = ranges[start : start + _CHUNK]
@@ -192,8 +192,8 @@ def _constant(
 
 def _first_order(Q: Quadratic, middle: float) -> Callable[[FloatArray], AnyArray] | None:
     """A of z' = A z at speeds, in units of energy about those at a middle speed; None without enough mass."""
-    size, spread = np.linalg.eigvalsh(Q.M)[[-1, 0]]
-    if not spread > 1e-12 * size:
+    own = np.sqrt(np.diag(Q.M))
+    if not own.all() or np.linalg.eigvalsh(Q.M / np.outer(own, own))[0] < 1e-12:
         return None
     L = np.linalg.inv(np.linalg.cholesky(Q.M))
     K = Q.at(np.array([middle]))[1][0]

@@ -229,8 +229,6 @@ def compare_stability(
         n_small=n_small,
         warnings=(
             *left,
-            *(f"full rotor: {text}" for text in full.warnings),
-            *(f"small model: {text}" for text in own.warnings),
             *_unconfirmed(full, n_full),
             *_doubts(full, own),
             *_damping_differs(speeds, full_decrement, small_decrement),
