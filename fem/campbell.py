@@ -282,8 +282,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
 
 def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
     """`followed`, over tables with so many speeds between that no two crossings of the 1× line are hidden."""
-    knots = rotor.knots
-    knots = knots[(knots > speeds[0]) & (knots < speeds[-1])]
+    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
     apart = np.abs(knots[:, None] - speeds).min(axis=1, initial=np.inf) > ROUNDED * speeds[-1]
     grid = np.union1d(speeds, knots[apart])
     for _ in range(_ROUNDS):

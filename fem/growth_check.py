@@ -124,7 +124,8 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
     from scipy.optimize import brentq
 
     knots = found.fine.P.rotor.knots
-    between = knots[(knots > min(unstable, stable)) & (knots < max(unstable, stable))]
+    ends = min(unstable, stable), max(unstable, stable)
+    between = knots[(knots > ends[0]) & (knots < ends[1])]
     trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))
     trials = trials if stable > unstable else trials[::-1]
     growth = largest_growth(found, trials)
@@ -147,7 +148,7 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
         parts = eigvals(start, start - end)
         part = parts[np.nanargmin(np.abs(parts - (speed - a) / (b - a)))].real
         return float(a + part * (b - a)), 0j
-    return _back(found, speed, value, (min(a, b), max(a, b))) if level else (speed, value)
+    return _back(found, speed, value, ends) if level else (speed, value)
 
 
 def growing_mode(

@@ -158,16 +158,6 @@ def general(band: FloatArray) -> FloatArray:
     return A
 
 
-def strain_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
-    """Twice the potential energy xᵀ K x of shaft and plain supports for each column of X, N·m, shape (m,)."""
-    stride = 4 if rotor.model.shear else 2
-    energy = shaft_energy(rotor, X)
-    for support in rotor.supports:
-        if support.plain:
-            energy = energy + support.stiffness * X[stride * (support.node - 1)] ** 2
-    return np.asarray(energy)
-
-
 def shaft_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
     """Twice the strain energy of the shaft and of tilting springs for each column of X, N·m, shape (m,).
 

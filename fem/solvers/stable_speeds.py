@@ -115,9 +115,9 @@ def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolA
         order = np.argsort(np.abs(lam.imag[near]))
         margins = (
             np.concatenate(([0.0], np.abs(lam.imag[near])[order])),
-            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))) - level,
+            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))),
         )
-        out = _certified(found.coarse, speeds, cuts, margins, found.low)
+        out = _certified(found.coarse, speeds, cuts, margins, found.low, level)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
         high = np.asarray((np.where(low, -1.0, rates(found, lam, oscillates)) > level).any(axis=1))
         at = np.searchsorted(cuts, speeds)
@@ -137,7 +137,12 @@ def rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
 
 
 def _certified(
-    Q: Quadratic, speeds: FloatArray, cuts: FloatArray, margins: tuple[FloatArray, FloatArray], low: float
+    Q: Quadratic,
+    speeds: FloatArray,
+    cuts: FloatArray,
+    margins: tuple[FloatArray, FloatArray],
+    low: float,
+    level: float,
 ) -> IndexArray:
     """1 where a low mode surely grows, −1 where surely none does, else 0, shape (S,)."""
     out = np.zeros(speeds.size, dtype=np.intp)
@@ -152,12 +157,13 @@ def _certified(
         halves = []
         for start in range(0, len(ranges), _CHUNK):
             part = ranges[start : start + _CHUNK]
-            sure, lam, margin = _constant(state, part, margins)
-            grows = ((lam.real > 0) & (np.abs(lam.imag) <= low)).any(axis=1)
+            sure, lam, margin = _constant(state, part, margins, level)
+            excess = lam.real - level * np.abs(lam)
+            grows = ((excess > 0) & (np.abs(lam.imag) <= low)).any(axis=1)
             for (a, b), holds, more in zip(part, sure, grows, strict=True):
                 if holds:
                     out[(speeds >= a) & (speeds <= b)] = 1 if more else -1
-            doubt = (np.abs(lam.real) <= margin * np.abs(lam)).any(axis=1)
+            doubt = (np.abs(excess) <= margin * np.abs(lam)).any(axis=1)
             again = part[~sure & ~(doubt & (depth >= _DEEP))]
             middle = again.mean(axis=1)
             halves += [np.stack((again[:, 0], middle), axis=1), np.stack((middle, again[:, 1]), axis=1)]
@@ -167,25 +173,28 @@ def _certified(
 
 
 def _constant(
-    state: Callable[[FloatArray], AnyArray], ranges: FloatArray, margins: tuple[FloatArray, FloatArray]
+    state: Callable[[FloatArray], AnyArray],
+    ranges: FloatArray,
+    margins: tuple[FloatArray, FloatArray],
+    level: float,
 ) -> tuple[BoolArray, AnyArray, FloatArray]:
-    """In which ranges, (B, 2), no eigenvalue comes near the axis; those in the middle, and margins, (B, n).
+    """In which ranges, (B, 2), no growth comes near the level; those in the middle, and margins, (B, n).
 
     The margin of an eigenvalue is that of the next frequency below.
     """
     lam, V = np.linalg.eig(state(ranges.mean(axis=1)))
     frequency, share = margins
     known = np.abs(lam.imag) <= 1.01 * frequency[-1]
-    margin = np.where(known, share[np.searchsorted(frequency, 1.01 * np.abs(lam.imag), "right") - 1], -GROWTH)
-    sign = np.where(lam.real > 0, -1.0, 1.0)[:, :, None]
+    margin = np.where(known, share[np.searchsorted(frequency, 1.01 * np.abs(lam.imag), "right") - 1], 0.0)
+    sign = np.where(lam.real > level * np.abs(lam), -1.0, 1.0)
     own = np.arange(V.shape[1])
     V[:, own, own] += _REGULAR  # vectors of equal eigenvalues may be one
     inverse = np.linalg.inv(V)
     sure: BoolArray = np.ones(len(ranges), dtype=bool)
     for end in (0, 1):
-        H = sign * (inverse @ state(ranges[:, end]) @ V)
+        H = sign[:, :, None] * (inverse @ state(ranges[:, end]) @ V)
         H = (H + np.swapaxes(H.conj(), 1, 2)) / 2
-        H[:, own, own] += margin * np.abs(lam)
+        H[:, own, own] += (margin - sign * level) * np.abs(lam)
         sure &= np.linalg.eigvalsh(H)[:, -1] < 0
     return sure, lam, margin
 

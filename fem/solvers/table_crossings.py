@@ -80,9 +80,9 @@ class TableSearch:
 
     def between(self, a: float, b: float) -> list[tuple[float, int]]:
         """Crossings in an interval of the tables, (speed, mode from 0), ascending, its upper end excluded."""
-        return sorted(self._halves(a, b, 0) if self._below(a) != self._below(b) else self._part(a, b, 0))
+        return sorted(self._halves(a, b, 0) if self.below(a) != self.below(b) else self._part(a, b, 0))
 
-    def _below(self, speed: float) -> int:
+    def below(self, speed: float) -> int:
         """How many modes lie below a speed."""
         return int(np.count_nonzero(self.at(speed).squares < speed * speed))
 
