@@ -283,8 +283,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
 
 def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
     """`followed`, over tables with so many speeds between that no two crossings of the 1× line are hidden."""
-    knots = np.array([knot for support in rotor.supports for knot in support.speeds])
-    knots = knots[(knots > speeds[0]) & (knots < speeds[-1])]
+    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
     apart = np.abs(knots[:, None] - speeds).min(axis=1, initial=np.inf) > ROUNDED * speeds[-1]
     grid = np.union1d(speeds, knots[apart])
     for _ in range(_ROUNDS):
@@ -415,19 +414,6 @@ def _paired(start: ComplexArray, begins: IndexArray) -> IndexArray:
 def runs_away(whirl: Whirl) -> list[bool]:
     """At which speeds a motion grows without oscillating, length S."""
     return [bool(real.size) and bool(real.max() > 1e-6 * whirl.scale) for real in whirl.found.real]
-
-
-def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
-    """Columns by frequency; of two that coincide the backward one first: Im λ < 0 in a complex coordinate."""
-    out: list[int] = []
-    for c in sorted(modes, key=lambda c: abs(start[c].imag)):
-        here = start[c].imag
-        before = start[out[-1]].imag if out else np.inf
-        if here < 0 < before and -here - before <= _PAIR * before:
-            out.insert(-1, c)
-        else:
-            out.append(c)
-    return out
 
 
 def _warnings(

@@ -86,11 +86,10 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    knots = np.unique(np.concatenate([np.array(table) for table in tables]))
-    knots = knots[(knots >= first) & (knots <= last)]
+    knots = [knot for knot in rotor.knots.tolist() if first <= knot <= last]
     search = TableSearch(rotor, A)
-    found = [root for a, b in itertools.pairwise(knots.tolist()) for root in search.between(a, b)]
-    below = int(np.count_nonzero(search.at(first).squares < first * first))
+    found = [root for a, b in itertools.pairwise(knots) for root in search.between(a, b)]
+    below = search.below(first)
     if not found:
         at = first if below else last
         raise ValueError(

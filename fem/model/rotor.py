@@ -202,6 +202,11 @@ class Rotor:
         return all(support.constant for support in self.supports)
 
     @property
+    def knots(self) -> FloatArray:
+        """Speeds at which a table of a support may change its slope, rad/s, ascending."""
+        return np.unique([speed for support in self.supports for speed in support.speeds])
+
+    @property
     def total_mass(self) -> float:
         """Mass of shaft and discs, kg."""
         shaft = float(np.sum(self.density * self.area * self.length))

@@ -148,6 +148,23 @@ def test_no_window_of_instability_is_missed_in_drawn_rotors():
     assert windows > 5
 
 
+def test_the_threshold_is_the_edge_of_the_first_window_whatever_mode_grows():
+    rng = np.random.default_rng(5)
+    speeds = np.linspace(2.0, 1498.0, 41)
+    highest = 0
+    for _ in range(12):
+        rotor = drawn(rng)
+        windows = unstable_windows(rotor, speeds)
+        found = fem.stability_threshold(rotor, 1498.0, lowest=2.0, n=1)
+        if not windows or not windows[0].begins:
+            assert found.status == ("unstable" if windows else "stable")
+            continue
+        assert found.threshold == pytest.approx(windows[0].first, rel=1e-5)
+        assert (found.mode, found.direction) == (windows[0].mode, windows[0].direction)
+        highest = max(highest, found.mode)
+    assert highest > 8  # among the modes that were watched before there was none
+
+
 def test_many_speeds_are_judged_as_each_alone():
     """Ranges that are certified as a whole hold what single speeds say."""
     for material in (0.0, 2e-4):
