@@ -34,9 +34,9 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
         braking = np.sqrt(np.maximum(np.linalg.det(c), 0.0))
         with np.errstate(divide="ignore", invalid="ignore"):
             own = np.where(circulating > tiny, circulating / braking, 0.0)
-        own = np.where(
-            np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny, np.maximum(own, speeds), own
-        )
+        outwards = np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny
+        # What is pushed aside does not oscillate, and is so at rest, too.
+        own = np.where(outwards, np.maximum(own, np.maximum(speeds, 1.0)), own)
         wrong = np.linalg.eigvalsh(c)[:, 0] < -_SLACK * np.abs(c).max(axis=(1, 2))
         bound = np.maximum(bound, np.where(wrong, np.inf, own))
     return np.asarray(bound)
@@ -45,7 +45,8 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     """Ranges of speed without a steady response, as far as they hold one of the speeds asked for.
 
-    Every speed is judged: first by `growth_bound`, then as `fem.solvers.stable_speeds` says.
+    Every speed is judged, and the knots of the tables between: first by `growth_bound`, then as
+    `fem.solvers.stable_speeds` says.
 
     Parameters
     ----------
@@ -60,18 +61,21 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
         If the rotor on the mean stiffness of its supports is statically unstable.
     """
     asked = np.unique(speeds)
-    bound = growth_bound(rotor, asked)
+    knots = np.unique([speed for support in rotor.supports for speed in support.speeds])
+    # Two windows are not one because nobody asked for a speed between them.
+    judged = np.union1d(asked, knots[(knots > asked[0]) & (knots < asked[-1])])
+    bound = growth_bound(rotor, judged)
     doubtful = bound > 0
     if not doubtful.any():
         return ()
-    knots = np.unique([speed for support in rotor.supports for speed in support.speeds])
-    found = bases(both_planes(rotor), asked[doubtful], float(bound.max()))
-    grows = np.zeros(asked.size, dtype=bool)
-    grows[doubtful] = growing_at(found, asked[doubtful], knots)
+    found = bases(both_planes(rotor), judged[doubtful], float(bound.max()))
+    grows = np.zeros(judged.size, dtype=bool)
+    grows[doubtful] = growing_at(found, judged[doubtful], knots)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], grows, [False]))))
     return tuple(
-        _window(found, asked, knots, int(start), int(end) - 1)
+        _window(found, judged, knots, int(start), int(end) - 1)
         for start, end in zip(edges[::2], edges[1::2], strict=True)
+        if np.isin(judged[start:end], asked).any()
     )
 
 
@@ -84,11 +88,11 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
     return windows, tuple(window.said() for window in windows)
 
 
-def _window(found: Bases, asked: FloatArray, knots: FloatArray, i: int, j: int) -> Window:
+def _window(found: Bases, judged: FloatArray, knots: FloatArray, i: int, j: int) -> Window:
     """The window that holds the speeds number i to j."""
-    begins, ends = i > 0, j + 1 < asked.size
-    first = _edge(found, asked[i], asked[i - 1], knots) if begins else float(asked[i])
-    last = _edge(found, asked[j], asked[j + 1], knots) if ends else float(asked[j])
+    begins, ends = i > 0, j + 1 < judged.size
+    first = _edge(found, judged[i], judged[i - 1], knots) if begins else float(judged[i])
+    last = _edge(found, judged[j], judged[j + 1], knots) if ends else float(judged[j])
     at = first if begins or not ends else last
     pairs = solve(found.fine, np.array([at]), found.fine.size, found.scale)
     values = pairs.values[0]
