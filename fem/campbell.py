@@ -15,7 +15,7 @@ from fem.model.rotor import Rotor, whole
 from fem.model.supports import ROUNDED
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import off_synchronous, synchronous, turns
-from fem.solvers.quadratic import NONE, Solutions
+from fem.solvers.quadratic import Solutions
 from fem.solvers.reduced_whirl import Whirl, solve_whirl, with_speeds
 from fem.solvers.stable_speeds import GROWTH
 from fem.solvers.tracking import Followed, follow
@@ -344,8 +344,8 @@ def _swings(values: ComplexArray) -> BoolArray:
 def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
     """What to say where modes that are not listed have critical speeds in the range."""
     others = np.delete(paths.values, columns, axis=1)
-    f = off_synchronous(np.where(_swings(others), others, NONE), whirl.speeds[:, None])
-    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
+    f, swings = off_synchronous(others, whirl.speeds[:, None]), _swings(others)
+    k, _ = np.nonzero((f[:-1] * f[1:] < 0) & (swings[:-1] | swings[1:]))
     if k.size:
         near = ", ".join(f"{speed:.6g}" for speed in np.unique(whirl.speeds[k])[:_NAMED])
         return (
@@ -460,19 +460,6 @@ def _paired(start: ComplexArray, begins: IndexArray) -> IndexArray:
 def runs_away(whirl: Whirl) -> list[bool]:
     """At which speeds a motion grows without oscillating, length S."""
     return [bool(real.size) and bool(real.max() > 1e-6 * whirl.scale) for real in whirl.found.real]
-
-
-def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
-    """Columns by frequency; of two that coincide the backward one first: Im λ < 0 in a complex coordinate."""
-    out: list[int] = []
-    for c in sorted(modes, key=lambda c: abs(start[c].imag)):
-        here = start[c].imag
-        before = start[out[-1]].imag if out else np.inf
-        if here < 0 < before and -here - before <= _PAIR * before:
-            out.insert(-1, c)
-        else:
-            out.append(c)
-    return out
 
 
 def _warnings(
