@@ -15,7 +15,6 @@ from rotorid.base.arrays import BoolArray, FloatArray
 
 _PARTS = 4  # into how many parts the step with an edge is divided
 _SLACK = 1e-12  # of the largest entry: rounding
-_AT_REST = 1e-300  # a bound, rad/s, that leaves room for motions that do not oscillate
 _NEAR = 1e-4  # relative step of speed for a slope
 _SECANTS = 3
 _PAIR = 1e-6  # relative distance of forward and backward whirl that coincide
@@ -39,7 +38,8 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
         with np.errstate(divide="ignore", invalid="ignore"):
             own = np.where(circulating > tiny, circulating / braking, 0.0)
         pushes = np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny
-        own = np.where(pushes, np.maximum(np.maximum(own, speeds), _AT_REST), own)
+        # What is pushed aside does not oscillate, and is so at rest, too.
+        own = np.where(pushes, np.maximum(own, np.maximum(speeds, 1.0)), own)
         wrong = np.linalg.eigvalsh(c)[:, 0] < -_SLACK * np.abs(c).max(axis=(1, 2))
         bound = np.maximum(bound, np.where(wrong, np.inf, own))
     return np.asarray(bound)
@@ -48,7 +48,8 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     """Ranges of speed without a steady response, as far as they hold one of the speeds asked for.
 
-    Every speed is judged: first by `growth_bound`, then as `fem.solvers.stable_speeds` says.
+    Every speed is judged, and the knots of the tables between: first by `growth_bound`, then as
+    `fem.solvers.stable_speeds` says.
 
     Parameters
     ----------
@@ -63,13 +64,16 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
         If the rotor on the mean stiffness of its supports is statically unstable.
     """
     asked = np.unique(speeds)
-    found, grows = judged(rotor, asked)
+    # Two windows are not one because nobody asked for a speed between them.
+    known = np.union1d(asked, rotor.knots[(rotor.knots > asked[0]) & (rotor.knots < asked[-1])])
+    found, grows = judged(rotor, known)
     if found is None:
         return ()
     edges = np.flatnonzero(np.diff(np.concatenate(([False], grows, [False]))))
     return tuple(
-        _window(found, asked, int(start), int(end) - 1)
+        _window(found, known, int(start), int(end) - 1)
         for start, end in zip(edges[::2], edges[1::2], strict=True)
+        if np.isin(known[start:end], asked).any()
     )
 
 
@@ -97,14 +101,14 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
     return windows, tuple(window.said() for window in windows)
 
 
-def _window(found: Bases, asked: FloatArray, i: int, j: int) -> Window:
+def _window(found: Bases, known: FloatArray, i: int, j: int) -> Window:
     """The window that holds the speeds number i to j."""
-    (first, start), (last, end) = (float(asked[i]), None), (float(asked[j]), None)
-    begins, ends = i > 0, j + 1 < asked.size
+    (first, start), (last, end) = (float(known[i]), None), (float(known[j]), None)
+    begins, ends = i > 0, j + 1 < known.size
     if begins:
-        first, start = loss(found, asked[i], asked[i - 1])
+        first, start = loss(found, known[i], known[i - 1])
     if ends:
-        last, end = loss(found, asked[j], asked[j + 1])
+        last, end = loss(found, known[j], known[j + 1])
     mode = growing_mode(found, last, end) if ends and not begins else growing_mode(found, first, start)
     return Window(first, last, begins, ends, *mode)
 

@@ -34,8 +34,11 @@ def campbell(
         typer.Option("--speeds", help="FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm."),
     ],
     n: Annotated[
-        int, typer.Option("-n", "--number", min=1, help="How many modes; forward and backward count apart.")
-    ] = 6,
+        int | None,
+        typer.Option(
+            "-n", "--number", min=1, help="How many modes, by default 6; forward and backward count apart."
+        ),
+    ] = None,
     operating: OperatingOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,
@@ -77,7 +80,7 @@ def campbell(
         lambda: "\n".join([result.summary(), *([] if inside is None else [separation_text(inside)])]),
         as_json=json,
         files=rotor_files(rotor),
-        options={"speeds": speed, "number": n, "operating": operating},
+        options={"speeds": speed, "number": n or result.frequencies.shape[1], "operating": operating},
         figure=(plot, picture),
         table=(output, result.to_frame),
     )

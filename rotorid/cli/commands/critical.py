@@ -31,11 +31,14 @@ if TYPE_CHECKING:
 def critical(
     rotor: RotorArgument,
     n: Annotated[
-        int,
+        int | None,
         typer.Option(
-            "-n", "--number", min=1, help="How many critical speeds; rigid-body motions come besides."
+            "-n",
+            "--number",
+            min=1,
+            help="How many critical speeds, by default 3; rigid-body motions come besides.",
         ),
-    ] = 3,
+    ] = None,
     mesh_check: Annotated[
         bool, typer.Option("--mesh-check", help="Estimate by refinement how far off the mesh makes each.")
     ] = False,
@@ -66,6 +69,7 @@ def critical(
     model = read_rotor(rotor)
     with busy("critical speeds"):
         modes = fem.critical_speeds(model, n)
+        n = n or sum(frequency > 0 for frequency in modes.frequencies.tolist()) or 1
         mesh = fem.mesh_check(model, n) if mesh_check else None
         chart, left_out = _map(model, n) if speed_map else (None, [])
 

@@ -98,6 +98,8 @@ def warn_of_rotor(source: str, rotor: Rotor) -> None:
             f"{source}: the shaft is {span:.4g} m long in all and {thin:.4g} m thick at least; are length "
             "and diameter exchanged?"
         )
+    if max(span, float(rotor.outer_diameter.max())) > USUAL["length"].high:
+        return  # nor is the mass then known
     bearings = [s for s in rotor.supports if s.kind == "bearing"]
     soft, first = [], ""
     for number, bearing in enumerate(bearings, start=1):
