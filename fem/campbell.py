@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth import Growing, growing
-from fem.growth_check import judge
+from fem.growth import Growing, growing, joined
+from fem.growth_check import growth_bound, judge
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import ROUNDED
@@ -258,7 +258,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
     crossings = crossings.only(_swings(crossings.values))
     at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
     unstable = growing(whirl, values, X)
-    windows, said = judge(rotor, speeds)
+    windows, said = _windows(whirl, asked, values, unstable) or judge(rotor, speeds)
     shown = np.zeros(speeds.size, dtype=bool)
     for mode in unstable:
         shown |= (speeds >= mode.speed) & (speeds <= mode.last)
@@ -291,6 +291,23 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         windows=windows,
         cut=_cut(whirl, paths, columns),
     )
+
+
+def _windows(
+    whirl: Whirl, asked: IndexArray, values: ComplexArray, listed: tuple[Growing, ...]
+) -> tuple[tuple[Window, ...], tuple[str, ...]] | None:
+    """As `judge`, where every mode that may grow is known and those that do are listed; else None."""
+    found = whirl.found.values[asked]
+    numbers = [
+        np.count_nonzero(np.nan_to_num(lam.real / np.abs(lam), nan=-1.0) > GROWTH, axis=1)
+        for lam in (found, values[asked])
+    ]
+    known = np.nanmax(np.abs(found.imag), axis=1, initial=0.0)
+    bound = growth_bound(whirl.Q.P.rotor, whirl.speeds[asked])
+    if (bound > known).any() or (numbers[0] > numbers[1]).any() or any(runs_away(whirl)):
+        return None
+    windows = joined(listed, whirl.speeds[asked])
+    return windows, tuple(window.said() for window in windows)
 
 
 def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:

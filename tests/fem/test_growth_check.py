@@ -165,6 +165,26 @@ def test_the_threshold_is_the_edge_of_the_first_window_whatever_mode_grows():
     assert highest > 8  # among the modes that were watched before there was none
 
 
+def test_the_windows_of_a_campbell_diagram_are_those_of_the_rotor():
+    rng = np.random.default_rng(8)
+    speeds = np.linspace(2.0, 1498.0, 41)
+    from_list = windows = 0
+    for _ in range(24):
+        rotor = drawn(rng)
+        expected, found = unstable_windows(rotor, speeds), fem.campbell(rotor, speeds, 4)
+        windows += len(expected)
+        from_list += len(expected) > 0 and len(found.unstable) > 0
+        ends = [
+            [end for window in some for end in (window.first, window.last)]
+            for some in (found.windows, expected)
+        ]
+        assert ends[0] == pytest.approx(ends[1], rel=1e-6)
+        assert [w.begins for w in found.windows] == [w.begins for w in expected]
+        assert [w.ends for w in found.windows] == [w.ends for w in expected]
+    assert windows > 10
+    assert from_list > 5
+
+
 def pushed_at_rest():
     """Held by bearings, pushed aside by a seal at low speed and at rest."""
     seal = fem.Support(2, [-2e6, -1e5], speeds=(0.0, 500.0), kind="seal")
