@@ -47,6 +47,7 @@ from balancing.solvers.error_propagation import (
 )
 from balancing.unbalance_result import Unbalance
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import counted
 from rotorid.regression import RCOND, stretch
 
 Method = Literal["minimum-norm", "ridge", "modal"]
@@ -276,7 +277,7 @@ def _basis(shapes: ArrayLike | None, masses: ArrayLike | None, Q: int) -> FloatA
     singular = np.linalg.svd(root / np.where(scale > 0, scale, 1.0), compute_uv=False)
     if Phi.shape[1] > Q or singular[-1] <= 1e-6 * singular[0]:
         raise UndeterminedError(
-            f"{Q} station{'s' if Q > 1 else ''} cannot tell {Phi.shape[1]} modes apart: "
+            f"{counted(Q, 'station')} cannot tell {Phi.shape[1]} modes apart: "
             "choose fewer modes, or more stations where the shapes differ"
         )
     return np.asarray(np.sqrt(m)[:, None] * np.linalg.pinv(root).T)
@@ -296,7 +297,7 @@ def _gain(
     rank = int(np.count_nonzero(s > RCOND * s[0]))
     if method == "modal" and rank < A.shape[1]:
         raise UndeterminedError(
-            f"{len(A)} reading{'s' if len(A) > 1 else ''} cannot tell {A.shape[1]} modes apart: "
+            f"{counted(len(A), 'reading')} cannot tell {A.shape[1]} modes apart: "
             "choose fewer modes, or add sensors or speeds"
         )
     left, s, right = left[:, :rank], s[:rank], right[:rank]
@@ -370,4 +371,4 @@ def _warnings(result: Unbalance, N: int) -> tuple[str, ...]:
 
 
 def _where(result: Unbalance) -> str:
-    return "at these stations" if result.modal is None else f"in {len(result.modal)} modes"
+    return "at these stations" if result.modal is None else f"in {counted(len(result.modal), 'mode')}"

@@ -8,27 +8,32 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.growth import Growing, growing
-from fem.growth_check import judge
+from fem.growth import Growing, growing, joined
+from fem.growth_check import growth_bound, judge
 from fem.matrices.lateral_planes import both_planes
-from fem.model.rotor import Rotor
+from fem.model.rotor import Rotor, whole
 from fem.model.supports import ROUNDED
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import off_synchronous, synchronous, turns
-from fem.solvers.reduced_whirl import Whirl, solve_whirl
+from fem.solvers.quadratic import Solutions
+from fem.solvers.reduced_whirl import Whirl, solve_whirl, with_speeds
 from fem.solvers.stable_speeds import GROWTH
 from fem.solvers.tracking import Followed, follow
 from fem.whirl import available_modes, checked_number, checked_speeds, in_both_planes
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 HEAVY = 1.28  # log decrement at an amplification factor of 2.5: critically damped after API 684
-_ROUNDS = 4  # of looking for crossings between the speeds
+_ROUNDS = 8  # of looking for crossings between the speeds
+_PARTS = 20  # into which a range over tables is divided at least
+_SWINGS = 0.4  # |Im λ| / |λ| below which a mode hardly oscillates: log decrement above 14
+_NARROW = 1e-3  # of a speed: steps that are not divided for a mode that ceases to oscillate
 _NAMED = 5  # critical speeds that a warning names
 _SPARE = 2  # modes above those asked for, which may come down; more are taken where a mode is lost
 _MOST = 3  # modes computed for each one asked for, at most
@@ -51,7 +56,8 @@ class Campbell:
     direction
         1 forward, −1 backward, 0 neither (a line, or different along the rotor), shape (S, n).
     critical_speeds
-        Damped critical speeds, where a frequency equals the speed, rad/s, ascending, shape (c,).
+        Damped critical speeds, where a frequency equals the speed, rad/s, ascending, shape (c,); not those of
+        motions that hardly oscillate (log decrement above 14).
     critical_modes
         Which column (from 1) each belongs to, shape (c,).
     critical_log_decrements, critical_direction
@@ -194,7 +200,7 @@ class Campbell:
 _LETTERS = {1.0: "F", -1.0: "B", 0.0: "-"}
 
 
-def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
+def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
     """Compute whirl frequencies, logarithmic decrements and directions over speed.
 
     Modes are followed from speed to speed by the likeness of their complex shapes (MAC), with smaller steps
@@ -211,16 +217,20 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     speeds
         rad/s, ascending, shape (S,).
     n
-        How many modes; forward and backward whirl count apart.
+        How many modes, by default 6; forward and backward whirl count apart. Where the model has fewer, all.
 
     Raises
     ------
     ValueError
-        If speeds are impossible or outside the table of a support, the model has fewer modes, or the mesh is
-        too fine for float64, or the rotor is pushed aside by negative stiffness at every speed.
+        If speeds are impossible or outside the table of a support, the mesh is too fine for float64, or the
+        rotor is pushed aside by negative stiffness at every speed.
     """
     speeds = checked_speeds(speeds)
-    checked_number(rotor, n)
+    available = available_modes(rotor)
+    said_of_number: tuple[str, ...] = ()
+    if n is not None and whole(n, "the number of modes") > available:
+        said_of_number, n = (f"the model has only {available} of {n} modes",), available
+    n = checked_number(rotor, n)
     whirl, paths, columns = _followed_closely(rotor, speeds, n)
     asked = np.searchsorted(whirl.speeds, speeds)
     if not columns.size:
@@ -237,16 +247,17 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     frequencies = np.where(gone, np.nan, lam.imag)
     log_decrements = -2 * np.pi * lam.real / frequencies
     crossings = synchronous(whirl, values, X)
+    crossings = crossings.only(_swings(crossings.values))
     at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
     unstable = growing(whirl, values, X)
-    windows, said = judge(rotor, speeds)
+    windows, said = _windows(whirl, asked, values, unstable) or judge(rotor, speeds)
     shown = np.zeros(speeds.size, dtype=bool)
     for mode in unstable:
         shown |= (speeds >= mode.speed) & (speeds <= mode.last)
     hidden = [
-        f"{text} (a mode that is not listed: ask for more)"
+        text if window.mode is None else f"{text} (a mode that is not listed: ask for more)"
         for window, text in zip(windows, said, strict=False)
-        if window.mode is not None and (within((window,), speeds) & ~shown).any()
+        if window.mode is None or (within((window,), speeds) & ~shown).any()
     ]
     hidden += said[len(windows) :]
     for array in (frequencies, log_decrements, direction, crossings.speeds):
@@ -266,6 +277,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
             *(mode.said() for mode in unstable),
             *hidden,
             *_warnings(whirl, paths, columns, n, asked),
+            *said_of_number,
         ),
         unstable=unstable,
         windows=windows,
@@ -273,27 +285,76 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int = 6) -> Campbell:
     )
 
 
+def _windows(
+    whirl: Whirl, asked: IndexArray, values: ComplexArray, listed: tuple[Growing, ...]
+) -> tuple[tuple[Window, ...], tuple[str, ...]] | None:
+    """As `judge`, where every mode that may grow is known and those that do are listed; else None."""
+    found = whirl.found.values[asked]
+    numbers = [
+        np.count_nonzero(np.nan_to_num(lam.real / np.abs(lam), nan=-1.0) > GROWTH, axis=1)
+        for lam in (found, values[asked])
+    ]
+    known = np.nanmax(np.abs(found.imag), axis=1, initial=0.0)
+    bound = growth_bound(whirl.Q.P.rotor, whirl.speeds[asked])
+    if (bound > known).any() or (numbers[0] > numbers[1]).any() or any(runs_away(whirl)):
+        return None
+    windows = joined(listed, whirl.speeds[asked])
+    return windows, tuple(window.said() for window in windows)
+
+
 def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
     """`followed`, over tables with so many speeds between that no two crossings of the 1× line are hidden."""
-    knots = np.array([knot for support in rotor.supports for knot in support.speeds])
-    knots = knots[(knots > speeds[0]) & (knots < speeds[-1])]
-    apart = np.abs(knots[:, None] - speeds).min(axis=1, initial=np.inf) > ROUNDED * speeds[-1]
-    grid = np.union1d(speeds, knots[apart])
-    for _ in range(_ROUNDS):
-        found = followed(rotor, grid, n)
-        if rotor.constant:
-            break
-        extra = turns(found[0], found[1].values, found[1].vectors, off_synchronous)
+    knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
+    grid = _with(speeds, knots)
+    if not rotor.constant:
+        grid = _with(grid, np.linspace(speeds[0], speeds[-1], _PARTS + 1))
+    whirl, paths, columns = followed(rotor, grid, n)
+    known: dict[float, Solutions] = {}
+    extra = grid
+    for _ in range(0 if rotor.constant else _ROUNDS):
+        new = np.isin(whirl.speeds, extra)
+        extra = np.union1d(
+            turns(whirl, paths.values, paths.vectors, off_synchronous, new[:-1] | new[1:]),
+            _unclear(whirl, paths),
+        )
         if not extra.size:
             break
-        grid = np.union1d(grid, extra)
-    return found
+        whirl = with_speeds(whirl, extra)
+        paths = follow(whirl, known)
+        columns = asked_for(paths, whirl.speeds, n)
+    return whirl, paths, columns
+
+
+def _with(speeds: FloatArray, more: FloatArray) -> FloatArray:
+    """Speeds with those of others that differ by more than rounding."""
+    apart = np.abs(more[:, None] - speeds).min(axis=1, initial=np.inf) > ROUNDED * speeds[-1]
+    return np.union1d(speeds, more[apart])
+
+
+def _unclear(whirl: Whirl, paths: Followed) -> FloatArray:
+    """Middles of intervals in which modes cross the 1× line both ways: they may have been exchanged.
+
+    And of those in which a mode above it begins or ceases to oscillate, which crosses it there.
+    """
+    speeds, f = whirl.speeds, off_synchronous(paths.values, whirl.speeds[:, None])
+    gone = np.isnan(f) & ~went_above(whirl, paths, np.arange(f.shape[1]))
+    ends = (gone[1:] & (f[:-1] > 0)) | (gone[:-1] & (f[1:] > 0))
+    up, down = (f[:-1] < 0) & (f[1:] > 0), (f[:-1] > 0) & (f[1:] < 0)
+    unclear = ends.any(axis=1) | (up.any(axis=1) & down.any(axis=1))
+    unclear &= np.diff(speeds) > _NARROW * speeds[1:]
+    return np.asarray(((speeds[:-1] + speeds[1:]) / 2)[unclear])
+
+
+def _swings(values: ComplexArray) -> BoolArray:
+    """Which modes oscillate so that a critical speed has a meaning: damping ratio below 0.92."""
+    return np.asarray(np.abs(values.imag) > _SWINGS * np.abs(values))
 
 
 def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
     """What to say where modes that are not listed have critical speeds in the range."""
-    f = off_synchronous(np.delete(paths.values, columns, axis=1), whirl.speeds[:, None])
-    k, _ = np.nonzero(f[:-1] * f[1:] < 0)
+    others = np.delete(paths.values, columns, axis=1)
+    f, swings = off_synchronous(others, whirl.speeds[:, None]), _swings(others)
+    k, _ = np.nonzero((f[:-1] * f[1:] < 0) & (swings[:-1] | swings[1:]))
     if k.size:
         near = ", ".join(f"{speed:.6g}" for speed in np.unique(whirl.speeds[k])[:_NAMED])
         return (
@@ -367,8 +428,9 @@ def asked_for(paths: Followed, speeds: FloatArray, n: int) -> IndexArray:
     begins = np.asarray(there.argmax(axis=0))
     start = values[begins, np.arange(count)]
     grows = ((np.nan_to_num(values.real / np.abs(values)) > GROWTH) & low).any(axis=0)
-    seldom = there.sum(axis=0) < S / 2
-    meets = np.array([_meets(size[there[:, c], c], speeds[there[:, c]]) for c in range(count)])
+    swings = _swings(values)
+    seldom = swings.sum(axis=0) < S / 2
+    meets = np.array([_meets(size[swings[:, c], c], speeds[swings[:, c]]) for c in range(count)])
     order = np.lexsort((_paired(start, begins), -low.sum(axis=0), meets, seldom, ~grows))
     best = [c for c in order if low[:, c].any() or np.isfinite(meets[c])][:n]
     rank = _paired(start, begins)
@@ -409,19 +471,6 @@ def runs_away(whirl: Whirl) -> list[bool]:
     return [bool(real.size) and bool(real.max() > 1e-6 * whirl.scale) for real in whirl.found.real]
 
 
-def _by_frequency(modes: list[int], start: ComplexArray) -> list[int]:
-    """Columns by frequency; of two that coincide the backward one first: Im λ < 0 in a complex coordinate."""
-    out: list[int] = []
-    for c in sorted(modes, key=lambda c: abs(start[c].imag)):
-        here = start[c].imag
-        before = start[out[-1]].imag if out else np.inf
-        if here < 0 < before and -here - before <= _PAIR * before:
-            out.insert(-1, c)
-        else:
-            out.append(c)
-    return out
-
-
 def _warnings(
     whirl: Whirl, paths: Followed, columns: IndexArray, n: int, asked: IndexArray
 ) -> tuple[str, ...]:
@@ -436,7 +485,7 @@ def _warnings(
         for k in np.flatnonzero(cells.any(axis=0)):
             where = speeds[cells[:, k]]
             texts.append(
-                f"mode {k + 1} {text} at {where.size} of {speeds.size} speeds, "
+                f"mode {k + 1} {text} at {where.size} of {counted(speeds.size, 'speed')}, "
                 f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
             )
     if columns.size < n:
@@ -444,12 +493,6 @@ def _warnings(
     rigid = whirl.found.still // 2
     if rigid.any():
         texts.append("rigid-body motions that nothing holds (eigenvalue 0) are left out")
-    away = np.flatnonzero(runs_away(whirl))
-    if away.size:
-        texts.append(
-            f"the rotor runs away without oscillating from {whirl.speeds[away[0]]:.6g} rad/s on: "
-            "a support pushes it aside; check negative stiffness"
-        )
     doubtful = sorted({k for k, mode in paths.doubtful if mode in columns})
     if doubtful:
         places = ", ".join(f"{whirl.speeds[k]:.6g}" for k in doubtful[:5])

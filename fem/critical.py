@@ -17,10 +17,11 @@ from fem.solvers.table_crossings import Found, TableSearch, positive_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line
+_USUAL = 3  # critical speeds, where nothing else is asked for
 _NAMED = 5  # critical speeds beyond the end of a list that are named
 
 
-def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
+def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
     """Compute the n lowest critical speeds and mode shapes of the undamped rotor.
 
     At a critical speed the rotor, turning at this speed, whirls freely once per turn: the gyroscopic moment
@@ -35,7 +36,7 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
     rotor
         The rotor; without enough supports its rigid-body motions come first, with frequency 0.
     n
-        How many, from 1; rigid-body motions, of frequency 0, come besides.
+        How many, from 1, by default 3 or all there are; rigid-body motions, of frequency 0, come besides.
 
     Returns
     -------
@@ -50,7 +51,7 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
         If the model has fewer than n modes, the bearing tables hold no critical speed, nothing
         that moves has mass, or the mesh is too fine for float64.
     """
-    n = whole(n, "the number of critical speeds")
+    asked = _USUAL if n is None else whole(n, "the number of critical speeds")
     A = assemble(rotor)
     said: tuple[str, ...] = ()
     cut = ""
@@ -58,14 +59,15 @@ def critical_speeds(rotor: Rotor, n: int = 3) -> Modes:
         pencil = whole_rotor(rotor, A)
         rigid = pencil.rigid.shape[1]
         available = finite_modes(pencil)
-        _check_number(n, max(available - rigid, min(available, 1)))
-        found = positive_modes(pencil, n + rigid)
+        available = max(available - rigid, min(available, 1))
+        _check_number(1 if n is None else asked, available)
+        found = positive_modes(pencil, min(asked, available) + rigid)
         thin = " (discs whose polar inertia exceeds the diametral one take some away)"
-        _check_number(n, found.squares.size - rigid, thin)
-        parts = [found.only(slice(0, n + rigid))]
+        _check_number(1 if n is None else asked, found.squares.size - rigid, thin)
+        parts = [found.only(slice(0, asked + rigid))]
     else:
-        _check_number(n, n)
-        parts, said, cut = _over_speed(rotor, A, n)
+        _check_number(asked, asked)
+        parts, said, cut = _over_speed(rotor, A, asked)
     return replace(_modes(rotor, parts, said), cut=cut)
 
 
@@ -86,11 +88,10 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
     first, last = max(table[0] for table in tables), min(table[-1] for table in tables)
     if first >= last:
         raise ValueError("the tables of the supports have no speed in common: extend them")
-    knots = np.unique(np.concatenate([np.array(table) for table in tables]))
-    knots = knots[(knots >= first) & (knots <= last)]
+    knots = [knot for knot in rotor.knots.tolist() if first <= knot <= last]
     search = TableSearch(rotor, A)
-    found = [root for a, b in itertools.pairwise(knots.tolist()) for root in search.between(a, b)]
-    below = int(np.count_nonzero(search.at(first).squares < first * first))
+    found = [root for a, b in itertools.pairwise(knots) for root in search.between(a, b)]
+    below = search.below(first)
     if not found:
         at = first if below else last
         raise ValueError(

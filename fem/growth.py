@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fem.solvers.quadratic import NONE
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.whirl import in_both_planes
+from fem.windows import Window
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.units import RPM, speed_text
 
@@ -123,6 +125,23 @@ def growing(whirl: Whirl, values: ComplexArray, X: ComplexArray) -> tuple[Growin
             )
         )
     return tuple(sorted(out, key=lambda g: (g.speed, g.mode)))
+
+
+def joined(ranges: Sequence[Growing], speeds: FloatArray) -> tuple[Window, ...]:
+    """Ranges of speed in which some mode grows, as far as they hold one of the speeds, ascending.
+
+    Modes have the numbers that they have in the list.
+    """
+    found: list[Window] = []
+    for g in ranges:
+        last, ends = (g.last, False) if g.end is None else (g.end, True)
+        if found and g.speed <= found[-1].last:
+            if last > found[-1].last:
+                found[-1] = replace(found[-1], last=last, ends=ends)
+        else:
+            begins = bool(g.speed > speeds[0])
+            found.append(Window(g.speed, last, begins, ends, g.mode, g.frequency, g.direction))
+    return tuple(w for w in found if ((speeds >= w.first) & (speeds <= w.last)).any())
 
 
 def _level(lam: ComplexArray, _: FloatArray) -> FloatArray:

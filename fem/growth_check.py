@@ -1,4 +1,4 @@
-"""At which speeds a steady response exists at all: the stability of the rotor at every speed asked for."""
+"""At which speeds a steady response exists: stability at every speed asked for, and where it is lost."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ import numpy as np
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
 from fem.orbits import whirl_direction
-from fem.solvers.quadratic import solve
-from fem.solvers.stable_speeds import GROWTH, Bases, bases, growing_at, largest_growth
+from fem.solvers.quadratic import all_values, solve
+from fem.solvers.stable_speeds import GROWTH, Bases, bases, growing_at, largest_growth, rates
 from fem.whirl import in_both_planes
 from fem.windows import Window
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 
-_PARTS = 8  # into how many parts the step with an edge is divided
+_PARTS = 4  # into how many parts the step with an edge is divided
 _SLACK = 1e-12  # of the largest entry: rounding
+_NEAR = 1e-4  # relative step of speed for a slope
+_SECANTS = 3
+_PAIR = 1e-6  # relative distance of forward and backward whirl that coincide
 
 
 def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
@@ -34,9 +37,9 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
         braking = np.sqrt(np.maximum(np.linalg.det(c), 0.0))
         with np.errstate(divide="ignore", invalid="ignore"):
             own = np.where(circulating > tiny, circulating / braking, 0.0)
-        own = np.where(
-            np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny, np.maximum(own, speeds), own
-        )
+        pushes = np.linalg.eigvalsh((k + np.swapaxes(k, 1, 2)) / 2)[:, 0] < -tiny
+        # What is pushed aside does not oscillate, and is so at rest, too.
+        own = np.where(pushes, np.maximum(own, np.maximum(speeds, 1.0)), own)
         wrong = np.linalg.eigvalsh(c)[:, 0] < -_SLACK * np.abs(c).max(axis=(1, 2))
         bound = np.maximum(bound, np.where(wrong, np.inf, own))
     return np.asarray(bound)
@@ -45,7 +48,8 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
 def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
     """Ranges of speed without a steady response, as far as they hold one of the speeds asked for.
 
-    Every speed is judged: first by `growth_bound`, then as `fem.solvers.stable_speeds` says.
+    Every speed is judged, and the knots of the tables between: first by `growth_bound`, then as
+    `fem.solvers.stable_speeds` says.
 
     Parameters
     ----------
@@ -60,19 +64,32 @@ def unstable_windows(rotor: Rotor, speeds: FloatArray) -> tuple[Window, ...]:
         If the rotor on the mean stiffness of its supports is statically unstable.
     """
     asked = np.unique(speeds)
-    bound = growth_bound(rotor, asked)
-    doubtful = bound > 0
-    if not doubtful.any():
+    # Two windows are not one because nobody asked for a speed between them.
+    known = np.union1d(asked, rotor.knots[(rotor.knots > asked[0]) & (rotor.knots < asked[-1])])
+    found, grows = judged(rotor, known)
+    if found is None:
         return ()
-    knots = np.unique([speed for support in rotor.supports for speed in support.speeds])
-    found = bases(both_planes(rotor), asked[doubtful], float(bound.max()))
-    grows = np.zeros(asked.size, dtype=bool)
-    grows[doubtful] = growing_at(found, asked[doubtful], knots)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], grows, [False]))))
     return tuple(
-        _window(found, asked, knots, int(start), int(end) - 1)
+        _window(found, known, int(start), int(end) - 1)
         for start, end in zip(edges[::2], edges[1::2], strict=True)
+        if np.isin(known[start:end], asked).any()
     )
+
+
+def judged(rotor: Rotor, speeds: FloatArray, level: float = GROWTH) -> tuple[Bases | None, BoolArray]:
+    """At which speeds, ascending, shape (S,), a mode grows beyond a level, and the equations that tell it.
+
+    These are None where no mode can grow: `growth_bound` says so.
+    """
+    bound = growth_bound(rotor, speeds)
+    doubtful = bound > 0
+    grows = np.zeros(speeds.size, dtype=bool)
+    if not doubtful.any():
+        return None, grows
+    found = bases(both_planes(rotor), speeds[doubtful], float(bound.max()))
+    grows[doubtful] = growing_at(found, speeds[doubtful], level)
+    return found, grows
 
 
 def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[str, ...]]:
@@ -84,40 +101,102 @@ def judge(rotor: Rotor, speeds: FloatArray) -> tuple[tuple[Window, ...], tuple[s
     return windows, tuple(window.said() for window in windows)
 
 
-def _window(found: Bases, asked: FloatArray, knots: FloatArray, i: int, j: int) -> Window:
+def _window(found: Bases, known: FloatArray, i: int, j: int) -> Window:
     """The window that holds the speeds number i to j."""
-    begins, ends = i > 0, j + 1 < asked.size
-    first = _edge(found, asked[i], asked[i - 1], knots) if begins else float(asked[i])
-    last = _edge(found, asked[j], asked[j + 1], knots) if ends else float(asked[j])
-    at = first if begins or not ends else last
-    pairs = solve(found.fine, np.array([at]), found.fine.size, found.scale)
-    values = pairs.values[0]
-    rates = np.nan_to_num(values.real / np.abs(values), nan=-1.0)
-    rates[np.nan_to_num(np.abs(values.imag)) > found.highest] = -1.0
-    k = int(np.argmax(rates))
-    real = float(pairs.real[0].max(initial=-found.scale))
-    if real > max(rates[k], 0.0) * found.scale:
-        return Window(first, last, begins, ends)
-    lam, x, y = in_both_planes(values[k : k + 1], found.fine.nodes(pairs.vectors[:1, k]))
-    return Window(first, last, begins, ends, k + 1, float(lam.imag[0]), float(whirl_direction(x, y)[0]))
+    (first, start), (last, end) = (float(known[i]), None), (float(known[j]), None)
+    begins, ends = i > 0, j + 1 < known.size
+    if begins:
+        first, start = loss(found, known[i], known[i - 1])
+    if ends:
+        last, end = loss(found, known[j], known[j + 1])
+    mode = growing_mode(found, last, end) if ends and not begins else growing_mode(found, first, start)
+    return Window(first, last, begins, ends, *mode)
 
 
-def _edge(found: Bases, unstable: float, stable: float, knots: FloatArray) -> float:
-    """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first."""
+def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) -> tuple[float, complex]:
+    """Where growth at one speed, rad/s, ends on the way to another: the edge next to the first.
+
+    Sought is the root of the largest growth of all modes, which needs no mode to be followed. Of a motion
+    without damping rounding decides the sign of Re λ: beside one, growth beyond a level is asked for, and the
+    last step back to Re λ = 0 is made along the slope of the mode that grows.
+
+    Returns
+    -------
+    The speed, and the eigenvalue that grows from there; 0 if the rotor runs away without oscillating.
+    """
+    from scipy.linalg import eigvals
     from scipy.optimize import brentq
 
-    # Where the mode decays beyond rounding on the other side, its growth vanishes at the edge.
-    level = 0.0 if largest_growth(found, np.array([stable]))[0] < -GROWTH else GROWTH
-
-    def excess(speeds: FloatArray) -> FloatArray:
-        return largest_growth(found, speeds) - level
-
-    between = knots[(knots > min(unstable, stable)) & (knots < max(unstable, stable))]
+    knots = found.fine.P.rotor.knots
+    ends = min(unstable, stable), max(unstable, stable)
+    between = knots[(knots > ends[0]) & (knots < ends[1])]
     trials = np.unique(np.concatenate((np.linspace(unstable, stable, _PARTS + 1), between)))
     trials = trials if stable > unstable else trials[::-1]
-    over = excess(trials) > 0
+    growth = largest_growth(found, trials)
+    if growth[-1] < -level:
+        level = 0.0
+    over = growth > level
     k = int(np.argmin(over))
     if over.all() or k == 0:
-        return unstable
-    a, b = float(trials[k - 1]), float(trials[k])
-    return float(brentq(lambda v: float(excess(np.array([v]))[0]), a, b, xtol=1e-13 * max(a, b), rtol=1e-12))
+        return float(unstable), _fastest(found, unstable)
+    a, b = trials[k - 1 : k + 1].tolist()
+
+    def excess(speed: float) -> float:
+        return float(largest_growth(found, np.array([speed]))[0]) - level
+
+    speed = float(brentq(excess, a, b, xtol=1e-13 * max(a, b), rtol=1e-14))
+    value = _fastest(found, speed)
+    if not value:
+        # K is singular there, and linear between a and b: sharper than the eigenvalue, which rounding blurs.
+        start, end = found.fine.at(np.array([a, b]))[1]
+        parts = eigvals(start, start - end)
+        part = parts[np.nanargmin(np.abs(parts - (speed - a) / (b - a)))].real
+        return float(a + part * (b - a)), 0j
+    return _back(found, speed, value, ends) if level else (speed, value)
+
+
+def growing_mode(
+    found: Bases, speed: float, value: complex | None = None
+) -> tuple[int, float, float] | tuple[None, None, None]:
+    """Number by frequency, from 1, whirl frequency and direction of a mode, by default the fastest growing.
+
+    Of two that coincide the backward one comes first. None if the motion does not oscillate.
+    """
+    value = _fastest(found, speed) if value is None else value
+    if not value:
+        return None, None, None
+    pairs = solve(found.fine, np.array([speed]), 2 * found.fine.size, found.scale)
+    lam, size = pairs.values[0], np.abs(pairs.values[0].imag)
+    k = int(np.nanargmin(np.abs(lam - value)))
+    before = size < (1 - _PAIR) * size[k]
+    before |= (lam.imag < 0) & (lam[k].imag > 0) & (size < (1 + _PAIR) * size[k])
+    _, x, y = in_both_planes(lam[k : k + 1], found.fine.nodes(pairs.vectors[:1, k]))
+    return 1 + int(np.count_nonzero(before)), float(size[k]), float(whirl_direction(x, y)[0])
+
+
+def _back(found: Bases, speed: float, value: complex, ends: tuple[float, float]) -> tuple[float, complex]:
+    """Speed and eigenvalue where a mode neither grows nor decays, from where it grows a little."""
+    step = min(_NEAR * ends[1], (ends[1] - ends[0]) / 2)
+    other = speed + step if speed + step <= ends[1] else speed - step
+    there = _nearest(found, other, value).real
+    for _ in range(_SECANTS):
+        if there == value.real:
+            break
+        new = float(np.clip(speed - value.real * (other - speed) / (there - value.real), *ends))
+        other, there, speed = speed, value.real, new
+        value = _nearest(found, speed, value)
+    return speed, value
+
+
+def _nearest(found: Bases, speed: float, value: complex) -> complex:
+    """The eigenvalue at a speed that is nearest to a given one."""
+    lam, _ = all_values(found.fine, np.array([speed]), found.scale)
+    return complex(lam[0, np.argmin(np.abs(lam[0] - value))])
+
+
+def _fastest(found: Bases, speed: float) -> complex:
+    """Eigenvalue of the motion that `largest_growth` counts at a speed; 0 if it does not oscillate."""
+    lam, oscillates = all_values(found.fine, np.array([speed]), found.scale)
+    k = int(np.argmax(rates(found, lam, oscillates)[0]))
+    value = complex(lam[0, k]) if oscillates[0, k] else 0j
+    return value.conjugate() if value.imag < 0 and found.fine.P.planes == 2 else value

@@ -12,6 +12,7 @@ from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,7 +71,7 @@ class MeshCheck:
 
     def summary(self) -> str:
         """A table, and the advice that follows."""
-        lines = [f"mode     rad/s   error of the mesh ({self.elements} elements)   rate"]
+        lines = [f"mode     rad/s   error of the mesh ({counted(self.elements, 'element')})   rate"]
         for k in range(self.frequencies.size):
             rate = "rounding" if np.isnan(self.rates[k]) else f"{self.rates[k]:.2f}"
             lines.append(f"{k + 1:4d}{self.frequencies[k]:12.4f}{self.errors[k]:15.1e}{rate:>26}")

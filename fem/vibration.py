@@ -12,6 +12,7 @@ from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.text import counted
 from rotorid.base.units import phase_deg, speed_text
 
 if TYPE_CHECKING:
@@ -290,8 +291,8 @@ class InfluenceCoefficients:
     def summary(self) -> str:
         """A table at one speed, or the range of sizes over many, as text."""
         lines = [
-            f"Influence coefficients at {speed_range(self.speeds)}: {len(self.sensors)} sensors, "
-            f"{len(self.planes)} planes",
+            f"Influence coefficients at {speed_range(self.speeds)}: {counted(len(self.sensors), 'sensor')}, "
+            f"{counted(len(self.planes), 'plane')}",
             f"{'sensor':>12}{'plane':>12}{'µm per g·mm':>14}{'phase lead, deg':>17}",
         ]
         if self.speeds.size > 1:

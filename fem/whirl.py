@@ -20,6 +20,8 @@ from rotorid.base.units import RPM, speed_text
 if TYPE_CHECKING:
     import pandas as pd
 
+_USUAL = 6  # modes, where nothing else is asked for
+
 
 @dataclass(frozen=True, eq=False)
 class WhirlModes:
@@ -108,7 +110,7 @@ class WhirlModes:
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
 
-def whirl_modes(rotor: Rotor, speed: float, n: int = 6) -> WhirlModes:
+def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     """Compute the whirl modes of lowest frequency at a speed, in a reduced basis: to 1e-7 and better.
 
     Parameters
@@ -118,7 +120,7 @@ def whirl_modes(rotor: Rotor, speed: float, n: int = 6) -> WhirlModes:
     speed
         rad/s.
     n
-        How many modes that oscillate; forward and backward whirl count apart.
+        How many modes that oscillate, by default 6 or all there are; forward and backward whirl count apart.
 
     Raises
     ------
@@ -202,15 +204,16 @@ def checked_speeds(speeds: ArrayLike) -> FloatArray:
     return array
 
 
-def checked_number(rotor: Rotor, n: int) -> int:
-    """How many modes to look for.
+def checked_number(rotor: Rotor, n: int | None) -> int:
+    """How many modes to look for, by default 6 or all there are.
 
     Raises
     ------
     ValueError
         If the model has fewer.
     """
-    n, available = whole(n, "the number of modes"), available_modes(rotor)
+    available = available_modes(rotor)
+    n = min(_USUAL, available) if n is None else whole(n, "the number of modes")
     if not 1 <= n <= available:
         raise ValueError(
             f"{n} modes cannot be found: the model has 1 to {available}; "

@@ -7,9 +7,11 @@ Every name below is loaded when it is first used.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # typing takes longer than all before the command line's answer to Ctrl-C
 if TYPE_CHECKING:
+    from typing import Any
+
     from rotorid.harmonic import Experiments as Experiments
     from rotorid.harmonic import Identification as Identification
     from rotorid.harmonic import harmonic_model as harmonic_model

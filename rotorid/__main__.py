@@ -9,8 +9,13 @@ def _end(_signal: int, _frame: FrameType | None) -> None:
 
 
 def run() -> None:
-    """Run the command line; Ctrl-C while it is still being loaded ends it quietly, too."""
+    """Run the command line; Ctrl-C while it is still being loaded ends it quietly, too.
+
+    A closed pipe ends it as any other program of a shell: by its signal, without a word.
+    """
     signal.signal(signal.SIGINT, _end)
+    if hasattr(signal, "SIGPIPE"):  # Windows has none
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     from rotorid.cli import main
 
     main()

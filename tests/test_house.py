@@ -21,6 +21,15 @@ def modules():
     return [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 
 
+def test_numbers_and_nouns_agree():
+    """One function counts words: `counted`; no text says "1 planes", "mode(s)" or builds a plural by hand."""
+    by_hand = re.compile(r"\} ?\w*\w\((?:e?s)\)|\} [\w ]*\{(?:''|'s') if ")
+    assert [p.name for p in modules() if by_hand.search(p.read_text(encoding="utf-8"))] == []
+    stored = ROOT / "tests" / "golden" / "stored"
+    wrong = re.compile(r"(?<![\w.,:–-])1 (?!has\b|is\b|was\b|times\b)[a-z]{3,}s\b")
+    assert [p.name for p in sorted(stored.glob("*")) if wrong.search(p.read_text(encoding="utf-8"))] == []
+
+
 def folders():
     return sorted({path.parent for path in modules()})
 

@@ -19,7 +19,7 @@ from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
-from rotorid.base.text import capital, figures, table, wrap
+from rotorid.base.text import capital, counted, figures, table, wrap
 from rotorid.base.units import rpm
 from rotorid.regression import coverage_factor
 
@@ -443,7 +443,8 @@ def _quality(c: Correction) -> str:
     if c.chi_square is not None and c.fit_dof:
         lines.append(
             f"What is left of the vibration is {np.sqrt(c.chi_square / c.fit_dof):.2g} times what the "
-            f"errors of the readings explain (χ² {c.chi_square:.1f} with {c.fit_dof} degrees of freedom)."
+            f"errors of the readings explain (χ² {c.chi_square:.1f} with "
+            f"{counted(c.fit_dof, 'degree')} of freedom)."
         )
     if c.covariance is None:
         lines.append(

@@ -16,7 +16,7 @@ from balancing.data.conventions import Labels
 from balancing.solvers.conditioning import check_stack, scaled_columns
 from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.text import figures, table
+from rotorid.base.text import counted, figures, table
 from rotorid.regression import RCOND, gain
 
 if TYPE_CHECKING:
@@ -141,9 +141,8 @@ class Subsets:
             numbers = [row[key] for key in _SHOWN]
             rows.append([", ".join(row["planes"]), *(figures(n, 3) for n in numbers)])
         k = self.weights.shape[1]
-        head = (
-            f"The best of {self.choices} choices of {k} plane{'s' if k > 1 else ''}, by {by} after correction"
-        )
+        choices = f"{counted(self.choices, 'choice')} of {counted(k, 'plane')}"
+        head = f"The best of {choices}, by {by} after correction"
         lines = [head + (f" ({units[1]})" if units[1] else ""), table(rows)]
         if self.dependent:
             lines.append(

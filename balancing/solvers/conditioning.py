@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
-from rotorid.base.text import sentence
+from rotorid.base.text import counted, sentence
 from rotorid.regression import RCOND
 
 ALIKE = 0.1
@@ -94,7 +94,7 @@ class Conditioning:
             else "no condition number"
         )
         lines = [
-            f"{P} plane{'s' if P > 1 else ''}, {self.readings} readings: "
+            f"{counted(P, 'plane')}, {counted(self.readings, 'reading')}: "
             f"rank {self.rank} of {P}, {condition}.",
             "Singular values: " + ", ".join(f"{s:.3g}" for s in self.singular_values) + ".",
         ]

@@ -119,12 +119,13 @@ def free_motions(rotor: Rotor, held: set[int]) -> int:
 def multiply(band: FloatArray, X: FloatArray) -> FloatArray:
     """Product of a symmetric or Hermitian band with vectors, shape (size, m)."""
     width = band.shape[0] - 1
-    if X.shape[1] <= _FEW and band.dtype == X.dtype == float:
-        from scipy.linalg.blas import dsbmv
+    if X.shape[1] <= _FEW and band.dtype == X.dtype:
+        from scipy.linalg import blas
 
-        Y = np.empty(X.shape, order="F")
+        product = blas.dsbmv if band.dtype == float else blas.zhbmv
+        band, Y = np.asfortranarray(band), np.empty(X.shape, X.dtype, order="F")
         for k in range(X.shape[1]):
-            dsbmv(width, 1.0, band, X[:, k], y=Y[:, k], overwrite_y=True)
+            product(width, 1.0, band, X[:, k], y=Y[:, k], overwrite_y=True)
         return Y
     Y = band[width, :, None] * X
     for above in range(1, width + 1):
@@ -155,16 +156,6 @@ def general(band: FloatArray) -> FloatArray:
         A[2 * width - above] = band[width - above]
         A[2 * width + above, :-above] = band[width - above, above:]
     return A
-
-
-def strain_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
-    """Twice the potential energy xᵀ K x of shaft and plain supports for each column of X, N·m, shape (m,)."""
-    stride = 4 if rotor.model.shear else 2
-    energy = shaft_energy(rotor, X)
-    for support in rotor.supports:
-        if support.plain:
-            energy = energy + support.stiffness * X[stride * (support.node - 1)] ** 2
-    return np.asarray(energy)
 
 
 def shaft_energy(rotor: Rotor, X: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean
+from rotorid.base.text import counted
 
 __all__ = ["STEEL_DENSITY", "STEEL_MODULUS", "STEEL_POISSON"]
 __all__ += ["Disc", "FloatArray", "Model", "Pedestal", "Rotor", "Support", "whole"]
@@ -114,8 +115,9 @@ class Rotor:
 
     def __repr__(self) -> str:
         return (
-            f"Rotor({self.n_elements} elements, {self.positions[-1]:.4g} m, {self.total_mass:.4g} kg, "
-            f"{len(self.discs)} discs, {len(self.supports)} supports)"
+            f"Rotor({counted(self.n_elements, 'element')}, {self.positions[-1]:.4g} m, "
+            f"{self.total_mass:.4g} kg, {counted(len(self.discs), 'disc')}, "
+            f"{counted(len(self.supports), 'support')})"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -198,6 +200,11 @@ class Rotor:
     def constant(self) -> bool:
         """Whether no support depends on speed."""
         return all(support.constant for support in self.supports)
+
+    @property
+    def knots(self) -> FloatArray:
+        """Speeds at which a table of a support may change its slope, rad/s, ascending."""
+        return np.unique([speed for support in self.supports for speed in support.speeds])
 
     @property
     def total_mass(self) -> float:

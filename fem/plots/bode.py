@@ -40,7 +40,8 @@ def draw_response(
         # Where a machine is measured, and where it moves most.
         named_nodes: list[str | int] = [*response.rotor.stations]
         named_nodes = named_nodes or [support.node for support in response.rotor.supports]
-        nodes = list(dict.fromkeys([*named_nodes, int(response.nodes[np.argmax(amplitude.max(axis=0))])]))
+        largest = np.where(response.steady[:, None], amplitude, 0.0).max(axis=0)
+        nodes = list(dict.fromkeys([*named_nodes, int(response.nodes[np.argmax(largest)])]))
     named = [f"node {node}" if isinstance(node, int) else str(node) for node in nodes]
     curves = amplitude[:, [response.column(node) for node in nodes]]
     return _over_speed(ax, response.speeds, 1e6 * curves, named, "amplitude, µm", response.windows)

@@ -72,10 +72,9 @@ def campbell_figure(
 
     figure = Figure(figsize=(10, 8.5), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(5, 3))
-    draw_campbell(campbell, above, criticals=criticals, operating=operating)
+    draw_campbell(campbell, above, criticals=criticals, operating=operating, unstable=unstable)
     draw_log_decrements(campbell, below)
-    for ax, word in ((above, "unstable"), (below, "")):
-        shade_unstable(ax, unstable, word)
+    shade_unstable(below, unstable, "")
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     return figure
@@ -87,6 +86,7 @@ def draw_campbell(
     *,
     criticals: Sequence[tuple[float, float]] = (),
     operating: tuple[float, float] | None = None,
+    unstable: Sequence[tuple[float, float]] = (),
 ) -> Axes:
     """Draw whirl frequencies over speed, with the 1× line.
 
@@ -103,6 +103,8 @@ def draw_campbell(
         Damped critical speeds to mark: speed in rad/s and log decrement there.
     operating
         Range of operating speeds, rad/s, shaded.
+    unstable
+        Ranges of speed in which a mode grows, rad/s, hatched.
     """
     ax = new_axes((10, 6)) if ax is None else ax
     top = _highest(campbell)
@@ -120,6 +122,7 @@ def draw_campbell(
     _label_criticals(ax, seen)
     if operating is not None:
         ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+    shade_unstable(ax, unstable, "unstable", 0.98 / _HEADROOM)  # below the legend
     plain(ax)
     ax.set(xlabel="speed, rad/s", ylabel="whirl frequency, rad/s")
     rpm_above(ax)

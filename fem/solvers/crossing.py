@@ -25,7 +25,8 @@ _STEPS = 60
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends
 _JUMP = 1e-4  # the same of a rank: more is a mode that came or went
 _NOTHING = 1e-11  # of the largest |f|: rounding
-_FALL = 3.0  # times the width of an interval: more a function does not fall within it
+_FALL = 3.0  # times the width of an interval: more a function does not fall within it, if it is not steep
+_STEEP = 20.0  # the same for the steepest
 _SLOPE = 1e-4  # of an interval: step for a slope
 _PARTS = 8  # into how many parts a doubtful bracket is divided
 _SAME = 0.9  # MAC of a mode before and after the last digits
@@ -52,6 +53,10 @@ class Crossings:
     modes: IndexArray
     values: ComplexArray
     shapes: ComplexArray
+
+    def only(self, which: BoolArray) -> Crossings:
+        """Some of them."""
+        return Crossings(self.speeds[which], self.modes[which], self.values[which], self.shapes[which])
 
 
 def synchronous(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> Crossings:
@@ -102,32 +107,35 @@ def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, functio
     return Crossings(found[order], mode[order], lam[order], Q.nodes(X[order]))
 
 
-def turns(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> FloatArray:
+def turns(
+    whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function, among: BoolArray
+) -> FloatArray:
     """Speeds between those given near which a function of a mode turns towards zero, ascending.
 
-    There it may vanish twice without a change of sign. Only intervals count over which it may fall so far:
-    by its slopes at both ends, of a step of the model.
+    There it may vanish twice without a change of sign: by its slopes at both ends, of a step of the model.
+    Only intervals count over which it may fall so far, by the width or by a slope, and only those `among`
+    which it is sought, shape (S − 1,).
     """
     speeds, Q = whirl.speeds, whirl.Q
     f = function(values, speeds[:, None])
     width = np.diff(speeds)[:, None]
-    k, mode = np.nonzero((f[:-1] * f[1:] > 0) & (np.minimum(np.abs(f[:-1]), np.abs(f[1:])) < _FALL * width))
-    if not k.size:
-        return np.empty(0)
+    near = np.minimum(np.abs(f[:-1]), np.abs(f[1:])) < _STEEP * width
+    k, mode = np.nonzero((f[:-1] * f[1:] > 0) & near & among[:, None])
     sign, h = np.sign(f[k, mode]), width[k, 0]
     slopes = []
     for end, way in ((k, 1), (k + 1, -1)):
         step = way * _SLOPE * h
-        near = speeds[end] + step
-        lam, _, _ = polish(Q, near, np.arange(k.size), values[end, mode], vectors[end, mode], 2)
-        slopes.append(sign * (function(lam, near) - f[end, mode]) / step)
+        beside = speeds[end] + step
+        lam, _, _ = polish(Q, beside, np.arange(k.size), values[end, mode], vectors[end, mode], 2)
+        slopes.append(sign * (function(lam, beside) - f[end, mode]) / step)
     first, last = slopes
-    before, after = sign * f[k, mode], sign * f[k + 1, mode]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        meet = (after - before - last * h) / (first - last)  # from the start, where the tangents meet
-        deep = (first < 0) & (last > 0) & (before + first * meet < 0)
-    part = np.clip(meet[deep] / h[deep], 0.05, 0.95)
-    return np.unique(speeds[k][deep] + part * h[deep])
+    before, after = np.abs(f[k, mode]), np.abs(f[k + 1, mode])
+    reach = np.maximum(
+        _FALL * h - np.minimum(before, after), -np.minimum(before + first * h, after - last * h)
+    )
+    turn = (first < 0) & (last > 0) & (reach > 0)
+    part = first[turn] / (first - last)[turn]  # of a parabola
+    return np.unique(speeds[k][turn] + np.clip(part, 0.1, 0.9) * h[turn])
 
 
 def _verified(

@@ -319,7 +319,7 @@ def _one_plane(
         pivot[lost] = 1.0
         step = H[: a + k, b + k, None] * (H[a + k, : b + k] * (D / pivot))
         H = np.subtract(H[: a + k, : b + k], step, out=step)
-    return np.moveaxis(H, 2, 0), lost
+    return np.moveaxis(H, 2, 0).astype(complex, copy=False), lost
 
 
 def _two_planes(

@@ -110,6 +110,20 @@ def _solve(P: Planes, speeds: FloatArray, m: int, room: int) -> Whirl:
     )
 
 
+def with_speeds(whirl: Whirl, more: FloatArray) -> Whirl:
+    """The same at more speeds, rad/s, in the same basis, without left vectors."""
+    one, two = whirl.found, solve(whirl.Q, more, whirl.found.values.shape[1], whirl.scale)
+    speeds = np.concatenate((whirl.speeds, more))
+    order = np.argsort(speeds, kind="stable")
+    values, vectors, still = (
+        np.concatenate((getattr(one, name), getattr(two, name)))[order]
+        for name in ("values", "vectors", "still")
+    )
+    real = one.real + two.real
+    found = Solutions(values, vectors, None, tuple(real[k] for k in order), still)
+    return replace(whirl, speeds=speeds[order], found=found)
+
+
 def enriched(
     whirl: Whirl, speeds: FloatArray, values: ComplexArray, X: ComplexArray
 ) -> tuple[Quadratic, ComplexArray]:

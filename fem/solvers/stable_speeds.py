@@ -86,11 +86,11 @@ def largest_growth(found: Bases, speeds: FloatArray) -> FloatArray:
     out = np.empty(speeds.size)
     for start in range(0, speeds.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        out[part] = _rates(found, *all_values(found.fine, speeds[part], found.scale)).max(axis=1)
+        out[part] = rates(found, *all_values(found.fine, speeds[part], found.scale)).max(axis=1)
     return out
 
 
-def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray:
+def growing_at(found: Bases, speeds: FloatArray, level: float = GROWTH) -> BoolArray:
     """At which speeds a mode grows, shape (S,).
 
     Parameters
@@ -99,11 +99,12 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         The equations.
     speeds
         rad/s, ascending, shape (S,).
-    knots
-        Speeds at which a table changes its slope, rad/s.
+    level
+        Re λ / |λ| above which it does.
     """
     out = np.zeros(speeds.size, dtype=np.intp)
     if speeds.size > _FEW:
+        knots = found.fine.P.rotor.knots
         inner = knots[(knots > speeds[0]) & (knots < speeds[-1])]
         cuts = np.unique(np.concatenate((speeds[[0, -1]], inner)))
         lam, oscillates = all_values(found.fine, cuts, found.scale)
@@ -114,20 +115,20 @@ def growing_at(found: Bases, speeds: FloatArray, knots: FloatArray) -> BoolArray
         order = np.argsort(np.abs(lam.imag[near]))
         margins = (
             np.concatenate(([0.0], np.abs(lam.imag[near])[order])),
-            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))) - GROWTH,
+            np.concatenate(([0.0], _SAFE * np.maximum.accumulate(error[near][order]))),
         )
-        out = _certified(found.coarse, speeds, cuts, margins, found.low)
+        out = _certified(found.coarse, speeds, cuts, margins, found.low, level)
         # The forces that drive a mode are linear in speed between the cuts, and so, nearly, is its growth.
-        high = np.asarray((np.where(low, -1.0, _rates(found, lam, oscillates)) > GROWTH).any(axis=1))
+        high = np.asarray((np.where(low, -1.0, rates(found, lam, oscillates)) > level).any(axis=1))
         at = np.searchsorted(cuts, speeds)
         out[high[at] | high[np.maximum(at - 1, 0)]] = 0
     left = np.flatnonzero(out == 0)
     if left.size:
-        out[left] = np.where(largest_growth(found, speeds[left]) > GROWTH, 1, -1)
+        out[left] = np.where(largest_growth(found, speeds[left]) > level, 1, -1)
     return np.asarray(out > 0)
 
 
-def _rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
+def rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray:
     """Growth of motions as `largest_growth` counts it; −1 where the basis does not know them."""
     rate = np.where(oscillates, lam.real / np.abs(lam), lam.real / found.scale * (GROWTH / AWAY))
     # What rounding makes of the motions of a free rotor, which nothing drives, does not count.
@@ -136,7 +137,12 @@ def _rates(found: Bases, lam: ComplexArray, oscillates: BoolArray) -> FloatArray
 
 
 def _certified(
-    Q: Quadratic, speeds: FloatArray, cuts: FloatArray, margins: tuple[FloatArray, FloatArray], low: float
+    Q: Quadratic,
+    speeds: FloatArray,
+    cuts: FloatArray,
+    margins: tuple[FloatArray, FloatArray],
+    low: float,
+    level: float,
 ) -> IndexArray:
     """1 where a low mode surely grows, −1 where surely none does, else 0, shape (S,)."""
     out = np.zeros(speeds.size, dtype=np.intp)
@@ -147,16 +153,17 @@ def _certified(
     depth = 0
     while len(ranges):
         first, last = np.searchsorted(speeds, ranges[:, 0]), np.searchsorted(speeds, ranges[:, 1], "right")
-        ranges = ranges[last - first > _FEW]
+        ranges = ranges[last - first > 1]
         halves = []
         for start in range(0, len(ranges), _CHUNK):
             part = ranges[start : start + _CHUNK]
-            sure, lam, margin = _constant(state, part, margins)
-            grows = ((lam.real > 0) & (np.abs(lam.imag) <= low)).any(axis=1)
+            sure, lam, margin = _constant(state, part, margins, level)
+            excess = lam.real - level * np.abs(lam)
+            grows = ((excess > 0) & (np.abs(lam.imag) <= low)).any(axis=1)
             for (a, b), holds, more in zip(part, sure, grows, strict=True):
                 if holds:
                     out[(speeds >= a) & (speeds <= b)] = 1 if more else -1
-            doubt = (np.abs(lam.real) <= margin * np.abs(lam)).any(axis=1)
+            doubt = (np.abs(excess) <= margin * np.abs(lam)).any(axis=1)
             again = part[~sure & ~(doubt & (depth >= _DEEP))]
             middle = again.mean(axis=1)
             halves += [np.stack((again[:, 0], middle), axis=1), np.stack((middle, again[:, 1]), axis=1)]
@@ -166,33 +173,36 @@ def _certified(
 
 
 def _constant(
-    state: Callable[[FloatArray], AnyArray], ranges: FloatArray, margins: tuple[FloatArray, FloatArray]
+    state: Callable[[FloatArray], AnyArray],
+    ranges: FloatArray,
+    margins: tuple[FloatArray, FloatArray],
+    level: float,
 ) -> tuple[BoolArray, AnyArray, FloatArray]:
-    """In which ranges, (B, 2), no eigenvalue comes near the axis; those in the middle, and margins, (B, n).
+    """In which ranges, (B, 2), no growth comes near the level; those in the middle, and margins, (B, n).
 
     The margin of an eigenvalue is that of the next frequency below.
     """
     lam, V = np.linalg.eig(state(ranges.mean(axis=1)))
     frequency, share = margins
     known = np.abs(lam.imag) <= 1.01 * frequency[-1]
-    margin = np.where(known, share[np.searchsorted(frequency, 1.01 * np.abs(lam.imag), "right") - 1], -GROWTH)
-    sign = np.where(lam.real > 0, -1.0, 1.0)[:, :, None]
+    margin = np.where(known, share[np.searchsorted(frequency, 1.01 * np.abs(lam.imag), "right") - 1], 0.0)
+    sign = np.where(lam.real > level * np.abs(lam), -1.0, 1.0)
     own = np.arange(V.shape[1])
     V[:, own, own] += _REGULAR  # vectors of equal eigenvalues may be one
     inverse = np.linalg.inv(V)
     sure: BoolArray = np.ones(len(ranges), dtype=bool)
     for end in (0, 1):
-        H = sign * (inverse @ state(ranges[:, end]) @ V)
+        H = sign[:, :, None] * (inverse @ state(ranges[:, end]) @ V)
         H = (H + np.swapaxes(H.conj(), 1, 2)) / 2
-        H[:, own, own] += margin * np.abs(lam)
+        H[:, own, own] += (margin - sign * level) * np.abs(lam)
         sure &= np.linalg.eigvalsh(H)[:, -1] < 0
     return sure, lam, margin
 
 
 def _first_order(Q: Quadratic, middle: float) -> Callable[[FloatArray], AnyArray] | None:
     """A of z' = A z at speeds, in units of energy about those at a middle speed; None without enough mass."""
-    size, spread = np.linalg.eigvalsh(Q.M)[[-1, 0]]
-    if not spread > 1e-12 * size:
+    own = np.sqrt(np.diag(Q.M))
+    if not own.all() or np.linalg.eigvalsh(Q.M / np.outer(own, own))[0] < 1e-12:
         return None
     L = np.linalg.inv(np.linalg.cholesky(Q.M))
     K = Q.at(np.array([middle]))[1][0]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,10 +20,9 @@ from fem.model.rotor import Rotor
 from fem.solvers.eigen import finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
-_PARTS = 2  # of an interval of a table, at least
 _STEP = 1e-5  # of an interval, for a slope
 _SHAPES = 1e-8  # tolerance of mode shapes; that of frequencies is its square
-_DEEP = 6  # halvings of such a part
+_DEEP = 7  # halvings of an interval in which a mode may cross, one at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +80,16 @@ class TableSearch:
 
     def between(self, a: float, b: float) -> list[tuple[float, int]]:
         """Crossings in an interval of the tables, (speed, mode from 0), ascending, its upper end excluded."""
-        ends = np.linspace(a, b, _PARTS + 1).tolist()
-        return sorted(root for low, high in pairwise(ends) for root in self._part(low, high, 0))
+        return sorted(self._halves(a, b, 0) if self.below(a) != self.below(b) else self._part(a, b, 0))
+
+    def below(self, speed: float) -> int:
+        """How many modes lie below a speed."""
+        return int(np.count_nonzero(self.at(speed).squares < speed * speed))
+
+    def _halves(self, a: float, b: float, depth: int) -> Iterator[tuple[float, int]]:
+        middle = (a + b) / 2
+        yield from self._part(a, middle, depth + 1)
+        yield from self._part(middle, b, depth + 1)
 
     def _part(self, a: float, b: float, depth: int) -> Iterator[tuple[float, int]]:
         soft, stiff = self._bounds(a, b)
@@ -91,11 +97,9 @@ class TableSearch:
         doubtful = [k for k in range(soft.size) if soft[k] <= b * b and not (stiff[k : k + 1] < a * a).any()]
         roots: list[tuple[float, int]] = []
         for k in doubtful:
-            found = self._roots(k, a, b, last=depth == _DEEP)
+            found = self._roots(k, a, b, last=depth == _DEEP) if depth else None
             if found is None:
-                middle = (a + b) / 2
-                yield from self._part(a, middle, depth + 1)
-                yield from self._part(middle, b, depth + 1)
+                yield from self._halves(a, b, depth)
                 return
             roots += [(speed, k) for speed in found]
         yield from roots
@@ -113,7 +117,7 @@ class TableSearch:
             return (excess(speed + step) - excess(speed)) / step
 
         def root(low: float, high: float) -> float:
-            return float(brentq(excess, low, high, xtol=1e-14 * high, rtol=1e-14))
+            return float(brentq(excess, low, high, xtol=1e-11 * high, rtol=1e-11))
 
         (ga, gb), (da, db) = (excess(a), excess(b)), (slope(a), slope(b))
         if ga == 0:

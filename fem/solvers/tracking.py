@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.solvers.quadratic import NONE, solve
+from fem.solvers.quadratic import NONE, Solutions, solve
 from fem.solvers.reduced_whirl import Whirl
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
@@ -42,8 +42,9 @@ class Followed:
     doubtful: tuple[tuple[int, int], ...]
 
 
-def follow(whirl: Whirl) -> Followed:
-    """Chain the eigenpairs of neighbouring speeds."""
+def follow(whirl: Whirl, known: dict[float, Solutions] | None = None) -> Followed:
+    """Chain the eigenpairs of neighbouring speeds; `known` keeps solutions between them for the next time."""
+    known = {} if known is None else known
     values, X = whirl.found.values, whirl.found.vectors
     S, m = values.shape
     weight = mass_weight(whirl)
@@ -64,7 +65,7 @@ def follow(whirl: Whirl) -> Followed:
         pairs, doubt = _pairs(alike[k])
         if doubt:
             ends = (values[k], X[k]), (values[k + 1], X[k + 1])
-            pairs, doubt, _ = _bridge(whirl, weight, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
+            pairs, doubt, _ = _bridge(whirl, weight, known, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
             doubtful += [(k, int(labels[k, i])) for i in sorted(doubt)]
         for i, j in pairs.items():
             labels[k + 1, j] = labels[k, i]
@@ -156,6 +157,7 @@ def _pairs(mac: FloatArray) -> tuple[dict[int, int], set[int]]:
 def _bridge(
     whirl: Whirl,
     weight: FloatArray,
+    known: dict[float, Solutions],
     speeds: FloatArray,
     start: tuple[ComplexArray, ComplexArray],
     end: tuple[ComplexArray, ComplexArray],
@@ -164,7 +166,9 @@ def _bridge(
 ) -> tuple[dict[int, int], set[int], int]:
     """Partners over an interval by way of its middle, the modes in doubt, and trials left."""
     middle = float(speeds.mean())
-    found = solve(whirl.Q, np.array([middle]), len(start[0]), whirl.scale)
+    if middle not in known:
+        known[middle] = solve(whirl.Q, np.array([middle]), len(start[0]), whirl.scale)
+    found = known[middle]
     trials -= 1
     half = found.values[0], found.vectors[0]
     apart = whirl.Q.P.planes == 1
@@ -172,7 +176,7 @@ def _bridge(
     for a, b, ends in ((start, half, (speeds[0], middle)), (half, end, (middle, speeds[1]))):
         step, doubt = _pairs(likeness(a[0], a[1], b[0], b[1], weight, apart))
         if doubt and depth < _HALVINGS and trials > 0:
-            step, doubt, trials = _bridge(whirl, weight, np.array(ends), a, b, depth + 1, trials)
+            step, doubt, trials = _bridge(whirl, weight, known, np.array(ends), a, b, depth + 1, trials)
         steps.append((step, doubt))
     (first, unsure), (second, later) = steps
     unsure = unsure | {i for i, j in first.items() if j in later}

@@ -64,15 +64,17 @@ def plain(ax: Axes) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def shade_unstable(ax: Axes, ranges: Iterable[tuple[float, float]], word: str = "no steady state") -> None:
-    """Hatch ranges of speed in which the rotor is unstable."""
+def shade_unstable(
+    ax: Axes, ranges: Iterable[tuple[float, float]], word: str = "no steady state", top: float = 0.98
+) -> None:
+    """Hatch ranges of speed in which the rotor is unstable; the word ends at this part of the axes."""
     for first, last in ranges:
         ax.axvspan(
             first, last, facecolor=VERMILION, alpha=0.12, hatch="///", edgecolor=VERMILION, linewidth=0.6
         )
         ax.annotate(
             word,
-            ((first + last) / 2, 0.98),
+            ((first + last) / 2, top),
             xycoords=("data", "axes fraction"),
             rotation=90,
             ha="center",

@@ -46,6 +46,15 @@ def cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
+def counted(n: int, noun: str, nouns: str = "") -> str:
+    """So many of something.
+
+    >>> counted(1, "plane"), counted(0, "plane"), counted(2, "mass", "masses")
+    ('1 plane', '0 planes', '2 masses')
+    """
+    return f"{n} {noun if n == 1 else nouns or f'{noun}s'}"
+
+
 def listing(names: Iterable[str], conjunction: str = "or") -> str:
     """`a, b or c`; of a great many only the first."""
     items = list(names)

@@ -83,6 +83,8 @@ def _rotorid(
 
 def main() -> None:
     """Run the command line; the exit status is 2 for bad input or usage, with one message, no traceback."""
+    if sys.stderr is None:  # print would take standard output instead
+        sys.stderr = io.StringIO()
     if sys.stdout is None:  # the caller closed it: a result that nobody can read is no success
         sys.exit(_complain(OSError("standard output is closed: there is nowhere to print the result")))
     for stream in (sys.stdout, sys.stderr):
@@ -124,7 +126,7 @@ def _complain(problem: Exception) -> int:
     text = str(problem)
     if isinstance(problem, OSError) and problem.strerror:
         text = f"{problem.filename}: {problem.strerror}" if problem.filename else problem.strerror
-    with contextlib.suppress(BrokenPipeError):
+    with contextlib.suppress(OSError):  # nobody can read it
         print(f"rotorid: {_safe(text)}", file=sys.stderr)
     return 2
 

@@ -80,6 +80,7 @@ def emit(
     The sheet is made from the document and the provenance.
     """
     from rotorid.cli.verbose import note
+    from rotorid.tables.reader.problems import printable
     from rotorid.tables.reader.writing import table_bytes, write_files
 
     note(document)
@@ -99,7 +100,7 @@ def emit(
         return
     typer.echo(text())
     for path in written:
-        typer.echo(f"written: {path}")
+        typer.echo(f"written: {printable(str(path))}")
 
 
 def picture(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Callable[[], Figure]:

@@ -71,6 +71,7 @@ def deliver(
         Further files, and what makes them.
     """
     from rotorid.cli.verbose import note
+    from rotorid.tables.reader.problems import printable
     from rotorid.tables.reader.writing import table_bytes, write_files
 
     with busy(what):
@@ -91,7 +92,7 @@ def deliver(
     if as_json:
         typer.echo(json_text(document))
     else:
-        typer.echo("\n".join([found.summary(), *(f"written: {path}" for path in written)]))
+        typer.echo("\n".join([found.summary(), *(f"written: {printable(str(path))}" for path in written)]))
     return found
 
 
@@ -140,7 +141,7 @@ def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
 def _same_file(a: Path, b: Path) -> bool:
     if a.exists() and b.exists():
         return a.samefile(b)
-    return a.resolve() == b.resolve()
+    return os.path.realpath(a) == os.path.realpath(b)  # of a circle of links, too
 
 
 def json_text(document: Mapping[str, Any]) -> str:

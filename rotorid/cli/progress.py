@@ -83,15 +83,13 @@ class _Count:
 
 
 def _terminal() -> bool:
-    return sys.stderr is not None and sys.stderr.isatty() and not dumb()
+    return sys.stderr.isatty() and not dumb()
 
 
 def _lines(count: _Count, done: threading.Event) -> None:
     """For a log, a pipe, or a terminal that cannot draw."""
     pause = FIRST_LINE
     while not done.wait(pause):
-        if sys.stderr is None:
-            return
         print(count.line(), file=sys.stderr, flush=True)
         pause = min(2 * pause, LONGEST_PAUSE)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import inspect
 import logging
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -87,12 +86,14 @@ def verbosely(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapper(*args: Any, verbose: bool = False, **kwargs: Any) -> None:  # noqa: ANN401 - any command
         from rotorid.tables.reader.input_file import each_file_once
-        from rotorid.tables.reader.number import LARGEST_STATED
+        from rotorid.tables.reader.number import LARGEST_STATED, NotANumber, check_size
 
         for option, value in kwargs.items():
-            if isinstance(value, float) and LARGEST_STATED < abs(value) < math.inf:
-                name = option.replace("_", "-")
-                raise ValueError(f"--{name} takes a number up to {LARGEST_STATED:g} in size, not {value:g}")
+            if isinstance(value, float):
+                try:
+                    check_size(value, LARGEST_STATED)
+                except NotANumber as error:
+                    raise ValueError(f"--{option.replace('_', '-')} takes {error}, not {value:g}") from None
         with each_file_once():
             if verbose:
                 with _told():

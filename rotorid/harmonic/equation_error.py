@@ -29,6 +29,7 @@ from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.harmonic.rows import Rows, ask_about_case, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate, echelon
+from rotorid.regression.nonlinear import NonlinearEstimate
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
@@ -85,17 +86,20 @@ def identify(
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
     ask_about_case(model, experiments)
+    experiments, copies = experiments.without_copies()
     if method == "output-error":
         from rotorid.harmonic.output_error import identify_outputs
 
-        return identify_outputs(model, experiments, bounds=bounds, loss=loss, start=start)
+        found = identify_outputs(model, experiments, bounds=bounds, loss=loss, start=start)
+        return replace(found, left_out=(*copies, *found.left_out))
     if loss != "linear" or start:
         raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
     hidden = hidden_outputs(model, experiments)
     seen = without(model, hidden) if hidden else None
+    found = equation_error(seen or model, experiments, bounds=bounds)
+    found = replace(found, left_out=(*copies, *found.left_out))
     if seen is None:
-        return equation_error(model, experiments, bounds=bounds)
-    found = equation_error(seen, experiments, bounds=bounds)
+        return found
     if not np.isfinite(found.condition_number):
         raise ValueError(
             f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
@@ -256,10 +260,22 @@ def equation_error(
         notes=_notes(model, experiments, estimate),
     )
 
-    def refit(others: Experiments) -> Sequence[FloatArray]:
-        return linear_fit(model, others).recovery.solutions
+    return replace(found, warnings=(*found.warnings, *_doubts(fit, found, bounds)))
 
-    return replace(found, warnings=(*found.warnings, *doubts(found, estimate, bounds, refit)))
+
+def _doubts(fit: LinearFit, found: Identification, bounds: Bounds | None) -> tuple[str, ...]:
+    """What speaks against the answer, after a look at output error from there."""
+    from rotorid.harmonic.output_error import output_error
+
+    def refit(others: Experiments) -> Sequence[FloatArray]:
+        return linear_fit(fit.model, others).recovery.solutions
+
+    def refine(theta: FloatArray) -> tuple[NonlinearEstimate, FloatArray]:
+        refined = output_error(fit.model, found.experiments, theta).fit
+        shown = [i for i, w in enumerate(fit.words) if w not in found.parameters]
+        return refined, fit.system.combinations(refined.estimate.solution)[shown]
+
+    return doubts(found, fit.estimate, bounds, refit, refine)
 
 
 def limits(bounds: Bounds | None) -> dict[str, tuple[float, float]]:

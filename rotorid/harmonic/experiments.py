@@ -134,6 +134,19 @@ class Experiments:
             {name: values[chosen] for name, values in self.varying.items()},
         )
 
+    def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
+        """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""
+        rows = np.column_stack([self.frequencies, self.free, *self.signals.values(), *self.varying.values()])
+        first: dict[bytes, int] = {}
+        same = [first.setdefault(row.tobytes(), i) for i, row in enumerate(rows)]
+        words = tuple(
+            f"experiment {self.names[i]}, in every reading a copy of experiment {self.names[j]} "
+            "(if both were measured, say so in a column repeat)"
+            for i, j in enumerate(same)
+            if i != j
+        )
+        return (self.take(list(first.values())) if words else self), words
+
 
 def experiments(
     model: HarmonicModel,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -184,7 +185,7 @@ def harmonic_model(
     ------
     ValueError
         For equations that cannot be read, are not linear in the signals or not rational in p and parameters,
-        parameters that do not occur, names given twice.
+        or follow from the others; parameters that do not occur, names given twice.
 
     Examples
     --------
@@ -217,6 +218,7 @@ def harmonic_model(
         raise ValueError(
             "the equations contain no signal: no name is left that is neither known nor estimated"
         )
+    _check_independent(features, len(equations))
     occurs = {name for f in features for m in f.exact for name, _ in m}
     for name in estimate:
         if name not in occurs:
@@ -343,6 +345,34 @@ def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
             raise ValueError(f"the parameter {name} is named twice")
         if name in known:
             raise ValueError(f"{name} is both known and to be estimated")
+
+
+def _check_independent(features: Sequence[Feature], equations: int) -> None:
+    """Raise ValueError for an equation that follows from those before it: its rows would count twice.
+
+    The rank of A(p; θ) at one general point, modulo a large prime.
+    """
+    from sympy import GF
+    from sympy.polys.matrices import DomainMatrix
+
+    names = sorted({name for f in features for m in (*f.exact, f.varying) for name, _ in m} | {P})
+    drawn = np.random.default_rng(1).integers(2, 1000, len(names)).tolist()
+    point = {name: Fraction(value, 999) for name, value in zip(names, drawn, strict=True)}
+    place = {name: i for i, name in enumerate(dict.fromkeys(f.signal for f in features))}
+    table = [[Fraction(0)] * equations for _ in place]
+    for f in features:
+        for monomial, x in f.exact.items():
+            term = x * math.prod(point[n] ** e for n, e in (*monomial, *f.varying, (P, f.power)))
+            table[place[f.signal]][f.equation] += term
+    K = GF(2**61 - 1)
+    whole = [[K(x.numerator) / K(x.denominator) for x in row] for row in table]
+    _, free = DomainMatrix(whole, (len(place), equations), K).to_sparse().rref()
+    for i in range(equations):
+        if i not in free:
+            raise ValueError(
+                f"equation {i + 1} follows from those before it and tells nothing new: leave it out, or its "
+                "rows would count twice"
+            )
 
 
 def _finite(name: str, value: float) -> float:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.text import counted
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.hidden import hidden_outputs, without
@@ -344,7 +345,7 @@ def _joined(rounds: Sequence[NonlinearEstimate]) -> NonlinearEstimate:
         last,
         start=rounds[0].start,
         iterations=iterations,
-        message=f"converged in {iterations} iterations" if last.converged else last.message,
+        message=f"converged in {counted(iterations, 'iteration')}" if last.converged else last.message,
         history=np.concatenate([rounds[0].history, *(fit.history[1:] for fit in rounds[1:])]),
         costs=np.concatenate([rounds[0].costs, *(fit.costs[1:] for fit in rounds[1:])]),
     )

@@ -14,39 +14,98 @@ from rotorid.harmonic.features import multipliers
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator import operator_of
 from rotorid.harmonic.result import Identification
-from rotorid.regression.estimate import Estimate
+from rotorid.regression.estimate import Estimate, coverage_factor
+from rotorid.regression.nonlinear import NonlinearEstimate
 
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
 EXPLAINS = 0.2
 """Another reading of the data is named where it leaves less than this share of what is left without it."""
+EXACT = 1e-6
+"""Share of the readings below which there is no noise."""
 KINDS = ("spring", "damper", "mass")
 Bounds = Mapping[str, tuple[float | None, float | None]]
 Refit = Callable[[Experiments], Sequence[FloatArray]]
+Refine = Callable[[FloatArray], tuple[NonlinearEstimate, FloatArray]]
 UNITS = {"Hz": 2 * np.pi, "rpm": np.pi / 30}
 
 
-def doubts(found: Identification, estimate: Estimate, bounds: Bounds | None, refit: Refit) -> tuple[str, ...]:
+def doubts(
+    found: Identification,
+    estimate: Estimate,
+    bounds: Bounds | None,
+    refit: Refit,
+    refine: Refine | None = None,
+) -> tuple[str, ...]:
     """What speaks against a result, in words.
 
     Stated errors: residuals that these explain with a probability below 0.1 %. Otherwise: what the model
-    leaves of the readings, if it is much. Units and phases that would explain it, found
-    by `refit`, a linear estimate from other experiments. Passive elements with a negative value are named,
-    unless bounds say that it may be so.
+    leaves of the readings, if it is much. A linear estimate is judged after `refine`, output error from there
+    (and its combinations): noise that biases it is not the model's fault, and is named instead. Units and
+    phases that would explain what is left are found by `refit`, a linear estimate from other experiments.
+    Passive elements with a negative value are named, unless bounds say that it may be so.
     """
-    words = [*misfit(estimate)] if found.converged else []
-    left = None
+    left, theta, fit, combinations = None, None, None, np.zeros(0)
     if found.starts:
-        left = left_over(found.model, found.experiments, np.array(list(found.starts[0].values())))
+        theta = np.array(list(found.starts[0].values()))
+        left = left_over(found.model, found.experiments, theta)
+    if refine is not None and theta is not None and left is not None and left > EXACT:
+        fit, combinations = _refined(refine, theta)
+    if fit is not None and left is not None:
+        rest = left_over(found.model, found.experiments, fit.estimate.solution)
+        if rest is not None and rest < left:
+            left, theta, estimate = rest, fit.estimate.solution, fit.estimate
+    words = [*misfit(estimate)] if found.converged else []
     if found.converged and not estimate.errors_stated and left is not None and left > LARGE:
-        advice = ", or readings are noisy: try output error" if found.method == "equation-error" else ""
+        ordered = theta is not None and _ordered(found, theta)
+        random = "not at random over the frequency, so " if ordered else "unless they are as noisy as that, "
         words.append(
-            f"the model leaves {100 * left:.0f} % of the readings: "
-            f"the model, a reading or a unit is wrong{advice}"
+            f"the model leaves {100 * left:.0f} % of the readings: {random}the model, a reading or a unit is "
+            "wrong"
         )
+    if not words and fit is not None and (biased := _biased(found, fit, combinations)):
+        return (biased,)
     if left is not None and (words or not found.converged):
         words += _other_reading(found, left, refit)
-    return (*words, *(_negative(found, bounds) if found.converged else ()))
+    return (*words, *(_negative(found, bounds, fit) if found.converged else ()))
+
+
+def _refined(refine: Refine, theta: FloatArray) -> tuple[NonlinearEstimate | None, FloatArray]:
+    try:
+        fit, combinations = refine(theta)
+    except (ValueError, np.linalg.LinAlgError):
+        return None, np.zeros(0)
+    return fit if fit.converged else None, combinations
+
+
+def _biased(found: Identification, fit: NonlinearEstimate, combinations: FloatArray) -> str:
+    """Words where output error lies outside an interval of the linear estimate."""
+    factor = coverage_factor(None if found.errors_stated else found.dof)
+    if found.std is None or factor is None:
+        return ""
+    words = [*found.parameters, *(c.words for c in found.combinations)]
+    here = np.array([*found.values, *(c.value for c in found.combinations)])
+    half = factor * np.array([*found.std, *(np.nan if c.std is None else c.std for c in found.combinations)])
+    there = np.array([*fit.values, *combinations])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.nan_to_num(np.abs(there - here) / half)
+    i = int(np.argmax(away))
+    if away[i] <= 1:
+        return ""
+    return (
+        "noisy readings bias the linear estimate and make its intervals too narrow: output error gives "
+        f"{words[i]} = {there[i]:.6g}, outside its interval; take the method output-error"
+    )
+
+
+def _ordered(found: Identification, theta: FloatArray) -> bool:
+    """Whether relative residuals of neighbouring frequencies are alike: those of noise are not (2.5 %)."""
+    comparison = compare(operator_of(found.model), found.experiments)
+    gap = (comparison.predict(theta)[0] - comparison.measured) / np.abs(comparison.measured)
+    seen = np.isfinite(gap)
+    r = np.where(seen, gap, 0.0)[np.argsort(found.experiments.frequencies)]
+    alike = float((r[1:] * r[:-1].conj()).real.sum())
+    return bool(alike * np.sqrt(2 * np.count_nonzero(seen)) > 1.96 * float(np.sum(np.abs(r) ** 2)))
 
 
 def misfit(estimate: Estimate) -> tuple[str, ...]:
@@ -94,12 +153,10 @@ def _other_reading(found: Identification, left: float, refit: Refit) -> list[str
         others[f"frequencies in {unit}, not rad/s,"] = replace(data, frequencies=w * factor)
         others[f"frequencies in rad/s, not {unit},"] = replace(data, frequencies=w / factor)
     words = []
+    plain = _left_by_refit(found.model, data, refit)
+    left = left if plain is None else min(left, plain)  # the same estimate with and without the change
     for what, other in others.items():
-        try:
-            solutions = refit(other)
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-        rest = left_over(found.model, other, solutions[0]) if solutions else None
+        rest = _left_by_refit(found.model, other, refit)
         if rest is not None and rest < min(EXPLAINS * left, LARGE):
             words.append(
                 f"with {what} the model leaves {100 * rest:.2g} % of the readings, not {100 * left:.0f} %"
@@ -107,8 +164,16 @@ def _other_reading(found: Identification, left: float, refit: Refit) -> list[str
     return words
 
 
-def _negative(found: Identification, bounds: Bounds | None) -> list[str]:
-    """Masses, dampers and springs whose value is negative beyond its interval."""
+def _left_by_refit(model: HarmonicModel, data: Experiments, refit: Refit) -> float | None:
+    try:
+        solutions = refit(data)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    return left_over(model, data, solutions[0]) if solutions else None
+
+
+def _negative(found: Identification, bounds: Bounds | None, fit: NonlinearEstimate | None) -> list[str]:
+    """Masses, dampers and springs negative beyond their interval, and for output error `fit`, too."""
     interval, kinds = found.ci95, passive_elements(found.model)
     pk = multipliers([0, 1, 2], [()] * 3, np.array([found.experiments.frequencies.max()]))
     force = max((abs(found.value(n) * pk[0, k]) for n, k in kinds.items()), default=0.0)
@@ -117,7 +182,8 @@ def _negative(found: Identification, bounds: Bounds | None) -> list[str]:
         i, (low, _) = found.parameters.index(name), (bounds or {}).get(name, (0.0, None))
         high = found.values[i] if interval is None or np.isnan(interval[i, 1]) else interval[i, 1]
         rounding = abs(found.values[i] * pk[0, kind]) <= 1e-9 * force
-        if high < 0 and not rounding and low is not None and low >= 0:
+        noise = fit is not None and fit.values[i] >= 0
+        if high < 0 and not (rounding or noise) and low is not None and low >= 0:
             named.append((name, kind))
     if not named:
         return []

@@ -32,6 +32,7 @@ from fem.matrices.pencil import Pencil, whole_rotor
 from fem.solvers.eigen import Spectrum, lowest_modes
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
+from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import (
     Normalisation,
     RowWeights,
@@ -170,7 +171,7 @@ def compare_methods(
         raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
     normalised(np.ones((n, modes)), normalise)  # refuse a wrong choice before anything is computed
     row_factors(rows, np.ones(modes), n)
-    name = f"regression, {modes} mode{'s' if modes > 1 else ''}"
+    name = f"regression, {counted(modes, 'mode')}"
     table = []
     for label, method in (("Guyan", _guyan), ("IRS", _irs), ("SEREP", _serep)):
         try:

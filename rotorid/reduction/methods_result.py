@@ -12,6 +12,7 @@ import numpy as np
 import fem
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -158,7 +159,8 @@ class Methods:
         """A table of frequencies, errors and MAC by method and mode, as text."""
         n = len(self.nodes)
         lines = [f"Warning: {text}" for text in self.warnings]
-        lines.append(f"The rotor reduced to {n} unknowns, the deflections of nodes {_list(self.nodes)}")
+        unknowns = counted(n, "unknown")
+        lines.append(f"The rotor reduced to {unknowns}, the deflections of nodes {_list(self.nodes)}")
         lines.append("in each cell: frequency in rad/s, its error, MAC with the rotor's mode at these nodes")
         for first in range(0, n, _ACROSS):
             modes = range(first, min(n, first + _ACROSS))

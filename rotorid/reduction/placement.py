@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import fem
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
+from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, RowWeights, design
 from rotorid.reduction.equivalent.plane import plane_at_rest
 from rotorid.reduction.placement_result import ALIKE, BADLY, Placement
@@ -183,8 +184,9 @@ def _antinodes(plane: fem.Rotor, n: int) -> tuple[int, ...]:
         peaks = [i + 1 for i in range(first, last - 1) if U[i] * U[i - 1] < U[i] ** 2 >= U[i] * U[i + 1]]
         if len(peaks) < mode:
             raise ValueError(
-                f"mode {mode} has {len(peaks)} antinode(s) between the outermost supports, the book's rule "
-                f"for {n} masses needs {mode}: use a finer mesh, fewer masses, or choose nodes by rank_nodes"
+                f"mode {mode} has {counted(len(peaks), 'antinode')} between the outermost supports, the "
+                f"book's rule for {n} masses needs {mode}: use a finer mesh, fewer masses, or choose nodes "
+                "by rank_nodes"
             )
         chosen += sorted(peaks, key=lambda node: -abs(U[node - 1]))[:mode]
     if len(set(chosen)) < n:
@@ -295,8 +297,8 @@ def _warnings(result: Placement) -> list[str]:
     if lost:
         out.append(
             f"{lost} of {result.considered} choices give no masses and are not ranked: {result.undetermined} "
-            f"are not determined by {result.modes} mode(s), in {result.at_node} a mode has a node at the "
-            'first mass (normalise="largest" can use these)'
+            f"are not determined by {counted(result.modes, 'mode')}, in {result.at_node} a mode has a node "
+            'at the first mass (normalise="largest" can use these)'
         )
     if not result.ranked:
         return [*out, "no choice gives a physical model: use other candidates, more modes or fewer masses"]

@@ -8,6 +8,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import COLORS
+from rotorid.base.text import counted
 from rotorid.reduction.plots import LINE, SAME_SHAPE, SMALLEST_ERROR
 
 if TYPE_CHECKING:
@@ -36,11 +37,11 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     ranked = np.isfinite(placement.error) & np.isfinite(placement.mac) & (placement.masses > 0).all(axis=1)
     axes.set(
         xlabel=f"1 − smallest MAC (at least {SAME_SHAPE:g}): the shape of the worst mode, better to the left",
-        ylabel=f"largest frequency error of {_count(placement.check, 'mode')}, %, better below",
+        ylabel=f"largest frequency error of {counted(placement.check, 'mode')}, %, better below",
     )
     n, all_of_them = placement.nodes.shape[1], placement.considered
     left_out = all_of_them - int(np.count_nonzero(ranked))
-    title = f"{all_of_them} choices of {_count(n, 'node')}" + (
+    title = f"{all_of_them} choices of {counted(n, 'node')}" + (
         f", {left_out} without physical model" if left_out else ""
     )
     if not ranked.any():
@@ -123,7 +124,3 @@ def _plain_numbers(axes: Axes) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 500 * low else (1.0,)))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _count(n: int, noun: str) -> str:
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import fem
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import finite, floats
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -229,8 +230,8 @@ class Placement:
         n = self.nodes.shape[1]
         lines = [f"Warning: {w}" for w in self.warnings]
         lines.append(
-            f"{self.considered} choices of {n} of {len(self.candidates)} nodes, masses from {self.modes} "
-            f"mode(s), checked on {self.check} mode(s)"
+            f"{self.considered} choices of {n} of {len(self.candidates)} nodes, masses from "
+            f"{counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}"
         )
         lines.append(
             f"  ranked {self.ranked}; with masses that are not positive {self.unphysical}; not determined "

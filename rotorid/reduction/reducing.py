@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 import fem
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
 from rotorid.reduction.equivalent.plane import plane_at_rest
 from rotorid.reduction.equivalent.sensitivity import mass_sensitivity
@@ -192,7 +193,7 @@ def _reduced(
     estimate = equivalent_masses(alpha, *used, **how, nonnegative=choices.nonnegative)
     if not estimate.full_rank:
         raise ValueError(
-            f"the first {modes} mode(s) do not determine the masses at nodes {list(places)}: "
+            f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
             f"{estimate.describe_rank()}; use more modes or other nodes"
         )
     sensitivity = mass_sensitivity(alpha, *used, **how)

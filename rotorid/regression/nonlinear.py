@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import Function, Search, drive, inside, polish
@@ -215,7 +216,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     if ok and not left:
         why = "the minimum was not reached: the last step is not yet small"
     elif converged:
-        why = f"converged in {len(search.path) - 1} iterations"
+        why = f"converged in {counted(len(search.path) - 1, 'iteration')}"
     if not converged:
         judged = replace(judged, covariance=None, solution_covariance=None)
     fixed = (x <= lower) | (x >= upper)

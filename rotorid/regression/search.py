@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.linear import least_squares
 from rotorid.regression.robust import cost, pseudo_residuals, spread, tuning
@@ -90,7 +91,8 @@ def drive(
             )
         x, ok = np.asarray(found.x), found.status > 0
         x = np.where(found.active_mask < 0, lower, np.where(found.active_mask > 0, upper, x))
-        why = "" if ok else f"not converged after {limit} evaluations: raise max_iterations or start nearer"
+        tried = counted(limit, "evaluation")
+        why = "" if ok else f"not converged after {tried}: raise max_iterations or start nearer"
     return x, ok, why
 
 

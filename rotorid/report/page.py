@@ -84,7 +84,7 @@ def render_report(
         show=Shown(whole),
         **context,
     )
-    return text.encode("utf-8")
+    return text.encode("utf-8", "replace")  # names of files may be anything
 
 
 def json_inside(document: Mapping[str, Any]) -> Markup:
@@ -235,7 +235,7 @@ def inline_svg(figure: Figure, title: str) -> Markup:
     for unwanted in (r"<metadata>.*?</metadata>", r"<style\b.*?</style>", r"<!--.*?-->"):
         body = re.sub(unwanted, "", body, flags=re.DOTALL)
     body = body.replace("xlink:href=", "href=")
-    prefix = "f" + hashlib.sha256((title + body).encode()).hexdigest()[:10] + "-"
+    prefix = "f" + hashlib.sha256((title + body).encode("utf-8", "replace")).hexdigest()[:10] + "-"
     used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', body))
     body = re.sub(
         r'\s+id="([^"]*)"', lambda m: f' id="{prefix}{m.group(1)}"' if m.group(1) in used else "", body

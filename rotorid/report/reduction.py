@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import counted
 from rotorid.base.units import RPM
 from rotorid.report.comparisons import (
     methods_part,
@@ -68,7 +69,7 @@ def reduce_report(
     return render_report(
         "reduce.html",
         document,
-        title=f"Rotor reduced to {_count(len(document['nodes']), 'mass', 'masses')}",
+        title=f"Rotor reduced to {counted(len(document['nodes']), 'mass', 'masses')}",
         warnings=every_warning(document),
         provenance=provenance,
         about=_about(document, provenance),
@@ -85,13 +86,9 @@ def _if(key: str, document: Mapping[str, Any], part: Callable[[], Part]) -> list
     return [part()] if document.get(key) is not None else []
 
 
-def _count(n: int, one: str, more: str) -> str:
-    return f"{n} {one if n == 1 else more}"
-
-
 def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     files = ", ".join(str(entry["file"]) for entry in provenance["inputs"])
-    how = f"formula (50), regression over {_count(document['modes'], 'mode', 'modes')}"
+    how = f"formula (50), regression over {counted(document['modes'], 'mode')}"
     how += ", no mass below 0" if document["nonnegative"] else ""
     how += ", rows of each mode relative to its 1/ω²" if document["rows"] == "relative" else ""
     return [

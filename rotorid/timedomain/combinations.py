@@ -3,7 +3,7 @@
 The null space of the sensitivities is a direction at the values found. Where the outputs stay what they are
 along the straight line in that direction, linear combinations are determined; where they stay along a line
 of constant ratios (θ exp(h v)), products of powers are. Otherwise the directions hold near these values only,
-and no standard deviation is given.
+and no standard deviation is given. That more may be determined is said only where beside them it is.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
 from rotorid.regression.estimate import Combination, Estimate, echelon
+from rotorid.regression.search import RCOND
 from rotorid.timedomain.methods.problem import Problem
 
 REACH = 0.2
@@ -50,11 +52,24 @@ def combined(problem: Problem, found: Estimate) -> tuple[Estimate, str]:
         return found, ""
     near = tuple(replace(c, words=f"(near these values) {c.words}", std=None) for c in found.combinations)
     which = ", ".join(found.undetermined)
+    if _deficient_beside(problem, theta):
+        return replace(found, curved=near), ""
     words = (
         f"the record's sensitivity to {which} (or to a combination) vanishes at the values found, but not "
         "beside them: it may be determined after all; start elsewhere"
     )
     return replace(found, curved=near), words
+
+
+def _deficient_beside(problem: Problem, theta: FloatArray) -> bool:
+    """Whether the sensitivities lack rank at other values near these, too: a curve of values fits alike."""
+    other = theta + REACH * np.where(theta == 0, 1.0, theta) * np.linspace(1.0, -0.7, len(theta))
+    deficient = False
+    if np.isfinite(problem.residual(other)).all():
+        J = problem.jacobian(other)
+        deficient = least_squares(J, np.zeros(len(J)), rcond=RCOND).rank < len(theta)
+    problem.residual(theta)
+    return deficient
 
 
 def _products(found: Estimate, rows: FloatArray) -> tuple[Combination, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.style import COLORS
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -177,8 +178,7 @@ def draw_iterations(result: Fit, axes: Axes) -> None:
     axes.locator_params(axis="x", integer=True)
     axes.set(xlabel="iteration", ylabel="value / last value" + ("\n(logarithmic beyond ±2)" if wide else ""))
     state = "converged" if result.converged else "not converged"
-    count = f"{result.iterations} iteration{'' if result.iterations == 1 else 's'}"
-    axes.set_title(f"{result.method}: {state} after {count}", fontsize=10)
+    axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=10)
     if not known.any():
         _say(axes, "no parameter by itself is determined\nby these data")
     _legend(axes, _colored(words, mark="o", shown=known), [])

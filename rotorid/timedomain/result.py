@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
+from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.models.model import OdeModel
@@ -186,6 +187,6 @@ class Fit:
             lines.append(f"estimated standard deviations, used as weights: {sizes}")
         for i, m in enumerate(self.minima if len(self.minima) > 1 else ()):
             values = ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
-            lines.append(f"minimum {i + 1} ({m.starts} starts): {values}; cost {m.cost:.4g}")
+            lines.append(f"minimum {i + 1} ({counted(m.starts, 'start')}): {values}; cost {m.cost:.4g}")
         said = set(lines)
         return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings if text not in said)])

@@ -26,7 +26,7 @@ class CriticalOptions:
     Attributes
     ----------
     number
-        How many critical speeds; rigid-body motions come besides.
+        How many critical speeds, by default 3; rigid-body motions come besides.
     mesh_check
         Estimate by refinement how far off the mesh makes each.
     speed_map
@@ -35,7 +35,7 @@ class CriticalOptions:
         Operating speeds, "5300:6500rpm" or rad/s.
     """
 
-    number: int = 3
+    number: int | None = None
     mesh_check: bool = False
     speed_map: bool = False
     operating: Band | None = None
@@ -124,8 +124,9 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     model, files = rotor_source(rotor)
     with phase("critical speeds"):
         modes = fem.critical_speeds(model, options.number)
-        mesh = fem.mesh_check(model, options.number) if options.mesh_check else None
-        chart, left_out = _map(model, options.number) if options.speed_map else (None, [])
+        n = options.number or sum(frequency > 0 for frequency in modes.frequencies.tolist()) or 1
+        mesh = fem.mesh_check(model, n) if options.mesh_check else None
+        chart, left_out = _map(model, n) if options.speed_map else (None, [])
     log_rotor(model)
     return CriticalSpeeds(
         modes=dataclasses.replace(modes, warnings=(*modes.warnings, *left_out)),

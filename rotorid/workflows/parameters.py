@@ -23,8 +23,8 @@ Sensor = str | int | tuple[str | int, float]
 """A node or station, in x or at an angle in degrees from x, with the rotation."""
 Names = str | Sequence[str]
 """As `names` reads them."""
-FASTEST = 1e9
-"""rad/s; no rotor turns so fast, and squares of larger numbers may overflow."""
+SLOWEST, FASTEST = 1e-9, 1e9
+"""rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
 
 
@@ -199,8 +199,8 @@ def _range(ends: Sequence[float], what: str, given: str) -> tuple[float, ...]:
 
 
 def _possible(found: list[float], what: str, given: Speeds) -> list[float]:
-    if not found or not (min(found) >= 0 and max(found) <= FASTEST):
-        raise ValueError(f"{what} {given!r}: speeds must be from 0 to {FASTEST:g} rad/s")
+    if not found or not all(value == 0 or SLOWEST <= value <= FASTEST for value in found):
+        raise ValueError(f"{what} {given!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
     return found
 
 

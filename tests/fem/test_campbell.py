@@ -242,6 +242,23 @@ def test_a_mode_that_grows_is_said_from_its_threshold_on():
     assert "grows already at" in above.warnings[0]
 
 
+def test_a_window_is_hatched_in_the_picture():
+    rotor = dataclasses.replace(symmetric(), material_damping=np.full(23, 2e-4))
+    for last, hatched in ((3000.0, True), (50.0, False)):
+        ax = plot(fem.campbell(rotor, np.linspace(0.0, last, 31), 4))
+        assert ("unstable" in {text.get_text() for text in ax.texts}) is hatched
+        assert any(patch.get_hatch() for patch in ax.patches) is hatched
+
+
+def test_by_default_all_modes_of_a_small_model():
+    ends = [fem.Support(node, 1e6) for node in (1, 3)]
+    rotor = fem.Rotor([0.1, 0.1], 0.1, density=0.0, discs=[fem.Disc(2, 10.0)], supports=ends)
+    assert fem.campbell(rotor, [10.0, 20.0]).frequencies.shape == (2, 2)
+    assert fem.whirl_modes(rotor, 10.0).frequencies.shape == (2,)
+    assert fem.critical_speeds(rotor).frequencies.size == 1
+    assert fem.campbell(rotor, [10.0], 3).warnings[-1] == "the model has only 2 of 3 modes"
+
+
 def test_a_rotor_that_is_pushed_aside_is_refused():
     base = machine()
     pushed = dataclasses.replace(base, supports=[*base.supports, fem.Support(12, -1e9, kind="seal")])

@@ -148,6 +148,131 @@ def test_no_window_of_instability_is_missed_in_drawn_rotors():
     assert windows > 5
 
 
+def test_the_threshold_is_the_edge_of_the_first_window_whatever_mode_grows():
+    rng = np.random.default_rng(5)
+    speeds = np.linspace(2.0, 1498.0, 41)
+    highest = 0
+    for _ in range(12):
+        rotor = drawn(rng)
+        windows = unstable_windows(rotor, speeds)
+        found = fem.stability_threshold(rotor, 1498.0, lowest=2.0, n=1)
+        if not windows or not windows[0].begins:
+            assert found.status == ("unstable" if windows else "stable")
+            continue
+        assert found.threshold == pytest.approx(windows[0].first, rel=1e-5)
+        assert (found.mode, found.direction) == (windows[0].mode, windows[0].direction)
+        highest = max(highest, found.mode)
+    assert highest > 8  # among the modes that were watched before there was none
+
+
+def test_the_windows_of_a_campbell_diagram_are_those_of_the_rotor():
+    rng = np.random.default_rng(8)
+    speeds = np.linspace(2.0, 1498.0, 41)
+    from_list = windows = 0
+    for _ in range(24):
+        rotor = drawn(rng)
+        expected, found = unstable_windows(rotor, speeds), fem.campbell(rotor, speeds, 4)
+        windows += len(expected)
+        from_list += len(expected) > 0 and len(found.unstable) > 0
+        ends = [
+            [end for window in some for end in (window.first, window.last)]
+            for some in (found.windows, expected)
+        ]
+        assert ends[0] == pytest.approx(ends[1], rel=1e-6)
+        assert [w.begins for w in found.windows] == [w.begins for w in expected]
+        assert [w.ends for w in found.windows] == [w.ends for w in expected]
+    assert windows > 10
+    assert from_list > 5
+
+
+def pushed_at_rest():
+    """Held by bearings, pushed aside by a seal at low speed and at rest."""
+    seal = fem.Support(2, [-2e6, -1e5], speeds=(0.0, 500.0), kind="seal")
+    bearings = [fem.Support(node, 1e6, 100.0) for node in (1, 3)]
+    disc, model = fem.Disc(2, 10.0, 0.1, 0.05), fem.Model(rotary_inertia=True, gyroscopic=True)
+    return fem.Rotor([0.3, 0.3], 0.04, discs=[disc], supports=[*bearings, seal], model=model)
+
+
+@pytest.mark.parametrize("speeds", [[0.0], [0.0, 400.0], [0.0, 1.0, 100.0, 400.0]])
+def test_a_rotor_that_is_pushed_aside_at_rest(speeds):
+    rotor = pushed_at_rest()
+    assert largest_growth(rotor, 0.0) > 0.5
+    assert largest_growth(rotor, 400.0) < 0
+    (window,) = unstable_windows(rotor, np.array(speeds))
+    assert window.first == 0.0
+    assert not window.begins
+    assert window.mode is None
+    assert window.last < 400.0
+    if len(speeds) > 1:
+        said = [text for text in fem.campbell(rotor, speeds).warnings if "runs away" in text]
+        assert [f"up to {window.last:.6g} rad/s" in text for text in said] == [True]
+
+
+def of_many_elements(rng):
+    """More unknowns than the whole space is taken for; seals, and material damping here and there."""
+    n = int(rng.integers(22, 28))
+    kinds = rng.permutation(["cross", "push", "none"])
+    stiff = 10 ** rng.uniform(6, 8.5, 3)
+    supports = [
+        fem.Support(int(node), ((k, 0.0), (0.0, k * rng.uniform(0.5, 2))), 10 ** rng.uniform(1.5, 4.5))
+        for node, k in zip(rng.choice(np.arange(1, n + 2), 3, replace=False), stiff, strict=True)
+    ]
+    knots = np.unique(np.concatenate(([0.0, 1500.0], rng.uniform(0, 1500, 4))))
+    for kind in kinds[:2]:
+        q = np.where(rng.random(knots.size) < 0.5, 0.0, 10 ** rng.uniform(4, 7, knots.size))
+        k = {"cross": [((0.0, one), (-one, 0.0)) for one in q], "push": (-0.3 * q).tolist()}.get(kind)
+        if k is not None:
+            node, c = int(rng.integers(1, n + 2)), rng.choice([30.0, 1000.0])
+            supports.append(fem.Support(node, k, c, speeds=tuple(knots), kind="seal"))
+    disc = rng.uniform(5, 50)
+    return fem.Rotor(
+        rng.dirichlet(np.full(n, 8.0)) * rng.uniform(0.6, 3.0),
+        rng.uniform(0.03, 0.12, n),
+        discs=[fem.Disc(int(rng.integers(1, n + 2)), disc, 0.015 * disc, 0.01 * disc)],
+        supports=supports,
+        material_damping=np.where(rng.random(n) < 0.5, 10 ** rng.uniform(-6, -3.5), 0.0),
+        model=fem.Model(rotary_inertia=True, gyroscopic=True),
+    ), knots
+
+
+def test_no_window_is_missed_where_the_basis_is_a_part_of_the_space():
+    rng = np.random.default_rng(3)
+    wrong, unstable = {}, 0
+    for number in range(60 if FULL else 8):
+        rotor, knots = of_many_elements(rng)
+        speeds = np.union1d(np.linspace(0.0, 1500.0, int(rng.choice([3, 40, 200]))), knots)
+        inside = within(unstable_windows(rotor, speeds), speeds)
+        edges = np.flatnonzero(np.diff(inside.astype(int)))
+        looked = np.unique(np.concatenate((edges, edges + 1, rng.integers(0, speeds.size, 8))))
+        growth = np.array([largest_growth(rotor, speed) for speed in speeds[looked]])
+        unstable += int((growth > 1e-6).sum())
+        bad = ((growth > 1e-6) & ~inside[looked]) | ((growth < -1e-6) & inside[looked])
+        if bad.any():
+            wrong[number] = speeds[looked][bad]
+    assert wrong == {}
+    assert unstable > 5
+
+
+def test_two_windows_are_not_one_where_no_speed_between_is_asked_for():
+    rotor = two_windows()
+    windows = unstable_windows(rotor, np.array([110.0, 295.0, 296.0]))
+    assert [window.first for window in windows] == pytest.approx([110.0, 286.458], abs=1e-3)
+    assert [window.last for window in windows] == pytest.approx([117.084, 296.0], abs=1e-3)
+    assert [(window.begins, window.ends) for window in windows] == [(False, True), (True, False)]
+    (only,) = unstable_windows(rotor, np.array([50.0, 295.0, 350.0]))  # that about 110 is not asked about
+    assert (only.first, only.last) == pytest.approx((286.458, 303.542), abs=1e-3)
+
+
+def two_windows():
+    """A seal that drives whirl about 110 and about 295 rad/s, and nowhere else."""
+    knots = (0.0, 100.0, 110.0, 120.0, 285.0, 290.0, 300.0, 305.0, 1200.0)
+    q = [3e5 * (speed in (110.0, 290.0, 300.0)) for speed in knots]
+    seal = fem.Support(3, [((0.0, k), (-k, 0.0)) for k in q], 300.0, speeds=knots, kind="seal")
+    disc, model = fem.Disc(3, 10.0, 0.1, 0.05), fem.Model(rotary_inertia=True, gyroscopic=True)
+    bearings = [fem.Support(node, 1e8) for node in (1, 5)]
+    return fem.Rotor([0.25] * 4, 0.04, discs=[disc], supports=[*bearings, seal], model=model)
+
+
 def test_many_speeds_are_judged_as_each_alone():
     """Ranges that are certified as a whole hold what single speeds say."""
     for material in (0.0, 2e-4):

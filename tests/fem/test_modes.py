@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.bands import assemble, dense, general, multiply, strain_energy
+from fem.matrices.bands import assemble, dense, general, multiply
+from fem.matrices.pencil import one_plane
 from fem.solvers.eigen import lowest_modes
 
 # Roots of cos x cosh x = 1: the free beam.
@@ -170,14 +171,26 @@ def test_bands_are_the_matrices(rotor):
     K = dense(A.stiffness)
     np.testing.assert_array_equal(K, K.T)
     np.testing.assert_allclose(multiply(A.stiffness, X), K @ X, rtol=1e-9, atol=1e-9 * np.abs(K).max())
-    np.testing.assert_allclose(strain_energy(rotor, X), np.einsum("ij,ik,kj->j", X, K, X), rtol=1e-9)
+    energy = one_plane(rotor, A).energy
+    np.testing.assert_allclose(energy(X), np.einsum("ij,ik,kj->j", X, K, X), rtol=1e-9)
     band = general(A.stiffness)
     i, j = np.nonzero(np.abs(np.subtract.outer(np.arange(A.size), np.arange(A.size))) <= 3)
     np.testing.assert_array_equal(band[6 + i - j, j], K[i, j])
     # A rigid translation carries the whole mass and strains no shaft.
     ones = np.tile([1.0, 0.0], rotor.n_nodes)[:, None]
     assert (ones.T @ multiply(A.mass, ones)).item() == pytest.approx(rotor.total_mass, rel=1e-12)
-    assert strain_energy(rotor, ones)[0] == pytest.approx(sum(s.stiffness for s in rotor.supports), rel=1e-12)
+    assert energy(ones)[0] == pytest.approx(sum(s.stiffness for s in rotor.supports), rel=1e-12)
+
+
+@pytest.mark.parametrize("columns", [3, 30])
+def test_hermitian_bands(columns):
+    rng = np.random.default_rng(2)
+    band = rng.normal(size=(4, 9)) + 1j * rng.normal(size=(4, 9))
+    band[3] = band[3].real
+    X = rng.normal(size=(9, columns)) + 1j * rng.normal(size=(9, columns))
+    full = dense(band)
+    np.testing.assert_array_equal(full, full.conj().T)
+    np.testing.assert_allclose(multiply(band, X), full @ X, rtol=1e-12)
 
 
 def test_ignored_inertia_is_said():

@@ -322,3 +322,10 @@ def test_memory_grows_with_the_answer():
     np.testing.assert_array_equal(found.largest_node[::97], every.major.argmax(axis=1) + 1)
     with pytest.raises(ValueError, match="node 7 was not kept"):
         found.at(7)
+
+
+def test_a_peak_on_constant_springs_is_refined_without_a_word_of_numpy():
+    # what the banded equations answer near a critical speed is complex; all else is real here
+    rotor = fem.Rotor(np.full(1000, 0.003), 0.1, supports=[fem.Support(101, 1e7), fem.Support(901, 1e7)])
+    response = fem.unbalance_response(rotor, {500: 1e-4}, np.arange(1.0, 1000.0, 10.0))
+    assert fem.response_peaks(response, 500).peaks

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import io
+import random
 from dataclasses import dataclass
 from functools import cache
 
 import openpyxl
 import tomli_w
 
-from fuzz import meaning
+from fuzz import meaning, mutations
 from fuzz.judging import answer, same
-from fuzz.mutations import generator, mutate
+from fuzz.spreadsheets import dress, mutate_workbook
 from fuzz.subjects import SUBJECTS
 
 REFUSED, SAME, CHANGED, FINDING = "refused", "same answer", "legitimate change", "FINDING"
@@ -52,6 +53,25 @@ def bench(subject, place):
     first = answer(words, seconds=60)
     assert first.document is not None, (subject, first)
     return Bench(target, words, target.read_bytes(), first.document)
+
+
+def generator(seed, number):
+    """The random numbers of one mutant."""
+    return random.Random(f"{seed}:{number}")
+
+
+def mutate(rng, kind, data):
+    """(what was done, the mutated file, its text where that is known and not plain UTF-8)."""
+    if kind == "workbook":
+        return *mutate_workbook(rng, data), None
+    m, more = mutations, (mutations.SETTINGS,)
+    if kind == "table":
+        more = (m.COLUMNS, (dress,), m.ENCODINGS)
+    done = rng.choice(rng.choice((m.BYTES, m.LINES, m.NUMBERS, m.NUMBERS, *more)))
+    changed = done(rng, data)
+    if done is dress:
+        return *changed, None
+    return done.__name__, *(changed if isinstance(changed, tuple) else (changed, None))
 
 
 def examine(number, seed, place):
@@ -144,8 +164,9 @@ def _book(content):
     book.remove(book.active)
     for title, cells in content.items():
         sheet = book.create_sheet(title)
-        for (row, column), value in cells.items():
-            sheet.cell(row, column).value = value
+        for (row, column), (value, number_format) in cells.items():
+            cell = sheet.cell(row, column)
+            cell.value, cell.number_format = value, number_format
     stream = io.BytesIO()
     book.save(stream)
     return stream.getvalue()

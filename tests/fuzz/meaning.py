@@ -103,7 +103,10 @@ def settings(data):
 
 
 def workbook(data):
-    """{sheet: {(row, column): value}} with what is not blank, or None."""
+    """{sheet: {(row, column): (value, format)}} with what is not blank, or None.
+
+    The format of a number says in which steps it was written; other formats say nothing.
+    """
     import warnings
 
     try:
@@ -115,10 +118,18 @@ def workbook(data):
     found = {}
     for sheet in book.worksheets:
         cells = sheet._cells.values()  # those that are in the file; iter_rows fills the gaps between them
-        found[sheet.title] = {(c.row, c.column): _plain(c.value) for c in cells if _plain(c.value) != ""}
+        found[sheet.title] = {
+            (c.row, c.column): (_plain(c.value), _format(c)) for c in cells if _plain(c.value) != ""
+        }
         if any("%" in str(c.number_format) for c in cells if c.value is not None):
             return None
     return found
+
+
+def _format(cell):
+    """Of decimals or a power of ten, else the general one."""
+    written = str(cell.number_format) if isinstance(cell.value, (int, float)) else ""
+    return written if re.fullmatch(r"(#,##)?0(\.0+)?(E\+0+)?", written) else "General"
 
 
 def _plain(value):

@@ -1,12 +1,8 @@
-"""Mutations of files: bytes, lines, columns, numbers, encodings, what spreadsheet programs do."""
+"""Mutations of text files: bytes, lines, numbers, columns, encodings, settings."""
 
 from __future__ import annotations
 
-import io
-import random
 import re
-
-import openpyxl
 
 NUMBER = re.compile(r"(?<![\w.])[+-]?\d+\.?\d*(?:[eE][+-]?\d+)?(?![\w.])")
 WORDS = (
@@ -63,21 +59,6 @@ WORDS = (
     "5\u200b",
     "\u202e5",
 )
-
-
-def mutate(rng, kind, data):
-    """(what was done, the mutated file, its text where that is known and not plain UTF-8)."""
-    if kind == "workbook":
-        return _workbook(rng, data)
-    group = rng.choice(
-        (BYTES, LINES, NUMBERS, NUMBERS, *((COLUMNS, EXCEL, ENCODINGS) if kind == "table" else (SETTINGS,)))
-    )
-    done = rng.choice(group)
-    changed = done(rng, data)
-    text = None
-    if isinstance(changed, tuple):
-        changed, text = changed
-    return done.__name__, changed, text
 
 
 # bytes
@@ -213,41 +194,35 @@ def change_digit(rng, data):
     return data[:at] + str(rng.randrange(10)).encode() + data[at + 1 :]
 
 
-def change_number(rng, data):
-    text = data.decode("utf-8-sig")
-    found = list(NUMBER.finditer(text))
-    if not found:
-        return data
-    m = rng.choice(found)
-    return (text[: m.start()] + rng.choice(WORDS) + text[m.end() :]).encode()
+def _number(change):
+    def done(rng, data):
+        text = data.decode("utf-8-sig")
+        found = list(NUMBER.finditer(text))
+        if not found:
+            return data
+        m = rng.choice(found)
+        return (text[: m.start()] + change(rng, m[0]) + text[m.end() :]).encode()
+
+    done.__name__ = change.__name__
+    return done
 
 
-def rewrite_number(rng, data):
+@_number
+def change_number(rng, _written):
+    return rng.choice(WORDS)
+
+
+@_number
+def rewrite_number(rng, written):
     """The same number, written otherwise."""
-    text = data.decode("utf-8-sig")
-    found = list(NUMBER.finditer(text))
-    if not found:
-        return data
-    m = rng.choice(found)
-    number = float(m[0])
-    forms = [
-        f"{number!r}",
-        f"{number:e}",
-        f"{number:.17g}",
-        f" {m[0]} ",
-        f"{m[0]}0" if "." in m[0] and "e" not in m[0].lower() else m[0],
-    ]
-    return (text[: m.start()] + rng.choice(forms) + text[m.end() :]).encode()
+    number = float(written)
+    zero = "0" if "." in written and "e" not in written.lower() else ""
+    return rng.choice([f"{number!r}", f"{number:e}", f"{number:.17g}", f" {written} ", f"{written}{zero}"])
 
 
-def scale_number(rng, data):
-    text = data.decode("utf-8-sig")
-    found = list(NUMBER.finditer(text))
-    if not found:
-        return data
-    m = rng.choice(found)
-    value = float(m[0]) * rng.choice((-1, 10, 1e-3, 1e3, 1e6, 1e-6, 1e12, 0.5, 2))
-    return (text[: m.start()] + f"{value:.6g}" + text[m.end() :]).encode()
+@_number
+def scale_number(rng, written):
+    return f"{float(written) * rng.choice((-1, 10, 1e-3, 1e3, 1e6, 1e-6, 1e12, 0.5, 2)):.6g}"
 
 
 # columns of a table with commas
@@ -329,51 +304,7 @@ def label_with_sign(rng, rows):
         row[at] = names.get(row[at], row[at])
 
 
-# what spreadsheet programs do: the same table in another dress
-def _dress(change):
-    def done(rng, data):
-        return change(rng, data.decode("utf-8-sig"))
-
-    done.__name__ = change.__name__
-    return done
-
-
-def _semicolons(text):
-    return "\n".join(
-        line if line.startswith("#") else line.replace(",", ";").replace(".", ",")
-        for line in text.split("\n")
-    )
-
-
-EXCEL = [
-    _dress(f)
-    for f in (
-        lambda _r, t: _semicolons(t).encode(),
-        lambda _r, t: ("sep=;\n" + _semicolons(t)).encode(),
-        lambda _r, t: t.replace("\n", "\r\n").encode(),
-        lambda _r, t: t.replace("\n", "\r").encode(),
-        lambda _r, t: "\n".join(x if x.startswith("#") else x and x + ",,," for x in t.split("\n")).encode(),
-        lambda _r, t: (t + ",,,\n,,,\n\n").encode(),
-        lambda _r, t: "\n".join(
-            x if x.startswith("#") else x and '"' + x.replace(",", '","') + '"' for x in t.split("\n")
-        ).encode(),
-        lambda _r, t: "\n".join(
-            x if x.startswith("#") else x.replace(",", "\t") for x in t.split("\n")
-        ).encode(),
-        lambda _r, t: "\n".join(
-            x if x.startswith("#") else x.replace(",", "\u00a0, ") for x in t.split("\n")
-        ).encode(),
-        lambda r, t: re.sub(NUMBER, lambda m: f"{float(m[0]):.2E}" if r.random() < 0.3 else m[0], t).encode(),
-        lambda r, t: re.sub(NUMBER, lambda m: f"{float(m[0]):.2f}" if r.random() < 0.3 else m[0], t).encode(),
-        lambda _r, t: re.sub(r"(?<=,)(\d{4})(?=[,\n])", r"\1.000", t).encode(),
-        lambda _r, t: re.sub(r"\b(\d)(\d{3})\b", r"\1,\2", t).encode(),
-        lambda _r, t: re.sub(r"\b(\d)(\d{3})\b", r"\1.\2", _semicolons(t)).encode(),
-    )
-]
-for _i, _f in enumerate(EXCEL):
-    _f.__name__ = f"excel_{_i}"
-
-
+# encodings
 def encode(rng, data):
     text = data.decode("utf-8-sig")
     if rng.random() < 0.5:  # a name with a letter that tells encodings apart
@@ -450,167 +381,3 @@ def change_key(rng, data):
 
 
 SETTINGS = (change_value, change_key)
-
-
-# workbooks
-def _workbook(rng, data):
-    if rng.random() < 0.2:
-        done = rng.choice((flip_bit, flip_bit, delete_bytes, truncate, repeat_bytes))
-        return done.__name__, done(rng, data), None
-    book = openpyxl.load_workbook(io.BytesIO(data))
-    sheet = rng.choice(book.worksheets)
-    done = rng.choice(CELLS)
-    done(rng, book, sheet)
-    stream = io.BytesIO()
-    book.save(stream)
-    return done.__name__, stream.getvalue(), None
-
-
-def _some_cell(rng, sheet):
-    return sheet.cell(rng.randrange(1, sheet.max_row + 1), rng.randrange(1, sheet.max_column + 1))
-
-
-def _set(change):
-    def done(rng, _book, sheet):
-        change(rng, _some_cell(rng, sheet))
-
-    done.__name__ = change.__name__
-    return done
-
-
-@_set
-def cell_value(rng, cell):
-    import datetime
-
-    values = (
-        None,
-        "",
-        " ",
-        "x",
-        "#1",
-        "#N/A",
-        True,
-        0,
-        -1,
-        1e300,
-        datetime.datetime(2024, 5, 1),
-        "7,2",
-        "1.234,5",
-        "'5",
-        "\n",
-        "a\nb",
-        "_x000D_",
-        10**20,
-    )
-    cell.value = rng.choice(values)
-
-
-@_set
-def cell_text(_rng, cell):
-    cell.value = None if cell.value is None else str(cell.value)
-    cell.data_type = "s"
-
-
-@_set
-def cell_decimal_comma(_rng, cell):
-    cell.value = None if cell.value is None else str(cell.value).replace(".", ",")
-
-
-@_set
-def cell_format(rng, cell):
-    cell.number_format = rng.choice(
-        ("0.00", "0%", "0.00E+00", "dd.mm.yyyy", "@", "#,##0.000", "General", "[h]:mm")
-    )
-
-
-@_set
-def cell_formula(rng, cell):
-    cell.value = rng.choice(("=1+1", "=A1", '=HYPERLINK("x")'))
-
-
-@_set
-def cell_error(_rng, cell):
-    cell.value = "#N/A"
-    cell.data_type = "e"
-
-
-@_set
-def cell_scale(rng, cell):
-    if isinstance(cell.value, (int, float)):
-        cell.value *= rng.choice((-1, 2, 0.5, 1e3, 1e6, 1e-3))
-
-
-def stray_format(rng, _book, sheet):
-    sheet.cell(rng.choice((1_048_576, 300, 5000)), rng.choice((1, 5, 16_384))).number_format = "0.00"
-
-
-def insert_row(rng, _book, sheet):
-    at = rng.randrange(1, sheet.max_row + 2)
-    sheet.insert_rows(at)
-    if rng.random() < 0.6:
-        sheet.cell(at, 1).value = rng.choice(("# remark", "#12 coupling", "Title", "#N/A"))
-
-
-def delete_row(rng, _book, sheet):
-    sheet.delete_rows(rng.randrange(1, sheet.max_row + 1))
-
-
-def insert_blank_column(rng, _book, sheet):
-    sheet.insert_cols(rng.randrange(1, sheet.max_column + 2))
-
-
-def delete_a_column(rng, _book, sheet):
-    sheet.delete_cols(rng.randrange(1, sheet.max_column + 1))
-
-
-def merge(rng, _book, sheet):
-    a = rng.randrange(1, sheet.max_row + 1)
-    sheet.merge_cells(
-        start_row=a, end_row=a + rng.randrange(1, 3), start_column=1, end_column=rng.randrange(1, 3)
-    )
-
-
-def rename_sheet(rng, _book, sheet):
-    sheet.title = rng.choice((sheet.title.upper(), sheet.title + " ", sheet.title[:-1], "Sheet9", "notes"))
-
-
-def add_sheet(rng, book, _sheet):
-    book.create_sheet(rng.choice(("notes", "extra", "results", "check"))).append(["x", 1])
-
-
-def hide_sheet(_rng, _book, sheet):
-    sheet.sheet_state = "hidden"
-
-
-def delete_sheet(_rng, book, sheet):
-    book.remove(sheet)
-    if not book.worksheets:
-        book.create_sheet("x")
-
-
-CELLS = (
-    cell_value,
-    cell_value,
-    cell_value,
-    cell_text,
-    cell_decimal_comma,
-    cell_format,
-    cell_formula,
-    cell_error,
-    cell_scale,
-    stray_format,
-    insert_row,
-    delete_row,
-    insert_blank_column,
-    delete_a_column,
-    merge,
-    rename_sheet,
-    add_sheet,
-    hide_sheet,
-    delete_sheet,
-)
-
-
-def generator(seed, number):
-    """The random numbers of one mutant."""
-    return random.Random(f"{seed}:{number}")

@@ -3,8 +3,7 @@
 import pytest
 from repetitions import FULL
 
-from fuzz.examining import CHANGED, FINDING, REFUSED, SAME, bench, examine, judge
-from fuzz.mutations import generator, mutate
+from fuzz.examining import CHANGED, FINDING, REFUSED, SAME, bench, examine, generator, judge, mutate
 from fuzz.subjects import SUBJECTS
 
 MUTANTS = 500 if FULL else 90

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rotorid.base.text import counted
 from rotorid.cli.common import (
     JsonOption,
     OperatingOption,
@@ -37,8 +38,11 @@ def campbell(
         typer.Option("--speeds", help="FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm."),
     ],
     n: Annotated[
-        int, typer.Option("-n", "--number", min=1, help="How many modes; forward and backward count apart.")
-    ] = 6,
+        int | None,
+        typer.Option(
+            "-n", "--number", min=1, help="How many modes, by default 6; forward and backward count apart."
+        ),
+    ] = None,
     operating: OperatingOption = None,
     json: JsonOption = False,
     plot: PlotOption = None,
@@ -58,7 +62,7 @@ def campbell(
     check_targets(plot, output)
     service = band(operating)
     model, omega = read_rotor(rotor), rising_speeds(speed)
-    with busy(f"whirl at {len(omega)} speeds"):
+    with busy(f"whirl at {counted(len(omega), 'speed')}"):
         result = fem.campbell(model, omega, n)
 
     def picture() -> Figure:
@@ -80,7 +84,7 @@ def campbell(
         lambda: "\n".join([result.summary(), *([] if inside is None else [separation_text(inside)])]),
         as_json=json,
         files=rotor_files(rotor),
-        options={"speeds": speed, "number": n, "operating": operating},
+        options={"speeds": speed, "number": n or result.frequencies.shape[1], "operating": operating},
         figure=(plot, picture),
         table=(output, result.to_frame),
     )

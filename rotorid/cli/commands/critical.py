@@ -22,11 +22,14 @@ from rotorid.workflows.critical import critical as work
 def critical(
     rotor: RotorArgument,
     number: Annotated[
-        int,
+        int | None,
         typer.Option(
-            "-n", "--number", min=1, help="How many critical speeds; rigid-body motions come besides."
+            "-n",
+            "--number",
+            min=1,
+            help="How many critical speeds, by default 3; rigid-body motions come besides.",
         ),
-    ] = CriticalOptions.number,
+    ] = None,
     mesh_check: Annotated[
         bool, typer.Option("--mesh-check", help="Estimate by refinement how far off the mesh makes each.")
     ] = False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -127,9 +128,9 @@ def _check_folder(folder: Path, samples: Path, copies: Mapping[Path, bytes], sam
     remedy = "choose another folder: rotorid demo DIR"
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"{folder}: this is a file; {remedy}")
-    inside = folder.resolve()
+    inside = Path(os.path.realpath(folder))
     if samples.resolve() in (inside, *inside.parents) or any(
-        (folder / name).resolve() == (samples / name).resolve() for name in sample.sources
+        os.path.realpath(folder / name) == os.path.realpath(samples / name) for name in sample.sources
     ):
         raise ValueError(f"{folder}: these are the sample data themselves; {remedy}")
     own = all(path.exists() for path in copies)  # a demo of this sample ran here before

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rotorid.base.text import counted
 from rotorid.cli.common import (
     JsonOption,
     OutputOption,
@@ -58,7 +59,7 @@ def influence(
     check_targets(plot, output)
     model = read_rotor(rotor)
     at, read, omega = nodes(planes, "--planes"), parse_sensors(sensors), rising_speeds(speed)
-    with busy(f"influence coefficients at {len(omega)} speeds"):
+    with busy(f"influence coefficients at {counted(len(omega), 'speed')}"):
         result = fem.influence(model, at, read, omega)
     note_rotor(model, speeds=len(omega))
     emit(

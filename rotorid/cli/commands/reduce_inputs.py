@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotorid.base.text import counted
 from rotorid.workflows.parameters import band
 from rotorid.workflows.parameters import nodes as parse_nodes
 
@@ -53,8 +54,8 @@ def places(
         }[place or "compromise"]
         if which is None:
             raise ValueError(
-                f"no {masses} nodes give positive masses with {placement.modes} mode(s): use other "
-                "--modes or --masses"
+                f"no choice of {counted(masses, 'node')} gives positive masses with "
+                f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
             )
         return [int(node) for node in placement.nodes[which]]
     if data is not None:
@@ -118,8 +119,8 @@ def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) 
 
         raise ValueError(
             f"--errors: {name!r} is not known{did_you_mean(name, ERRORS)}; known are {', '.join(ERRORS)}, or "
-            f"one input of {n} masses and {modes} mode(s): alpha11 to alpha{n}{n}, U11 to U{n}{modes}, "
-            f"omega1 to omega{modes}, c1 to c{n}"
+            f"one input of {counted(n, 'mass', 'masses')} and {counted(modes, 'mode')}: "
+            f"alpha11 to alpha{n}{n}, U11 to U{n}{modes}, omega1 to omega{modes}, c1 to c{n}"
         )
     table = np.array(np.broadcast_to(stated.get(kinds[stem], 0.0), shapes[stem]))
     table[at] = value

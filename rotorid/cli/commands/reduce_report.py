@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from rotorid.base.text import counted
 from rotorid.plots import plot
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ class Report:
         which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
         said = [
             f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
-            f"{self.result.modes} mode(s)), {which} at {motion.speed:.6g} rad/s, SI",
+            f"{counted(self.result.modes, 'mode')}), {which} at {motion.speed:.6g} rad/s, SI",
             "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
         ]
         if motion.M.any(axis=0).all() and not inputs:

@@ -105,7 +105,8 @@ def _criticals(result: Response) -> FloatArray:
     """Undamped critical speeds up to the highest speed; none where they cannot be found."""
     import fem
 
-    n, found = 4, np.zeros(0)
+    # Over tables all are found at once, whatever n.
+    n, found = 4 if result.rotor.constant else _CRITICALS, np.zeros(0)
     while n <= _CRITICALS:
         try:
             found = fem.critical_speeds(result.rotor, n).frequencies

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.base.units import RPM
 from rotorid.cli.commands.refine import refine, response_from_rest, settle
 from rotorid.cli.common import (
@@ -102,7 +103,7 @@ def response(
     mounted = read_unbalance(unbalance, model)
     nodes = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
     nodes |= dict.fromkeys(support.node for support in model.supports)
-    with busy(f"response at {len(omega)} speeds"):
+    with busy(f"response at {counted(len(omega), 'speed')}"):
         result = response_from_rest(model, mounted, omega, [*nodes])
     labels = [str(label(place)) for place in places]
     finer, peaks = result, []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotorid.base.text import counted
 from rotorid.cli.amounts import inside, length_of, weight_of, weights_of
 
 if TYPE_CHECKING:
@@ -231,7 +232,7 @@ def _drilling_text(wanted: Wanted, found: Drilling) -> str:
     return "\n".join(
         [
             f"Instead of adding {wanted.words(wanted.target)}, take away opposite:",
-            f"  {n} hole{'s' if n > 1 else ''} of diameter {1e3 * tool.diameter:g} mm at {at}, {where} a "
+            f"  {counted(n, 'hole')} of diameter {1e3 * tool.diameter:g} mm at {at}, {where} a "
             f"radius of {1e3 * tool.radius:g} mm",
             f"  {only}tip at {1e3 * found.tip_depth:.2f} mm",
             f"  each takes away {1e3 * found.mass:.4g} g, {1e6 * found.unbalance:.5g} g·mm",

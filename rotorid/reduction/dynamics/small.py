@@ -25,6 +25,7 @@ import fem
 from fem.matrices.lateral_planes import Quadratic, both_planes, project
 from fem.state_space import StateSpace, state_space
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import counted
 from rotorid.reduction.dynamics.lumping import (
     checked_speeds,
     condensed,
@@ -238,7 +239,7 @@ class SmallRotor:
     def summary(self) -> str:
         """The model as text."""
         lines = [f"Warning: {text}" for text in self.warnings]
-        lines.append(f"{len(self.nodes)} masses on a massless shaft, both planes")
+        lines.append(f"{counted(len(self.nodes), 'mass', 'masses')} on a massless shaft, both planes")
         lines += [
             f"  node {node:>3}  at {self.rotor.positions[node - 1]:7.3f} m   {mass:10.3f} kg"
             for node, mass in zip(self.nodes, self.masses, strict=True)

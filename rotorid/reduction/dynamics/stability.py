@@ -12,10 +12,12 @@ from fem.campbell import runs_away
 from fem.matrices.lateral_planes import both_planes
 from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
+from fem.stability import least_damped, range_of_speeds
 from fem.whirl import available_modes, checked_number
 from rotorid.base.json import floats
+from rotorid.base.text import counted
 from rotorid.reduction.dynamics.running import without_modal_damping
-from rotorid.reduction.dynamics.threshold import STEPS, grid, searched, stability_threshold
+from rotorid.reduction.dynamics.threshold import STEPS, stability_threshold, threshold_of
 from rotorid.reduction.dynamics.turning import whirl_of
 
 if TYPE_CHECKING:
@@ -98,7 +100,7 @@ class StabilityCost:
         """What the reduction costs, in words and a table."""
         lines = [f"Warning: {text}" for text in self.warnings]
         lines.append(self._verdict())
-        lines.append(f"{'':28}{'full rotor':>14}{f'{len(self.nodes)} masses':>14}")
+        lines.append(f"{'':28}{'full rotor':>14}{counted(len(self.nodes), 'mass', 'masses'):>14}")
         both = (self.full, self.small)
         rpm = [None if each.threshold is None else each.threshold * RPM for each in both]
         rows = (
@@ -185,15 +187,15 @@ def compare_stability(
         Into how many steps the range is divided; a mode that is unstable only between two neighbouring
         speeds is not seen, in neither model. The thresholds themselves are found by iteration.
     n
-        How many modes of lowest frequency of the full rotor to watch, forward and backward whirl apart; by
-        default 8, or as many as the small model has. Of the small model all are watched.
+        Of how many modes of lowest frequency of the full rotor the decrements are taken, forward and backward
+        whirl apart; by default 8, or as many as the small model has. Of the small model all are.
 
     Raises
     ------
     ValueError
         For an impossible range, a number of modes out of range, or a speed outside the table of a support.
     """
-    speeds = grid(highest, lowest, steps)
+    speeds = range_of_speeds(lowest, highest, steps)
     rotor = small.rotor
     left = without_modal_damping(small)
     if left:
@@ -203,7 +205,7 @@ def compare_stability(
     available = available_modes(rotor)
     n_full = checked_number(rotor, min(max(8, n_small), available) if n is None else n)
     full = fem.stability_threshold(rotor, highest, lowest=lowest, n=n_full, steps=steps)
-    own = searched(whirl, small)
+    own = threshold_of(whirl)
     full_decrement, full_frequency = _least_damped(solve_whirl(both_planes(rotor), speeds, n_full))
     small_decrement, small_frequency = _least_damped(whirl)
     for array in (full_decrement, full_frequency, small_decrement, small_frequency):
@@ -221,8 +223,6 @@ def compare_stability(
         n_small=n_small,
         warnings=(
             *left,
-            *(f"full rotor: {text}" for text in full.warnings),
-            *(f"small model: {text}" for text in own.warnings),
             *_unconfirmed(full, n_full),
             *_doubts(full, own),
             *_damping_differs(speeds, full_decrement, small_decrement),
@@ -231,23 +231,17 @@ def compare_stability(
 
 
 def _least_damped(whirl: Whirl) -> tuple[FloatArray, FloatArray]:
-    """Smallest logarithmic decrement at each speed and the frequency of its mode, shape (S,) each."""
-    values = whirl.found.values
-    with np.errstate(invalid="ignore"):
-        decrements = -2 * np.pi * values.real / np.abs(values.imag)
-    which = np.argmin(np.where(np.isfinite(decrements), decrements, np.inf), axis=1)
-    row = np.arange(len(values))
-    frequency = np.abs(values[row, which].imag)
-    least = decrements[row, which]
+    """`least_damped`; −inf and NaN where the rotor runs away."""
+    least, frequency = least_damped(whirl)
     away = np.array(runs_away(whirl))
     return np.where(away, -np.inf, least), np.where(away, np.nan, frequency)
 
 
 def _unconfirmed(full: fem.Stability, n: int) -> tuple[str, ...]:
-    """Whether the full rotor's threshold is one: the search follows modes, which may be exchanged."""
+    """Whether the full rotor's threshold is one, by another basis."""
     if full.threshold is None or full.frequency is None:
         return ()
-    whirl = solve_whirl(both_planes(full.rotor), np.array([full.threshold]), n)
+    whirl = solve_whirl(both_planes(full.rotor), np.array([full.threshold]), max(n, full.mode or 1))
     values = whirl.found.values[np.isfinite(whirl.found.values)]
     fastest = float((values.real / np.abs(values)).max(initial=-np.inf))
     if abs(fastest) <= CONFIRMED:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import BoolArray, FloatArray, IntArray
+from rotorid.base.text import counted
 from rotorid.reduction.equivalent.vibration import natural_frequencies
 
 EXACT = 1e-9
@@ -158,8 +159,8 @@ def _incomplete(n: int, starts: int, found: IntArray) -> str:
     rare = f", the rarest reached by {found.min()} of them" if found.size else ""
     odd = "; their number should be even: one is missing or two coincide" if len(found) % 2 else ""
     return (
-        f"{len(found)} mass set(s) found from {starts} random starts{rare}: for {n} masses it is not proven "
-        f"that there are no others{odd}"
+        f"{counted(len(found), 'set')} of masses found from {starts} random starts{rare}: for {n} masses "
+        f"it is not proven that there are no others{odd}"
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import fem
 from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
 from rotorid.base.json import finite, floats
+from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
 from rotorid.reduction.equivalent.matching import match
 from rotorid.reduction.equivalent.plane import plane_at_rest
@@ -109,7 +110,8 @@ class TradeOff:
     def summary(self) -> str:
         """Text for an engineer: two lines per alternative, and the trap in words."""
         lines = [f"Warning: {w}" for w in self.warnings]
-        lines.append(f"{len(self.nodes)} mass(es) at node(s) {', '.join(map(str, self.nodes))}")
+        masses, at = counted(len(self.nodes), "mass", "masses"), "node" if len(self.nodes) == 1 else "nodes"
+        lines.append(f"{masses} at {at} {', '.join(map(str, self.nodes))}")
         for r, name in enumerate(self.names):
             lines.append(f"{name}: " + ", ".join(f"{m:.2f}" for m in self.masses[r]) + " kg")
             errors = "  ".join(_cell(round(100 * e, 4) + 0.0, "+10.4f") for e in self.relative_error[r])
@@ -127,8 +129,8 @@ class TradeOff:
             text = f"No set of positive masses at these nodes has all {n} frequencies{which}. "
         else:
             text = (
-                f"{count} different mass set(s) have the rotor's {n} frequencies exactly. Frequencies alone "
-                "are a trap: they do not say where the mass is. "
+                f"{counted(count, 'different set')} of masses {'has' if count == 1 else 'have'} the rotor's "
+                f"{n} frequencies exactly. Frequencies alone are a trap: they do not say where the mass is. "
             )
         if self.traps.size:
             told = "; ".join(f"{self.names[r]} has MAC {self._worst(r)}" for r in self.traps)
@@ -225,7 +227,7 @@ def _regressions(
     choices: tuple[Literal["equal", "relative"], ...] = ("equal", "relative")
     for k in range(1, len(omega) + 1):
         for rows in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
-            name = f"regression, {k} mode{'s' if k > 1 else ''}" + (f", {rows} rows" if k > 1 else "")
+            name = f"regression, {counted(k, 'mode')}" + (f", {rows} rows" if k > 1 else "")
             try:
                 fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=rows)
             except ValueError as problem:

@@ -15,6 +15,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
 from rotorid.tables.reader.grid import Cell, Grid
+from rotorid.tables.reader.number import check_size
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, one_of
 
@@ -254,9 +255,10 @@ def read_sigma(text: str | None, model: OdeModel) -> dict[str, float] | None:
         name = name.strip()
         try:
             value = float(number)
+            check_size(value)
         except ValueError:
-            value = np.nan
-        if not (np.isfinite(value) and value > 0):
+            value = 0.0
+        if not value > 0:
             raise ValueError(
                 f"--sigma {text!r}: {part.strip()!r} holds no number above 0; use y1=0.01,y2=0.02"
             )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import Problems, TableWarning
 
@@ -144,7 +145,7 @@ def _scatter(
         return None
     if dof < ENOUGH_REPEATS:
         message = (
-            f"{source}: the errors come from {dof} repeated reading{'s' if dof > 1 else ''} only: intervals "
+            f"{source}: the errors come from {counted(dof, 'repeated reading')} only: intervals "
             "may be far too narrow; repeat more readings or state the errors"
         )
         warnings.warn(message, TableWarning, stacklevel=4)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rotorid.base.text import counted
 from rotorid.tables.job.assumed import with_assumed
 from rotorid.tables.job.completion import completed
 from rotorid.tables.job.job_data import Job, Source, source_name
@@ -164,7 +165,7 @@ def job_from_files(
     if not 1 <= len(files) <= 2 or (len(files) == 1 and influence is None):
         raise ValueError(
             "give a job (.toml or .xlsx), or a runs table and a weights table, or a runs table and "
-            f"--influence with an influence table; got {len(files)} file{'s' if len(files) != 1 else ''}"
+            f"--influence with an influence table; got {counted(len(files), 'file')}"
         )
     problems = Problems()
     paths = [Path(file) for file in files]

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from rotorid.base.text import counted
 from rotorid.tables.reader.problems import Problems
 
 LOOKED_AT = 10
@@ -195,8 +196,8 @@ def _fit(source: str, header: list[str], row: Row, separator: str, problems: Pro
             source,
             number,
             None,
-            f"{found} cells",
-            f"{width} cell{'s' if width > 1 else ''}, as in the header{hint}",
+            counted(found, "cell"),
+            f"{counted(width, 'cell')}, as in the header{hint}",
         )
     return number, (cells + ("",) * width)[:width]
 

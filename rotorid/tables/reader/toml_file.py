@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +15,9 @@ from rotorid.tables.reader.number import LARGEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 
-MOST_BYTES = 20_000_000
+MOST_BYTES = 2_000_000
+_DEEP = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){20}""")
+"""A key of so many parts; the time that tomllib takes grows with their square."""
 MOST_NAMES = 1_000
 
 
@@ -35,6 +38,8 @@ def read_toml(path: Path, problems: Problems) -> dict[str, Any] | None:
         problems.add(str(path), None, None, None, "a TOML file with settings; the file is empty")
         return None
     try:
+        if _DEEP.search(text):
+            raise ValueError("a key of more than 20 parts")
         # A lone carriage return ends a line for no reader of TOML.
         return tomllib.loads(text.replace("\r\n", "\n"))
     except (ValueError, RecursionError) as error:

@@ -19,6 +19,8 @@ from rotorid.tables.reader.text_file import read_bytes
 SUFFIXES = (".xlsx", ".xlsm")
 MOST_UNPACKED = 200_000_000
 """Bytes of all parts of a workbook."""
+MOST_PACKING = 100
+"""Times that parts may be larger than the file; those that people write are about 10 times."""
 MOST_SECONDS = 60.0
 LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
 _DIGITS = re.compile(r"(?:#,##)?0(?=[.E])(?:\.(0+))?(E\+0+)?")
@@ -60,9 +62,11 @@ def _check_size(data: bytes) -> None:
     """Refuse a workbook that unpacks to too much, before it is unpacked."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         size = sum(part.file_size for part in archive.infolist())
-    if size > MOST_UNPACKED:
-        most = MOST_UNPACKED / 1e6
-        raise _TooLarge(f"a workbook of at most {most:.0f} MB unpacked; this one has {size / 1e6:.0f} MB")
+    most = min(MOST_UNPACKED, 10_000_000 + MOST_PACKING * len(data))
+    if size > most:
+        raise _TooLarge(
+            f"a workbook of at most {most / 1e6:.0f} MB unpacked; this one has {size / 1e6:.0f} MB"
+        )
 
 
 def _sheets(data: bytes, deadline: float) -> dict[str, list[Row]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import math
 import os
@@ -93,7 +94,11 @@ def write_files(files: Mapping[Path, bytes]) -> None:
     try:
         for path in files:
             if path.exists() and not path.is_file():
-                raise OSError(22, "it is a folder" if path.is_dir() else "it is no regular file", str(path))
+                raise OSError(
+                    errno.EINVAL, "it is a folder" if path.is_dir() else "it is no regular file", str(path)
+                )
+            if targets[path].is_symlink():
+                raise OSError(errno.ELOOP, "its links go in a circle", str(path))
         for path, data in files.items():
             with waiting[path].open("xb") as stream:
                 stream.write(data)

@@ -11,6 +11,7 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import BoolArray
+from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import TableWarning
 
@@ -71,7 +72,7 @@ def warn_of_table(table: Table, elements: BoolArray) -> None:
         rows = np.flatnonzero(outside)
         for row in rows[:1].tolist():
             others = rows.size - 1
-            more = f" and {others} more row{'s' if others > 1 else ''}" if others else ""
+            more = f" and {counted(others, 'more row')}" if others else ""
             _warn(
                 f"{table.source}, row {table.rows[row]}{more}, column {field.name}: "
                 f"{table.shown(stem, row)} means {values[row]:.6g} {usual.unit}; "
@@ -97,6 +98,8 @@ def warn_of_rotor(source: str, rotor: Rotor) -> None:
             f"{source}: the shaft is {span:.4g} m long in all and {thin:.4g} m thick at least; are length "
             "and diameter exchanged?"
         )
+    if max(span, float(rotor.outer_diameter.max())) > USUAL["length"].high:
+        return  # nor is the mass then known
     bearings = [s for s in rotor.supports if s.kind == "bearing"]
     soft, first = [], ""
     for number, bearing in enumerate(bearings, start=1):

@@ -104,7 +104,8 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     must_be(table, "poisson_ratio", possible | ~elements, "a number above -1, up to 0.5", problems)
     must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
     for stem in ATTACHED:
-        must_be(table, stem, table.numbers(stem) >= 0, "0 (nothing attached) or more", problems)
+        outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
+        must_be(table, stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}", problems)
     warn_of_table(table, elements)
     return Shaft(
         length[elements],

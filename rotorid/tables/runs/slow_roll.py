@@ -24,7 +24,7 @@ from balancing.data.conventions import Labels
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.text import listing
+from rotorid.base.text import counted, listing
 from rotorid.tables.reader import units
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems
@@ -338,7 +338,7 @@ def _larger(trials: Trials, S: ComplexArray) -> Iterator[str]:
         speed = show_speed(float(trials.speeds[s]), unit)
         own, read = _shown(abs(S[s, c]), trials.labels), _shown(size[r, s, c], trials.labels)
         others = int(less.sum()) - 1
-        more = f", and than {others} other reading{'s' if others > 1 else ''}" if others else ""
+        more = f", and than {counted(others, 'other reading')}" if others else ""
         yield (
             f"the slow-roll vector of sensor {sensor!r}, {own}, is larger than its reading in run "
             f"{trials.runs[r]!r} at {speed}, {read}{more}: check its unit, and that the readings have not "

@@ -45,13 +45,8 @@ def learn(system: Augmented, table: FloatArray, steps: int, longest: float) -> N
     x, s = system.unpack(table)
     try:
         made = _Taylor(system.model, np.abs(x).max(axis=0), np.abs(system.theta[: system.np]))
-    except (
-        ImportError,
-        TypeError,
-        ValueError,
-        RuntimeError,
-    ):  # not installed, or a function it does not know
-        return
+    except (ImportError, TypeError, ValueError, RuntimeError):
+        return  # not installed, or a function it does not know
     again = made(system, x[0], s[0], longest)
     size = np.abs(table).max(axis=0)
     if again is not None and (np.abs(again - table).max(axis=0) <= SAME * size).all():

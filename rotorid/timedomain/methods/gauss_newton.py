@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
@@ -39,7 +40,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
     r, K = problem.evaluate(theta)
     history, costs = [theta], [half_square(r)]
     found = _step(problem, r, K)
-    converged, message = False, f"not converged in {max_iterations} iterations"
+    converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
     for _ in range(max_iterations):
         new = theta + found.solution
         try:
@@ -47,7 +48,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
                 raise SimulationError("the parameters grow beyond all bounds")
             r, K = problem.evaluate(new)
         except SimulationError as error:
-            message = f"Gauss–Newton diverged after {len(history) - 1} iterations: {error}"
+            message = f"Gauss–Newton diverged after {counted(len(history) - 1, 'iteration')}: {error}"
             break
         step, theta = found.solution, new
         history.append(theta)
@@ -57,7 +58,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
         if small:
             # a minimum, not only a short step: the next one is no longer either
             converged = negligible(found.solution, theta, found, 10 * tolerance)
-            message = f"converged in {len(history) - 1} iterations"
+            message = f"converged in {counted(len(history) - 1, 'iteration')}"
             if converged:
                 break
     r, _ = problem.evaluate(theta)

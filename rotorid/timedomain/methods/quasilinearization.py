@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
@@ -56,7 +57,7 @@ def quasilinearization(
     history, costs, trajectories = [theta], [first], [states]
     found: Estimate | None = None
     step: FloatArray | None = None
-    converged, message = False, f"not converged in {max_iterations} iterations"
+    converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
     for _ in range(max_iterations):
         if found is not None and problem.late:
             message = (
@@ -71,7 +72,7 @@ def quasilinearization(
         except SimulationError as error:
             if found is None:
                 raise
-            message = f"quasilinearization diverged after {len(history) - 1} iterations: {error}"
+            message = f"quasilinearization diverged after {counted(len(history) - 1, 'iteration')}: {error}"
             break
         last, step = step, found.solution
         theta = theta + step
@@ -82,7 +83,7 @@ def quasilinearization(
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
         if negligible(step, theta, found, tolerance, last) and change < 1e-3:
-            converged, message = True, f"converged in {len(history) - 1} iterations"
+            converged, message = True, f"converged in {counted(len(history) - 1, 'iteration')}"
             break
     if found is None:
         raise ValueError("max_iterations must be at least 1")

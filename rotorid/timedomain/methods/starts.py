@@ -12,6 +12,7 @@ from rotorid.timedomain.result import Minimum
 
 SAME = 1e-3
 """Relative difference of parameters below which two minima are one."""
+MOST_STARTS = 10_000
 
 
 def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) -> list[FloatArray]:
@@ -30,7 +31,14 @@ def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) 
         Of all starts.
     seed
         Of the random numbers: the same starts every time.
+
+    Raises
+    ------
+    ValueError
+        For more starts than any record is worth.
     """
+    if count > MOST_STARTS:
+        raise ValueError(f"at most {MOST_STARTS:,} starts, not {count:,}")
     rng = np.random.default_rng(seed)
     n, m = len(first), count - 1
     if m < 1:

@@ -11,6 +11,7 @@ from fem_rotors import rotor23, uniform
 import fem
 from fem.plots import campbell_figure, draw_bode, draw_orbits, draw_polar, draw_speed_map, new_axes
 from fem.plots.drawing import radii, surface
+from fem.windows import Window
 from rotorid.plots import plot
 
 mpl.use("Agg")
@@ -92,6 +93,16 @@ def test_amplitudes_over_speed():
     np.testing.assert_allclose(ax.get_lines()[1].get_ydata(), np.abs(W.W[:, 1, 0]))
     ax.figure.canvas.draw()
     assert plot(fem.influence(rotor, [7], [2], 100.0)).get_lines()[0].get_marker() == "o"
+
+
+def test_the_largest_node_is_one_of_a_steady_response():
+    response = fem.unbalance_response(rotor23(2e4), {12: 1e-3}, [100.0, 200.0])
+    size = np.zeros((2, 24), dtype=complex)
+    size[0, 4], size[1, 8] = 1.0, 5.0
+    window = Window(150.0, 200.0, begins=True, ends=False)
+    for windows, node in (((), 9), ((window,), 5)):
+        drawn = plot(dataclasses.replace(response, amplitudes=size, backward=0 * size, windows=windows))
+        assert labels(drawn) == ["node 2", "node 22", f"node {node}"]
 
 
 def turbine():

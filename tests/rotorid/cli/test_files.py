@@ -119,11 +119,27 @@ def test_a_result_that_nobody_can_read_is_no_success(redirection, words):
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_names_of_files_cannot_steer_the_terminal(cli):
+def test_names_of_files_cannot_steer_the_terminal(cli, tmp_path):
     outcome = cli("critical", "no\x1b[31m.csv")
     assert outcome.code == 2
     assert "\x1b" not in outcome.err
     assert "no\\x1b[31m.csv" in outcome.err
+    # also of those that are written; Linux takes any bytes
+    output, report = tmp_path / "o\x1b[31m\udcff.csv", tmp_path / "r\udcff.html"
+    outcome = cli("critical", ROTOR, "--output", output, "--report", report)
+    assert (outcome.code, "\x1b" in outcome.out, "\udcff" in outcome.out) == (0, False, False)
+    shutil.copy(ROTOR, tmp_path / "y\udcff.csv")
+    assert cli("critical", tmp_path / "y\udcff.csv", "--report", tmp_path / "r.html").code == 0
+
+
+def test_links_in_a_circle_are_no_files(cli, tmp_path):
+    (tmp_path / "a.csv").symlink_to(tmp_path / "b.csv")
+    (tmp_path / "b.csv").symlink_to(tmp_path / "a.csv")
+    for words in (("critical", ROTOR, "--output"), ("critical",), ("demo",)):
+        outcome = cli(*words, tmp_path / "a.csv")
+        assert outcome.code == 2
+        assert outcome.err.startswith(f"rotorid: {tmp_path / 'a.csv'}: ")
+    assert (tmp_path / "a.csv").is_symlink()
 
 
 def test_speeds_of_balance_are_in_the_unit_of_the_job(cli):

@@ -155,6 +155,7 @@ def test_peaks_are_those_of_the_model(cli, tmp_path):
             "[[disc]]\nnode=2\nmass_kg=490\n[[bearing]]\nnode=1\nstiffness_N_per_m=10\n",
             "bearing 1 at node 1 of 10 N/m would sag 490 m",
         ),
+        ([[250000, 40]] * 2, "[[bearing]]\nnode=1\nstiffness_N_per_m=1\n", "means 250 m; is this in"),
         ([[40, 250]] * 4, "", "are length and diameter exchanged?"),
         (PLAIN[1:], "[material]\nyoungs_modulus_Pa=7e10\ndensity_kg_per_m3=2700\n", ""),
         (PLAIN[1:], "[material]\ndensity_kg_per_m3=0\n[[disc]]\nnode=2\nmass_kg=1\n", ""),
@@ -204,3 +205,21 @@ def test_a_negative_bearing_stiffness_names_the_seal(cli, tmp_path):
     for rest in ("stiffness_N_per_m=-1e7", "kxx=-1e6\nkyy=1e6", 'table="b.csv"'):
         (tmp_path / "r.toml").write_text(f'shaft="p4.csv"\n[[bearing]]\nnode=1\n{rest}\n')
         assert "is a [[seal]], not a [[bearing]]" in cli("critical", tmp_path / "r.toml").err
+    for quantity in ("stiffness_N_per_m", "damping_N_s_per_m"):
+        write_csv(tmp_path / "s.csv", [["length_mm", "diameter_mm", f"support_{quantity}"], [250, 40, -1]])
+        assert "is a [[seal]] of a rotor file" in cli("critical", tmp_path / "s.csv").err
+
+
+def test_a_model_of_few_modes_shows_those_that_exist(cli, crossings):
+    speeds = ("--speeds", "100,150,199")
+    few = cli("campbell", crossings, *speeds, "--json").json
+    assert len(few["frequencies_rad_s"]) == 2
+    assert few["warnings"] == []
+    asked = cli("campbell", crossings, *speeds, "-n", 500, "--json").json
+    assert asked["frequencies_rad_s"] == few["frequencies_rad_s"]
+    assert asked["warnings"] == ["the model has only 2 of 500 modes"]
+    plain = crossings.with_name("plain.toml")
+    bearings = "".join(f"[[bearing]]\nnode={node}\nstiffness_N_per_m=1e5\n" for node in (1, 3))
+    plain.write_text(crossings.read_text().split("[[bearing]]")[0] + bearings)
+    assert cli("critical", plain, "--json").json["critical_speeds_rad_s"] == pytest.approx([100.0], rel=1e-5)
+    assert "2 critical speeds cannot be found: the model has 1 to 1" in cli("critical", plain, "-n", 2).err

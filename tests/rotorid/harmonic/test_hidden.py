@@ -55,6 +55,17 @@ def test_noisy_ones_within_their_intervals(seed):
     assert found.left_out == (f"{(set(model.outputs) - set(data.signals)).pop()} is measured nowhere",)
 
 
+def test_phases_are_not_blamed_for_a_linear_estimate_that_is_poor_with_either_sign():
+    """A linear estimate with the phases turned is compared with one without that, from the same rows."""
+    poor = 0
+    for seed in range(5, 8):
+        errors = AmplitudeErrors(0.01, 0.01)
+        found = identify(*drawn_chain(seed, 4, 0.01, errors)[::2])
+        poor += not found.converged
+        assert not any("phases of the other sign" in text for text in found.warnings), found.warnings
+    assert poor
+
+
 def test_two_unmeasured_masses():
     model, truth, data = drawn_chain(5, 4, lost=2)
     np.testing.assert_allclose(identify(model, data, method="output-error").values, truth, rtol=1e-6)

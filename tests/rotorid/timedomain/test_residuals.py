@@ -138,6 +138,16 @@ def test_combination_that_is_no_product_and_no_sum_has_no_error():
     only = found.estimate.combinations[0]
     assert only.words.startswith("(near these values)")
     assert only.std is None
+    assert "start elsewhere" not in " ".join(found.warnings)
+
+
+@pytest.mark.parametrize("rate", ["-a*b/(a + b)*x", "-(a + b**2)*x", "-(a*b + 0.1*a)*x"])
+def test_a_curve_of_values_is_not_said_to_be_determined_elsewhere(rate):
+    model = ode_model({"x": rate}, initial={"x": 2.0}, estimate={"a": 1.0, "b": 1.5})
+    found = fit(model, decay_record())
+    assert found.converged
+    assert np.isnan(found.values).all()
+    assert not any("may be determined after all" in text for text in found.warnings), found.warnings
 
 
 def test_start_where_the_sensitivity_vanishes_is_said():

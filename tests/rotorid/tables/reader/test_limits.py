@@ -2,6 +2,7 @@
 
 import io
 import os
+import time
 import zipfile
 
 import openpyxl
@@ -40,14 +41,15 @@ def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
     assert expected in words(book)
 
 
-def test_a_bomb_is_not_unpacked(book, monkeypatch):
+@pytest.mark.parametrize(("size", "most"), [(1_000_000, 500_000), (20_000_000, workbook.MOST_UNPACKED)])
+def test_a_bomb_is_not_unpacked(book, monkeypatch, size, most):
     stream = io.BytesIO(book.read_bytes())
     with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("xl/media/x.bin", b"\0" * 1_000_000)
+        archive.writestr("xl/media/x.bin", b"\0" * size)
     book.write_bytes(stream.getvalue())
-    monkeypatch.setattr(workbook, "MOST_UNPACKED", 500_000)
+    monkeypatch.setattr(workbook, "MOST_UNPACKED", most)
     monkeypatch.setattr(workbook, "_sheets", lambda *_: pytest.fail("read"))
-    assert "1 MB" in words(book)
+    assert f"{size // 10**6} MB" in words(book)
 
 
 def test_rows_of_a_workbook_in_any_order_and_without_sizes(book):
@@ -138,3 +140,23 @@ def test_a_model_of_5000_names_is_refused(tmp_path, key):
     (problem,) = complaints(read, path)
     assert problem.column == key
     assert "at most 1,000 names; these are 5,000" in problem.expected
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("a" + ".a" * 200_000 + " = 1\n", "a key of more than 20 parts"),
+        ("[a" + ' . "a"' * 200_000 + "]\n", "a key of more than 20 parts"),
+        ("k = 1\n" * 400_000, "at most 2 MB"),
+        ("x = [" + "1.5, " * 300_000 + "\n", "a TOML file: Invalid value"),
+        ("a" * 1_900_000, "a TOML file: Expected"),
+        ("a. " * 600_000, "a key of more than 20 parts"),
+    ],
+)
+def test_settings_that_would_take_long_are_refused_soon(tmp_path, text, expected):
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    begun = time.process_time()
+    (problem,) = complaints(read_ode_model, path)
+    assert expected in problem.expected
+    assert time.process_time() - begun < 5

@@ -26,4 +26,4 @@ def test_a_linear_model_takes_one_step_and_one_that_is_nothing():
 def test_too_few_iterations_are_said():
     found = straight_line(max_iterations=1)
     assert (found.converged, found.iterations) == (False, 1)
-    assert found.message == "not converged in 1 iterations"
+    assert found.message == "not converged in 1 iteration"
