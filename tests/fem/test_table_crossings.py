@@ -135,3 +135,11 @@ def test_rigid_body_motions_are_not_counted():
         assert (found.frequencies[:rigid] == 0).all()
         assert (found.frequencies[rigid:] > 0).all()
         assert "beside the critical speeds asked for" in found.warnings[-1]
+
+
+def test_inertias_of_impossible_size_are_refused_at_once():
+    table = fem.Support(1, [1e8, 2e8], speeds=(100.0, 1000.0))
+    for disc in (fem.Disc(2, 10.0, 1e15, 0.1), fem.Disc(2, 1e18, 1e15, 1e15)):
+        rotor = fem.Rotor([0.5, 0.5], 0.05, discs=[disc], supports=[table, fem.Support(3, 1e8)])
+        with pytest.raises(ValueError, match="differ by too many orders of size"):
+            fem.critical_speeds(dataclasses.replace(rotor, model=fem.Model(gyroscopic=True)), 2)
