@@ -19,6 +19,7 @@ from rotorid.base.arrays import AnyArray, FloatArray
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line
 _USUAL = 3  # critical speeds, where nothing else is asked for
 _NAMED = 5  # critical speeds beyond the end of a list that are named
+_SLOW = 1e-6  # of the last speed of the tables: no motion of a rotor is slower, but as a rigid body
 
 
 def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
@@ -90,6 +91,12 @@ def _over_speed(rotor: Rotor, A: Matrices, n: int) -> tuple[list[Found], tuple[s
         raise ValueError("the tables of the supports have no speed in common: extend them")
     knots = [knot for knot in rotor.knots.tolist() if first <= knot <= last]
     search = TableSearch(rotor, A)
+    slow = [value for value in np.sqrt(search.at(last).squares).tolist() if 0 < value < _SLOW * last]
+    if slow:
+        raise ValueError(
+            f"a natural frequency of {slow[0]:.3g} rad/s beside speeds up to {last:.6g} rad/s: masses or "
+            "moments of inertia, or stiffnesses of supports, differ by too many orders of size"
+        )
     found = [root for a, b in itertools.pairwise(knots) for root in search.between(a, b)]
     below = search.below(first)
     if not found:

@@ -30,7 +30,7 @@ def growth_bound(rotor: Rotor, speeds: FloatArray) -> FloatArray:
     """
     bound = np.where(np.any(rotor.material_damping), speeds, 0.0)
     for support in rotor.supports:
-        k, c = support.at(speeds)
+        k, c = support.at(speeds if support.speeds else speeds[:1])
         tiny = _SLACK * np.abs(k).max(axis=(1, 2))
         c = (c + np.swapaxes(c, 1, 2)) / 2
         circulating = np.abs(k[:, 0, 1] - k[:, 1, 0]) / 2

@@ -22,6 +22,7 @@ from rotorid.base.arrays import AnyArray, FloatArray
 
 _STEP = 1e-5  # of an interval, for a slope
 _SHAPES = 1e-8  # tolerance of mode shapes; that of frequencies is its square
+_MODES, _MODES_A_KNOT = 3000, 150  # computed at most, ten times what a rotor needs
 _DEEP = 7  # halvings of an interval in which a mode may cross, one at least
 
 
@@ -62,12 +63,19 @@ class TableSearch:
         self.top = 1.01 * min(s.speeds[-1] for s in rotor.supports if s.speeds) ** 2
         self.known: dict[float, tuple[int, Found]] = {}
         self.listed = 1  # modes up to the end of the tables, as far as is known
+        self.room = _MODES + _MODES_A_KNOT * rotor.knots.size
 
     def solve(self, rotor: Rotor, speed: float, n: int = 1) -> Found:
         """Modes on other supports up to the end of the tables, n at least."""
         A = self.A if rotor is self.rotor else assemble(rotor)
         found = positive_modes(whole_rotor(rotor, A, speed), max(n, self.listed), self.top)
         self.listed = max(1, int((found.squares <= self.top).sum()) + 1)
+        self.room -= found.squares.size
+        if self.room < 0:
+            raise ValueError(
+                f"{self.listed - 1} modes lie among the speeds of the tables, too many to tell their "
+                "crossings apart: check masses and stiffnesses, or shorten the tables"
+            )
         return found
 
     def at(self, speed: float, n: int = 1) -> Found:

@@ -135,3 +135,22 @@ def test_rigid_body_motions_are_not_counted():
         assert (found.frequencies[:rigid] == 0).all()
         assert (found.frequencies[rigid:] > 0).all()
         assert "beside the critical speeds asked for" in found.warnings[-1]
+
+
+def test_inertias_of_impossible_size_are_refused_at_once():
+    table = fem.Support(1, [((1e8, 0.0), (0.0, 2e8)), ((2e8, 0.0), (0.0, 3e8))], speeds=(100.0, 1000.0))
+    discs = [fem.Disc(2, 10.0, 1e15, 0.1)]
+    rotor = fem.Rotor([0.3, 0.7], 0.05, discs=discs, supports=[table, fem.Support(3, 1e8)])
+    with pytest.raises(ValueError, match="differ by too many orders of size"):
+        fem.critical_speeds(
+            dataclasses.replace(rotor, model=fem.Model(rotary_inertia=True, gyroscopic=True)), 2
+        )
+
+
+def test_modes_beyond_number_over_tables_are_refused():
+    knots = tuple(np.linspace(100.0, 1000.0, 7))
+    stiff = [1e8 * (1 + 0.5 * (-1) ** i) for i in range(len(knots))]
+    supports = [fem.Support(node, stiff, speeds=knots) for node in (1, 31)]
+    rotor = fem.Rotor([0.1] * 30, 0.2, density=7.85e9, supports=supports)
+    with pytest.raises(ValueError, match="too many to tell their crossings apart"):
+        fem.critical_speeds(rotor, 2)
