@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -252,14 +253,18 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
 
 def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
+    from rotorid.tables.reader.number import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
         if name not in outputs:
             hint = did_you_mean(name, outputs) or f"; outputs are {listing(outputs, 'and')}"
             raise ValueError(f"--sigma: {name!r} is no output of the model{hint}")
-        if not (value := number(text)) > 0:
-            raise ValueError(f"--sigma: {name} = {text} is no number above 0; use y1=0.01,y2=0.02")
-        return value
+        value = number(text)
+        with contextlib.suppress(NotANumber):
+            check_size(value)
+            if value > 0:
+                return value
+        raise ValueError(f"--sigma: {name} = {text} is no number above 0; use y1=0.01,y2=0.02")
 
     if isinstance(given, float | int) or (isinstance(given, str) and not {"=", ","} & set(given)):
         given = ",".join(f"{name}={given}" for name in outputs)
