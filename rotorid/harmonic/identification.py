@@ -48,7 +48,7 @@ def identify(
         Lowest and highest value by name, None: no limit. Output error keeps to them; with equation error
         they choose among several solutions.
     loss
-        "linear" or a robust loss of output error ("soft_l1", "huber", "cauchy").
+        Of output error: one of `LOSSES` in `rotorid.regression.robust`.
     start
         Starting values by name for output error, where the linear estimate is not to be used.
 

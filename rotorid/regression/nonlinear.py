@@ -163,8 +163,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     scale
         Typical size of a change of each parameter (n,); default: from the columns of the Jacobian.
     loss
-        "linear" (least squares), or "huber", "soft_l1", "cauchy", which give gross errors less weight. With
-        these the spread is taken from the residuals and intervals are Student's.
+        One of `LOSSES`; with a robust one the spread is taken from the residuals and intervals are Student's.
     max_iterations
         Of the driver.
     near

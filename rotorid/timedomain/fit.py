@@ -60,13 +60,13 @@ def fit(  # noqa: PLR0913
     method
         One of `METHODS` in `rotorid.timedomain.methods.search`.
     integrator
-        Of `simulate`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
+        Of `INTEGRATORS`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
     start
         Starting values by name, instead of the model's.
     bounds
         {name: (lower, upper)}, instead of the model's; not for Gauss–Newton and quasilinearization.
     loss
-        "linear" (least squares), or "huber", "soft_l1", "cauchy" against gross errors.
+        One of `LOSSES` in `rotorid.regression.robust`.
     starts
         Number of starts: the first is `start`, the others spread over the bounds, or around it.
     trajectory
