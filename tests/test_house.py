@@ -103,4 +103,4 @@ def test_the_list_of_complex_functions_only_gets_shorter():
 def test_no_circle_is_added():
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     circles = text[text.index('name = "No circles"') :]
-    assert len(re.findall(r'" *[\w.]+ -> [\w.]+"', circles)) == 3
+    assert len(re.findall(r'" *[\w.]+ -> [\w.]+"', circles)) == 2

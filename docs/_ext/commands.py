@@ -34,9 +34,12 @@ def all_commands() -> Iterator[tuple[str, Any]]:
     from typer.main import get_command
 
     from rotorid.cli import app
+    from rotorid.cli.choices import tell_choices
 
     group: Any = get_command(app)
-    yield from group.commands.items()
+    for name, command in group.commands.items():
+        tell_choices(command)
+        yield name, command
 
 
 def describe(name: str, command: Any) -> nodes.section:  # noqa: ANN401 - typer has no public type for it

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
@@ -30,3 +30,18 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     """
     near = suggest(name, known)
     return f" (did you mean {near!r}?)" if near else ""
+
+
+def one_of(value: str, what: str, known: Sequence[str]) -> str:
+    """A name out of a few.
+
+    Raises
+    ------
+    ValueError
+        For another one, with the nearest.
+    """
+    if value not in known:
+        raise ValueError(
+            f"{what} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
+        )
+    return value

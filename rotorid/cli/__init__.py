@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import typer
 
+from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
     campbell,
@@ -27,12 +28,11 @@ from rotorid.cli.commands import (
     unbalance,
     validate,
 )
-from rotorid.cli.suggest import NearestGroup, markup_mode
+from rotorid.cli.terminal import markup_mode
 from rotorid.cli.verbose import verbosely
 
 app = typer.Typer(
     name="rotorid",
-    cls=NearestGroup,
     rich_markup_mode=markup_mode(),
     no_args_is_help=True,
     add_completion=False,
@@ -56,7 +56,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "validate": validate.validate,
 }
 for _name, _command in _COMMANDS.items():
-    app.command(_name)(verbosely(_command))
+    app.command(_name, cls=Command)(verbosely(_command))
 
 
 def _version(show: bool) -> None:

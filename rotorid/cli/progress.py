@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rotorid.cli.suggest import dumb
+from rotorid.cli.terminal import dumb
 
 PATIENCE = 1.0
 """Seconds without a sign, on a terminal."""

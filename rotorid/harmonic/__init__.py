@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from rotorid.harmonic.equation_error import identify
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
+from rotorid.harmonic.identification import identify
 from rotorid.harmonic.model import HarmonicModel, harmonic_model
 from rotorid.harmonic.result import FoundCombination, Identification
 

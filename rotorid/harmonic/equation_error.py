@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words, ratio_words
-from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.influence import leave_one_out
 from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.output_error import output_error
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
 from rotorid.harmonic.recovery import (
@@ -26,89 +26,18 @@ from rotorid.harmonic.recovery import (
     undetermined_parameters,
 )
 from rotorid.harmonic.result import FoundCombination, Identification
-from rotorid.harmonic.rows import Rows, ask_about_case, build_rows, row_covariance, whiten
+from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate, echelon
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
-METHODS = ("equation-error", "output-error")
 REWEIGHTINGS = 60
 SETTLED = 0.01
 """Weights have settled where the last round moved nothing by more than this share of its deviation."""
 RCOND = 1e-11
 """Columns are merged exactly beforehand; what is left below this comes from too few different experiments."""
-
-
-def identify(
-    model: HarmonicModel,
-    experiments: Experiments,
-    *,
-    method: str = "equation-error",
-    bounds: Bounds | None = None,
-    loss: str = "linear",
-    start: Mapping[str, float] | None = None,
-) -> Identification:
-    """Identify a model's parameters from measured amplitudes.
-
-    Parameters
-    ----------
-    model
-        From `harmonic_model`.
-    experiments
-        Amplitudes of all signals; a row that needs one that was not measured (NaN) is left out.
-    method
-        "equation-error": linear regression of the equations' residuals, all rows alike as in [S] (9), (24);
-        with stated errors of the amplitudes each row has the weight that follows from them.
-        "output-error": nonlinear least squares of predicted against measured amplitudes, started from the
-        linear estimate; unbiased where noise in the amplitudes makes the linear one biased.
-    bounds
-        Lowest and highest value by name, None: no limit. Output error keeps to them; with equation error
-        they choose among several solutions.
-    loss
-        "linear" or a robust loss of output error ("soft_l1", "huber", "cauchy").
-    start
-        Starting values by name for output error, where the linear estimate is not to be used.
-
-    Raises
-    ------
-    ValueError
-        For signals that were not measured at all, options that do not go together, unknown names.
-    """
-    if method not in METHODS:
-        raise ValueError(f"method is one of {', '.join(METHODS)}; got '{method}'")
-    for what, given in (("bounds", bounds), ("start", start)):
-        for name in given or {}:
-            if name not in model.parameters:
-                raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
-    for name, (low, high) in limits(bounds).items():
-        if not low <= high:
-            raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
-    ask_about_case(model, experiments)
-    experiments, copies = experiments.without_copies()
-    if method == "output-error":
-        from rotorid.harmonic.output_error import identify_outputs
-
-        found = identify_outputs(model, experiments, bounds=bounds, loss=loss, start=start)
-        return replace(found, left_out=(*copies, *found.left_out))
-    if loss != "linear" or start:
-        raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
-    hidden = hidden_outputs(model, experiments)
-    seen = without(model, hidden) if hidden else None
-    found = equation_error(seen or model, experiments, bounds=bounds)
-    found = replace(found, left_out=(*copies, *found.left_out))
-    if seen is None:
-        return found
-    if not np.isfinite(found.condition_number):
-        raise ValueError(
-            f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
-            f"equations without {and_words(hidden)} (not measured): use the method "
-            "output-error, or measure more"
-        )
-    note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
-    shown = () if found.identifiable else found.combinations
-    return replace(found, combinations=shown, notes=(note, *found.notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +194,6 @@ def equation_error(
 
 def _doubts(fit: LinearFit, found: Identification, bounds: Bounds | None) -> tuple[str, ...]:
     """What speaks against the answer, after a look at output error from there."""
-    from rotorid.harmonic.output_error import output_error
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(fit.model, others).recovery.solutions

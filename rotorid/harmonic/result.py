@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +17,7 @@ from rotorid.regression.estimate import coverage_factor
 if TYPE_CHECKING:
     import pandas as pd
 
-
-METHODS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
+HEADINGS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ class Identification:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        std, ci95 = self.std, self.ci95
+        std, ci95, correlation, names = self.std, self.ci95, self.correlation, self.parameters
         return {
             "method": self.method,
             "parameters": {
@@ -157,7 +156,7 @@ class Identification:
                     "std": None if std is None else finite(std[i]),
                     "ci95": None if ci95 is None or not np.isfinite(ci95[i]).all() else ci95[i].tolist(),
                 }
-                for i, name in enumerate(self.parameters)
+                for i, name in enumerate(names)
             },
             "converged": self.converged,
             "rank": self.rank,
@@ -172,6 +171,19 @@ class Identification:
             "residual_rms": finite(self.residual_rms),
             "left_out": list(self.left_out),
             "warnings": list(self.warnings),
+            "correlation": None
+            if correlation is None
+            else {a: _by_name(names, row) for a, row in zip(names, correlation, strict=True)},
+            "residuals": [
+                {key: finite(value) if key in ("re", "im") else value for key, value in row.items()}
+                for row in self.residual_frame().to_dict("records")
+            ],
+            "influence": None
+            if self.influence is None
+            else [
+                {"experiment": experiment, "change": _by_name(names, row)}
+                for experiment, row in zip(self.experiments.names, self.influence, strict=True)
+            ],
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -209,7 +221,7 @@ class Identification:
         """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
         words = [*self.parameters, *(c.words for c in self.combinations)]
         width = max(len(w) for w in words)
-        lines = [METHODS.get(self.method, self.method)]
+        lines = [HEADINGS.get(self.method, self.method)]
         if not self.converged:
             lines.append("not converged: the values are where the search stopped, no estimates")
         lines += [self._line(i, width) for i in range(len(self.parameters))]
@@ -245,3 +257,7 @@ class Identification:
         if ci95 is not None and np.isfinite(ci95[i]).all():
             text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
         return text
+
+
+def _by_name(names: Sequence[str], values: FloatArray) -> dict[str, float | None]:
+    return {name: finite(value) for name, value in zip(names, values, strict=True)}

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.registry import find
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.robust import LOSSES
@@ -162,8 +163,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     scale
         Typical size of a change of each parameter (n,); default: from the columns of the Jacobian.
     loss
-        "linear" (least squares), or "huber", "soft_l1", "cauchy", which give gross errors less weight. With
-        these the spread is taken from the residuals and intervals are Student's.
+        One of `LOSSES`; with a robust one the spread is taken from the residuals and intervals are Student's.
     max_iterations
         Of the driver.
     near
@@ -195,8 +195,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     n = len(labels)
     if first.shape != (n,) or n == 0 or len(set(labels)) != n or not np.isfinite(first).all():
         raise ValueError(f"{n} different names need as many finite starting values; got {list(first)}")
-    if loss not in LOSSES:
-        raise ValueError(f"unknown loss {loss!r}: choose one of {', '.join(LOSSES)}")
+    find(LOSSES, loss, "loss")
     lower, upper = _limits(bounds, labels)
     first = inside(first, lower, upper)
     r0 = np.asarray(residual(first), dtype=np.float64)

@@ -2,19 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.registry import Method, find
 
-LOSSES = ("linear", "huber", "soft_l1", "cauchy")
-# Scale at which each loses 5 % of efficiency on normal errors (Huber 1981; Holland & Welsch 1977);
-# soft_l1 is a smooth Huber and takes its constant.
-_TUNING = {"linear": 1.0, "huber": 1.345, "soft_l1": 1.345, "cauchy": 2.385}
+Rho = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A loss ρ of squared scaled residuals.
+
+    Attributes
+    ----------
+    tuning
+        Residual, in standard deviations, above which it begins to discount: there it loses 5 % of efficiency
+        on normal errors (Huber 1981; Holland & Welsch 1977).
+    rho
+        ρ, its first and its second derivative at z (m,), as scipy has them.
+    """
+
+    tuning: float
+    rho: Rho
+
+
+def _linear(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return z, np.ones_like(z), np.zeros_like(z)
+
+
+def _huber(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    near, root = z <= 1, np.sqrt(np.maximum(z, 1.0))
+    return np.where(near, z, 2 * root - 1), 1 / root, np.where(near, 0.0, -0.5 / root**3)
+
+
+def _soft_l1(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    root = np.sqrt(1 + z)
+    return 2 * (root - 1), 1 / root, -0.5 / root**3
+
+
+def _cauchy(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return np.log1p(z), 1 / (1 + z), -1 / (1 + z) ** 2
+
+
+LOSSES = (
+    Method("linear", "least squares", Loss(1.0, _linear)),
+    Method("soft_l1", "a smooth Huber", Loss(1.345, _soft_l1)),
+    Method("huber", "gross errors count by their size, not its square", Loss(1.345, _huber)),
+    Method("cauchy", "gross errors count hardly at all", Loss(2.385, _cauchy)),
+)
 
 
 def tuning(loss: str) -> float:
     """Residual, in standard deviations, above which a loss begins to discount."""
-    return _TUNING[loss]
+    return find(LOSSES, loss, "loss").function.tuning
 
 
 def spread(r: FloatArray) -> float:
@@ -25,15 +69,7 @@ def spread(r: FloatArray) -> float:
 
 def cost(r: FloatArray, loss: str, scale: float) -> float:
     """Half the sum of the loss of residuals (m,), as scipy counts it."""
-    z = (r / scale) ** 2
-    if loss == "linear":
-        return 0.5 * float(r @ r)
-    if loss == "huber":
-        rho = np.where(z <= 1, z, 2 * np.sqrt(np.maximum(z, 1.0)) - 1)
-    elif loss == "soft_l1":
-        rho = 2 * (np.sqrt(1 + z) - 1)
-    else:
-        rho = np.log1p(z)
+    rho, _, _ = find(LOSSES, loss, "loss").function.rho((r / scale) ** 2)
     return 0.5 * scale**2 * float(rho.sum())
 
 
@@ -43,16 +79,7 @@ def pseudo_residuals(r: FloatArray, loss: str, scale: float) -> FloatArray:
     ψ(r) over the mean of ψ′: the classical covariance of an M-estimator, s² (JᵀJ)⁻¹ with s² from these
     (Huber 1981, section 7.6).
     """
-    if loss == "linear":
-        return r
     z = (r / scale) ** 2
-    if loss == "huber":
-        psi = np.clip(r, -scale, scale)
-        slope = (z <= 1).astype(np.float64)
-    elif loss == "soft_l1":
-        psi = r / np.sqrt(1 + z)
-        slope = (1 + z) ** -1.5
-    else:
-        psi = r / (1 + z)
-        slope = (1 - z) / (1 + z) ** 2
-    return np.asarray(psi / max(float(slope.mean()), 0.05))
+    _, first, second = find(LOSSES, loss, "loss").function.rho(z)
+    slope = first + 2 * z * second
+    return np.asarray(r * first / max(float(slope.mean()), 0.05))

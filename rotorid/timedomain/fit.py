@@ -4,37 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.regression import least_squares
-from rotorid.regression.nonlinear import nonlinear_least_squares
-from rotorid.regression.search import RCOND, inside
+from rotorid.base.registry import find
+from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
-from rotorid.timedomain.methods.gauss_newton import gauss_newton
-from rotorid.timedomain.methods.path import Path, at, half_square
-from rotorid.timedomain.methods.problem import RTOL, OutOfTime, Problem
-from rotorid.timedomain.methods.quasilinearization import quasilinearization
-from rotorid.timedomain.methods.shooting import shoot
+from rotorid.timedomain.methods.path import Path
+from rotorid.timedomain.methods.problem import RTOL, Problem
+from rotorid.timedomain.methods.search import METHODS, Search, Trajectories
 from rotorid.timedomain.methods.starts import merge, spread_starts
-from rotorid.timedomain.methods.trajectory import Curve, given_trajectory, measured_trajectory, own_trajectory
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
 from rotorid.timedomain.models.several import for_copies
 from rotorid.timedomain.residuals import output_errors, settled
 from rotorid.timedomain.result import Fit, Minimum
 
-METHODS = ("levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting")
 SECONDS = 60.0
 """Of a search, by default."""
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
 Searching = Callable[[Problem, FloatArray], Path]
-Trajectories = str | Mapping[str, str | float | ArrayLike]
 
 
 @np.errstate(all="ignore")  # what is not finite is looked for
@@ -66,17 +58,15 @@ def fit(  # noqa: PLR0913
     records
         One, or several that share the parameters.
     method
-        "levenberg-marquardt": safeguarded, with bounds and robust losses; "gauss-newton": as [F];
-        "quasilinearization": as [Q]; "multiple-shooting": for long or oscillating records and bad starts,
-        then Levenberg–Marquardt.
+        One of `METHODS` in `rotorid.timedomain.methods.search`.
     integrator
-        Of `simulate`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
+        Of `INTEGRATORS`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
     start
         Starting values by name, instead of the model's.
     bounds
         {name: (lower, upper)}, instead of the model's; not for Gauss–Newton and quasilinearization.
     loss
-        "linear" (least squares), or "huber", "soft_l1", "cauchy" against gross errors.
+        One of `LOSSES` in `rotorid.regression.robust`.
     starts
         Number of starts: the first is `start`, the others spread over the bounds, or around it.
     trajectory
@@ -119,8 +109,7 @@ def fit(  # noqa: PLR0913
             "the model has nothing to estimate: put NAME = STARTING VALUE into the table [estimate] of its "
             "file"
         )
-    if method not in METHODS:
-        raise ValueError(f"no method {method!r}; methods are {', '.join(METHODS)}")
+    way = find(METHODS, method, "method").function
     plain = method in ("gauss-newton", "quasilinearization")
     if plain and loss != "linear":
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
@@ -140,7 +129,7 @@ def fit(  # noqa: PLR0913
     begin = inside(begin, limits[:, 0], limits[:, 1])
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
-    search = _Search(method, limits, loss, kind, pieces, max_iterations, tolerance)
+    search = Search(way, limits, loss, kind, pieces, max_iterations, tolerance)
     path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
     for _ in range(WEIGHINGS if weigh and path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, len(names))
@@ -181,40 +170,6 @@ def fit(  # noqa: PLR0913
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """One search by one of the methods, within the problem's limit of time."""
-
-    method: str
-    limits: FloatArray
-    loss: str
-    trajectory: Trajectories
-    pieces: int | None
-    max_iterations: int
-    tolerance: float
-
-    def __call__(self, problem: Problem, theta: FloatArray) -> Path:
-        problem.best = None
-        try:
-            return self.whole(problem, theta)
-        except OutOfTime:
-            return _so_far(problem, theta)
-
-    def whole(self, problem: Problem, theta: FloatArray) -> Path:
-        steps, tolerance, limits = self.max_iterations, self.tolerance, self.limits
-        if self.method == "gauss-newton":
-            return gauss_newton(problem, theta, max_iterations=steps, tolerance=tolerance)
-        if self.method == "quasilinearization":
-            curves = _curves(problem, theta, self.trajectory)
-            return quasilinearization(problem, theta, curves, max_iterations=steps, tolerance=tolerance)
-        first = theta
-        if self.method == "multiple-shooting":
-            curves = _curves(problem, theta, self.trajectory)
-            first = shoot(problem, theta, curves, limits[:, 0], limits[:, 1], pieces=self.pieces)
-        path = _levenberg_marquardt(problem, first, limits, self.loss, steps)
-        return path if first is theta else path.after(theta[None])
-
-
 def search_all(
     search: Searching, begins: Sequence[FloatArray], problem: Problem
 ) -> tuple[Path, tuple[Minimum, ...]]:
@@ -234,53 +189,6 @@ def search_all(
     # one that did not converge is no minimum; where it describes the record better, it is given, and said
     best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
     return best, merge([p for p in paths if p.converged], problem.model.parameters) if len(begins) > 1 else ()
-
-
-def _so_far(problem: Problem, start: FloatArray) -> Path:
-    """The best point of a search that ran out of time."""
-    seconds, problem.limit = problem.seconds, np.inf
-    theta = start if problem.best is None else problem.best[1]
-    r, J = problem.evaluate(theta)
-    problem.limit = 0.0
-    sigma = 1.0 if problem.stated else None
-    found = least_squares(J, -r, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
-    words = (
-        f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start "
-        "nearer or take another method"
-    )
-    costs = np.array([np.nan, half_square(r)])
-    return Path(at(found, theta, r), np.stack([start, theta]), costs, False, words)
-
-
-def _levenberg_marquardt(
-    problem: Problem, start: FloatArray, limits: FloatArray, loss: str, max_iterations: int
-) -> Path:
-    problem.evaluate(start)  # says why, where the states diverge
-    names = problem.model.parameters
-
-    found = nonlinear_least_squares(
-        problem.residual,
-        problem.jacobian,
-        start,
-        names=names,
-        sigma_stated=problem.stated,
-        bounds={name: (low, high) for name, (low, high) in zip(names, limits.tolist(), strict=True)},
-        loss=loss,
-        max_iterations=max_iterations,
-        near=loss == "linear",
-    )
-    return Path(found.estimate, found.history, found.costs, found.converged, found.message, found.at_bounds)
-
-
-def _curves(problem: Problem, theta: FloatArray, kind: Trajectories) -> list[Curve]:
-    if isinstance(kind, Mapping):
-        return [given_trajectory(problem.model, kind, record) for record in problem.records]
-    if kind == "data":
-        both = zip(problem.models, problem.records, strict=True)
-        return [measured_trajectory(model, theta, record) for model, record in both]
-    if kind != "model":
-        raise ValueError(f"no starting trajectory {kind!r}: it is 'model', 'data', or given by state")
-    return [own_trajectory(problem, theta, number) for number in range(len(problem.records))]
 
 
 def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.text import listing, sentence
-from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row
+from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
+from rotorid.workflows.outcome import Outcome, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Key = TypeVar("Key", bound=Hashable)
 
-__all__ = ["Group", "Row", "Status", "Validation", "row", "validate"]
+__all__ = ["Group", "Row", "Status", "ValidateOptions", "Validation", "row", "validate"]
 
 PROVIDERS = {
     "rotor": "Rotor of 23 elements: critical speeds and mode shapes",
@@ -56,16 +57,32 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Validation:
+class ValidateOptions:
+    """Options of `validate`.
+
+    Attributes
+    ----------
+    every
+        Tell every number, not only the sources.
+    """
+
+    every: bool = False
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Validation(Outcome):
     """Printed and computed numbers.
 
     Attributes
     ----------
     groups
         In the order of reading.
+    every
+        Whether the summary has every row, too.
     """
 
     groups: tuple[Group, ...]
+    every: bool = False
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -91,14 +108,8 @@ class Validation:
             f"; not computed: {failed}" if failed else ""
         )
 
-    def summary(self, *, every: bool = False) -> str:
-        """Text: a line for each source, then what differs, errata and wide tolerances with their reasons.
-
-        Parameters
-        ----------
-        every
-            Every row, too.
-        """
+    def summary(self) -> str:
+        """Text: a line for each source, then what differs, errata and wide tolerances with their reasons."""
         width = max([len(source) for group in self.groups for source in group.sources()] or [0]) + 2
         head = f"{'':{width}}{'numbers':>8}{'agree':>8}{'errata':>8}{'differ':>8}   worst agreement"
         lines = [head]
@@ -108,7 +119,7 @@ class Validation:
                 lines.append(f"  FAILED, none of its numbers was computed: {group.failure}")
             for source, rows in group.sources().items():
                 lines.append(_source_line(source, rows, width))
-                if every:
+                if self.every:
                     lines += [_row_line(r) for r in rows]
         lines += [
             "",
@@ -144,13 +155,15 @@ class Validation:
         }
 
 
-def validate(groups: Iterable[str] | None = None) -> Validation:
+def validate(groups: Iterable[str] | None = None, options: ValidateOptions | None = None) -> Validation:
     """Compute every printed number of the references and compare.
 
     Parameters
     ----------
     groups
         Some of the providers, by name; default all.
+    options
+        Those that differ from the defaults.
 
     Raises
     ------
@@ -177,7 +190,12 @@ def validate(groups: Iterable[str] | None = None) -> Validation:
         "time_records": time_records.rows,
         "balancing": balancing.rows,
     }
-    return Validation(tuple(_group(name, rows[name]) for name in chosen))
+    options = options or ValidateOptions()
+    return Validation(
+        groups=tuple(_group(name, rows[name]) for name in chosen),
+        every=options.every,
+        provenance=provenance(tables(), options),
+    )
 
 
 def _group(name: str, provider: Callable[[], Iterable[Row]]) -> Group:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar, cast
 
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.suggestions import one_of as one_of
 
 _T = TypeVar("_T")
 Speeds = str | Sequence[float]
@@ -26,21 +26,6 @@ Names = str | Sequence[str]
 SLOWEST, FASTEST = 1e-9, 1e9
 """rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
-
-
-def one_of(value: str, what: str, known: Sequence[str]) -> str:
-    """A name out of a few.
-
-    Raises
-    ------
-    ValueError
-        For another one, with the nearest.
-    """
-    if value not in known:
-        raise ValueError(
-            f"{what} {value!r} is not known{did_you_mean(value, known)}: one of {', '.join(known)}"
-        )
-    return value
 
 
 def number(text: str) -> float:

@@ -6,13 +6,10 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    JsonOption,
-    OutputOption,
-    emit,
-)
-from rotorid.cli.output import check_targets
-from rotorid.cli.progress import busy
+from rotorid.cli.common import JsonOption, OutputOption
+from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.validation import ValidateOptions
+from rotorid.validation import validate as work
 
 
 def validate(
@@ -30,19 +27,8 @@ def validate(
     reason; an erratum of the print has its reason, too. A group that fails is said, the others are
     shown. Exit status 0 if no number differs and no group fails, else 1.
     """
-    from rotorid.validation import validate as prove
-    from rotorid.validation.row import tables
-
+    options = chosen(ValidateOptions, locals())
     check_targets(None, output)
-    with busy("validation"):
-        proof = prove()
-    emit(
-        proof.to_dict(),
-        lambda: proof.summary(every=every),
-        as_json=json,
-        files=tables(),
-        options={"all": every},
-        table=(output, proof.to_frame),
-    )
+    proof = deliver("validation", lambda: work(options=options), as_json=json, output=output)
     if not proof.holds:
         raise typer.Exit(1)

@@ -11,11 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
 from rotorid.tables.reader.grid import Cell, Grid
-from rotorid.tables.reader.number import check_size
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, one_of
 
@@ -237,39 +235,3 @@ def _warn_of_gaps(table: Table) -> None:
         f"step is {usual:.4g} s; nothing is filled in"
     )
     warnings.warn(message, TableWarning, stacklevel=3)
-
-
-def read_sigma(text: str | None, model: OdeModel) -> dict[str, float] | None:
-    """Read "0.01" (of every output) or "y1=0.01,y2=0.02" as standard deviations of outputs.
-
-    Raises
-    ------
-    ValueError
-        For everything else.
-    """
-    if text is None:
-        return None
-    found: dict[str, float] = {}
-    for part in text.split(","):
-        name, equals, number = part.rpartition("=")
-        name = name.strip()
-        try:
-            value = float(number)
-            check_size(value)
-        except ValueError:
-            value = 0.0
-        if not value > 0:
-            raise ValueError(
-                f"--sigma {text!r}: {part.strip()!r} holds no number above 0; use y1=0.01,y2=0.02"
-            )
-        if not equals:
-            if "," in text:
-                raise ValueError(f"--sigma {text!r}: name each output, y1=0.01,y2=0.02")
-            return dict.fromkeys(model.outputs, value)
-        if name not in model.outputs:
-            hint = did_you_mean(name, model.outputs) or f"; outputs are {listing(model.outputs, 'and')}"
-            raise ValueError(f"--sigma: {name!r} is no output of the model{hint}")
-        found[name] = value
-    if lost := [name for name in model.outputs if name not in found]:
-        raise ValueError(f"--sigma: the standard deviation of {listing(lost, 'and')} is missing")
-    return found

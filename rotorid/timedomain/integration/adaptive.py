@@ -29,7 +29,12 @@ class _TooManySteps(SimulationError):
 
 
 def integrate(
-    system: Augmented, x0: FloatArray, s0: FloatArray, method: str, rtol: float, atol: float | None
+    system: Augmented,
+    x0: FloatArray,
+    s0: FloatArray,
+    rtol: float,
+    atol: float | None,
+    method: str = "auto",
 ) -> tuple[FloatArray, FloatArray, str]:
     """States (n, n_x), sensitivities (n, n_x, n_p) and the method used ("dop853" or "lsoda").
 
@@ -39,10 +44,10 @@ def integrate(
         With the times.
     x0, s0
         Initial states and sensitivities.
-    method
-        "auto", "dop853" or "lsoda".
     rtol, atol
         Tolerances; `atol` None: follows the size of each state and sensitivity.
+    method
+        "auto", "dop853" or "lsoda".
 
     Raises
     ------

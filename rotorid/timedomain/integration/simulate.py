@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.registry import Method, find
 from rotorid.timedomain.integration import adaptive, propagation
 from rotorid.timedomain.integration.system import Augmented
 from rotorid.timedomain.models.errors import SimulationError, check_finite
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record, from_t0
 
-METHODS = ("auto", "expm", "dop853", "lsoda", "heun", "rk4")
+__all__ = ["INTEGRATORS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
 
-__all__ = ["METHODS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
+Integrate = Callable[
+    [Augmented, FloatArray, FloatArray, float, float | None], tuple[FloatArray, FloatArray, str]
+]
+"""System, initial states and sensitivities, rtol, atol → both at all times, and the method used."""
+Step = Callable[[Augmented, float, float, FloatArray], FloatArray]
+"""System, time now and then, states → states then."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +74,8 @@ def simulate(
     record
         Times and inputs; times alone (n,) for a model without inputs.
     method
-        "expm": the exact solution of a linear model with constant coefficients (inputs allowed); "dop853",
-        "lsoda" (stiff models): error control, of states and sensitivities; "heun" ([Q]), "rk4": one step
-        from sample to sample. "auto": "expm" if possible, else "dop853", and "lsoda" where that needs too
-        many steps; with the extra `rotorid[fast]` "taylor" for a model that has needed many.
+        One of `INTEGRATORS`; "auto" with the extra `rotorid[fast]` takes "taylor" for a model that has
+        needed many steps.
     rtol, atol
         Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
     sensitivities
@@ -83,8 +90,7 @@ def simulate(
     ValueError
         A method that does not suit the model, missing inputs.
     """
-    if method not in METHODS:
-        raise ValueError(f"no integrator {method!r}; integrators are {', '.join(METHODS)}")
+    integrate = find(INTEGRATORS, method, "integrator").function
     if not isinstance(record, Record):
         record = Record(np.asarray(record, dtype=float), name="the times")
     values = np.asarray(theta, dtype=float)
@@ -99,7 +105,6 @@ def simulate(
         )
         return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
-    used: str = method
     t = record.t
     if not model.states:
         x, s, used = np.zeros((len(t), 0)), np.zeros((len(t), 0, len(values))), "none"
@@ -107,14 +112,7 @@ def simulate(
         system = Augmented(model, values, t, u, sensitivities)
         x_0, s_0 = _start(model, values, x0, sensitivities)
         check_finite(model, t[:1], x_0[None], s_0[None])
-        if used == "auto" and model.linear_driven:
-            used = "expm"
-        if used == "expm":
-            x, s = _exact(model, values, t, u, x_0, s_0)
-        elif used in ("heun", "rk4"):
-            x, s = _stepwise(system, x_0, s_0, used)
-        else:
-            x, s, used = adaptive.integrate(system, x_0, s_0, used, rtol, atol)
+        x, s, used = integrate(system, x_0, s_0, rtol, atol)
         check_finite(model, t, x, s)
     y = model.h(t, x, values, u)
     y_theta = np.zeros((*y.shape, len(values)))
@@ -154,55 +152,80 @@ def _start(
     return start, empty
 
 
+def _auto(
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+) -> tuple[FloatArray, FloatArray, str]:
+    exact = system.model.linear_driven
+    return (_exact if exact else adaptive.integrate)(system, x0, s0, rtol, atol)
+
+
 def _exact(
-    model: OdeModel, theta: FloatArray, t: FloatArray, u: FloatArray, x0: FloatArray, s0: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+) -> tuple[FloatArray, FloatArray, str]:
+    model, t, u = system.model, system.t, system.u
     if not model.linear_driven:
         raise ValueError(
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
             "or auto"
         )
-    a, b, da, db = model.matrices(theta)
+    a, b, da, db = model.matrices(system.theta)
     n, k = len(x0), s0.shape[1]
     if not (model.driven or b.any() or db.any()):
-        return propagation.propagate(t, x0, s0, a, da[:k])
+        return *propagation.propagate(t, x0, s0, a, da[:k]), "expm"
     # more states: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
     nu = u.shape[1] if model.driven else 0
     size = n + 1 + 2 * nu
-    system, derivatives = np.zeros((size, size)), np.zeros((k, size, size))
-    system[:n, :n], system[:n, n] = a, b
+    matrix, derivatives = np.zeros((size, size)), np.zeros((k, size, size))
+    matrix[:n, :n], matrix[:n, n] = a, b
     derivatives[:, :n, :n], derivatives[:, :n, n] = da[:k], db[:k]
     if not nu:
-        z, s = propagation.propagate(t, np.append(x0, 1.0), np.vstack([s0, np.zeros(k)]), system, derivatives)
-        return z[:, :n], s[:, :n]
-    matrix, slopes = model.input_matrices(theta)
-    system[:n, n + 1 : n + 1 + nu], derivatives[:, :n, n + 1 : n + 1 + nu] = matrix, slopes[:k]
-    system[n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
+        z, s = propagation.propagate(t, np.append(x0, 1.0), np.vstack([s0, np.zeros(k)]), matrix, derivatives)
+        return z[:, :n], s[:, :n], "expm"
+    inputs, slopes = model.input_matrices(system.theta)
+    matrix[:n, n + 1 : n + 1 + nu], derivatives[:, :n, n + 1 : n + 1 + nu] = inputs, slopes[:k]
+    matrix[n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
     growth = np.diff(u, axis=0) / np.diff(t)[:, None]
     drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1], growth], axis=1)
-    return propagation.propagate_driven(t, x0, s0, system, derivatives, drive)
+    return *propagation.propagate_driven(t, x0, s0, matrix, derivatives, drive), "expm"
 
 
-def _stepwise(
-    system: Augmented, x0: FloatArray, s0: FloatArray, method: str
-) -> tuple[FloatArray, FloatArray]:
-    """One step of Heun's or the classical Runge–Kutta method per sample."""
-    t = system.t
-    table = np.empty((len(t), system.size))
-    table[0] = z = system.pack(x0, s0)
-    with np.errstate(all="ignore"):
-        for i, h in enumerate(np.diff(t).tolist()):
-            now, then = float(t[i]), float(t[i + 1])
-            k1 = system(now, z)
-            if method == "heun":
-                z = z + h / 2 * (k1 + system(then, z + h * k1))
-            else:
-                k2 = system(now + h / 2, z + h / 2 * k1)
-                k3 = system(now + h / 2, z + h / 2 * k2)
-                k4 = system(then, z + h * k3)
-                z = z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            table[i + 1] = z
-            if not np.isfinite(z).all():
-                table[i + 2 :] = np.nan
-                break
-    return system.unpack(table)
+def _heun(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
+    h, k1 = then - now, system(now, z)
+    return z + h / 2 * (k1 + system(then, z + h * k1))
+
+
+def _rk4(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
+    h, k1 = then - now, system(now, z)
+    k2 = system(now + h / 2, z + h / 2 * k1)
+    k3 = system(now + h / 2, z + h / 2 * k2)
+    k4 = system(then, z + h * k3)
+    return z + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+
+def _stepwise(name: str, step: Step) -> Integrate:
+    """One step from sample to sample."""
+
+    def integrate(
+        system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+    ) -> tuple[FloatArray, FloatArray, str]:
+        table = np.empty((len(system.t), system.size))
+        table[0] = z = system.pack(x0, s0)
+        with np.errstate(all="ignore"):
+            for i, (now, then) in enumerate(pairwise(system.t.tolist()), start=1):
+                table[i] = z = step(system, now, then, z)
+                if not np.isfinite(z).all():
+                    table[i + 1 :] = np.nan
+                    break
+        return *system.unpack(table), name
+
+    return integrate
+
+
+INTEGRATORS: tuple[Method[Integrate], ...] = (
+    Method("auto", "expm if possible, else dop853, and lsoda where that needs too many steps", _auto),
+    Method("expm", "the exact solution of a linear model with constant coefficients", _exact),
+    Method("dop853", "error control, for smooth models", partial(adaptive.integrate, method="dop853")),
+    Method("lsoda", "error control, for stiff models", partial(adaptive.integrate, method="lsoda")),
+    Method("heun", "one step from sample to sample, as [Q]", _stepwise("heun", _heun)),
+    Method("rk4", "one step from sample to sample", _stepwise("rk4", _rk4)),
+)

@@ -12,7 +12,8 @@ import pytest
 import typer
 from cases import each_of
 
-from rotorid.cli import progress, suggest, verbose
+from rotorid.cli import progress, terminal, verbose
+from rotorid.cli.choices import nearest_choice
 from rotorid.samples import sample_data
 
 JOB = sample_data() / "turbo_job" / "job.toml"
@@ -54,12 +55,15 @@ def at_terminal(*args, **changes):
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (["balanec"], "No such command 'balanec'. Did you mean 'balance'?"),
+        (["balanec"], "No such command 'balanec'. Did you mean 'balance', 'unbalance'?"),
         (["trail-weight"], "No such command 'trail-weight'. Did you mean 'trial-weight'?"),
         (["xyzzy"], "No such command 'xyzzy'."),
-        (["--versoin"], "No such option '--versoin'. Did you mean '--version'?"),
-        (["balance", JOB, "--limt", "3"], "No such option '--limt'. Did you mean '--limit'?"),
-        (["critical", JOB, "--qqq"], "No such option '--qqq'."),
+        (["--versoin"], "No such option: --versoin (Possible options: --version)"),
+        (
+            ["balance", JOB, "--limt", "3"],
+            "No such option: --limt (Possible options: --limit, --plot, --split)",
+        ),
+        (["critical", JOB, "--qqq"], "No such option: --qqq"),
         (
             ["reduce", "a.csv", "--place", "bset"],
             "Invalid value for '--place': 'bset' is not one of 'best', 'compromise', 'mac', 'book'. "
@@ -110,7 +114,7 @@ def test_usage_with_the_nearest_name(cli, args, message):
             ["trial-weight", "--rotor-mass=5kg", "--speed=9rpm", "--radius=1m", "--measures", "velocty"],
             "'velocty' is not known (did you mean 'velocity'?)",
         ),
-        (["demo", "--sample", "hols"], "there is no sample 'hols' (did you mean 'holes'?)"),
+        (["demo", "--sample", "hols"], "--sample 'hols' is not known (did you mean 'holes'?)"),
     ],
 )  # fmt: skip
 def test_values_with_the_nearest_name(cli, args, message):
@@ -131,11 +135,18 @@ def test_a_name_like_no_other_gets_no_suggestion(cli):
 
 
 def test_the_words_of_a_choice():
-    assert suggest.choice("Value error, 'bode' is not one of 'a', 'b'") == "'bode' is not one of 'a', 'b'."
-    assert suggest.choice("anything else") == "anything else"
-    assert suggest.unknown("sheet", "run", ["runs", "weights"]) == "No such sheet 'run'. Did you mean 'runs'?"
-    assert issubclass(typer.BadParameter, suggest.UsageError)
-    assert suggest.UsageError is not Exception
+    assert nearest_choice("Value error, 'bode' is not one of 'a', 'b'") == "'bode' is not one of 'a', 'b'."
+    assert nearest_choice("anything else") == "anything else"
+
+
+def test_help_of_an_option_names_its_methods(cli):
+    for command, *methods in (
+        ("fit", "gauss-newton", "dop853", "cauchy"),
+        ("identify", "output-error", "huber"),
+    ):
+        said = words(cli(command, "--help").out)
+        for method in methods:
+            assert said.count(f"{method}: ") == 1
 
 
 @pytest.mark.parametrize("args", [["critical", "--help"], ["balanec"]])
@@ -159,14 +170,14 @@ def test_colours_only_where_they_are_wanted(args):
 def test_plain_terminals(monkeypatch):
     for name in COLOURS:
         monkeypatch.delenv(name, raising=False)
-    assert suggest.markup_mode() == "rich"
+    assert terminal.markup_mode() == "rich"
     monkeypatch.setenv("NO_COLOR", "")  # as no-color.org has it: empty does not count
-    assert not suggest.plain()
+    assert not terminal.plain()
     monkeypatch.setenv("NO_COLOR", "0")
-    assert suggest.plain()
+    assert terminal.plain()
     monkeypatch.delenv("NO_COLOR")
     monkeypatch.setenv("TERM", "dumb")
-    assert suggest.markup_mode() is None
+    assert terminal.markup_mode() is None
 
 
 def wait_for(said, word):

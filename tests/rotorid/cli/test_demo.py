@@ -6,8 +6,8 @@ import shlex
 import pytest
 from golden.storing import read
 
-from rotorid.cli.demo_samples import SAMPLES
 from rotorid.samples import sample_data
+from rotorid.workflows.demo_samples import SAMPLES
 
 NUMBERS = {
     "main": ["135.240", "134.203 kg", "423.0  168.9°"],

@@ -212,7 +212,7 @@ def test_errors_of_the_command_line_are_percent_and_degrees_and_stand_before_tho
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (("--method", "newton"), "equation-error or output-error"),
+        (("--method", "newton"), "one of equation-error, output-error"),
         (("--loss", "huber"), "belongs to --method output-error"),
         (("--loss", "none", "--method", "output-error"), "soft_l1"),
         (("--amplitude-error", "-1"), "from 0 to 1000"),

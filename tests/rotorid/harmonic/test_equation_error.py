@@ -227,7 +227,7 @@ def test_measurements_that_do_not_fit_the_model_are_refused(signals, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "magic"}, "method is one of"),
+        ({"method": "magic"}, "method 'magic' is not known: one of equation-error"),
         ({"loss": "huber"}, "output-error"),
         ({"bounds": {"k": (0, 1)}}, "k is no parameter"),
         ({"bounds": {"c": (2, 1)}}, "lowest, highest"),

@@ -277,7 +277,7 @@ def test_history_starts_at_the_start_and_descends():
         ({"names": ["a"]}, "as many finite starting values"),
         ({"names": ["a", "a"]}, "different names"),
         ({"start": [np.nan, 1]}, "finite starting values"),
-        ({"loss": "median"}, "unknown loss 'median'"),
+        ({"loss": "median"}, "loss 'median' is not known"),
         ({"bounds": {"z": (0, 1)}}, "'z', which is not estimated"),
         ({"bounds": {"b1": (1, 1)}}, "lower bound of b1"),
         ({"start": [1e308, -1e6]}, "not finite"),

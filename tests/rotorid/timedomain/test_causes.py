@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
+from rotorid.base.registry import names
 from rotorid.tables import read_ode_model, read_record
-from rotorid.timedomain.fit import METHODS, fit
+from rotorid.timedomain.fit import fit
 from rotorid.timedomain.integration.simulate import simulate
+from rotorid.timedomain.methods.search import METHODS
 from rotorid.timedomain.models.model import ode_model
 from rotorid.timedomain.models.nuisance import with_nuisance
 from rotorid.timedomain.models.record import Record
@@ -92,7 +94,7 @@ def test_a_record_that_begins_later_is_asked_about_and_t0_answers():
     asked = fit(oscillator(), data)
     assert any("begins at t = 0.7 s" in text and "t0" in text for text in asked.warnings)
     assert not within(asked)
-    for method in METHODS:
+    for method in names(METHODS):
         found = fit(oscillator(t0=0.0), data, method=method, trajectory=None)
         assert within(found), method
         assert found.warnings == ()
@@ -103,7 +105,7 @@ def test_a_record_that_begins_later_is_asked_about_and_t0_answers():
         fit(oscillator(t0=1.0), data)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_what_known_initial_values_fix_is_no_degree_of_freedom(method, tmp_path):
     """n parameters, n samples and the first one: as many equations as unknowns, whatever rounding leaves."""
     (tmp_path / "one.toml").write_text('[states]\nx = "-a*x"\n[initial]\nx = 1.0\n[estimate]\na = 0.5\n')
@@ -125,7 +127,7 @@ def test_what_known_initial_values_fix_is_no_degree_of_freedom(method, tmp_path)
         assert tight.converged
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_what_did_not_converge_has_no_intervals_and_says_nothing_of_what_is_determined(method):
     found = fit(
         ode_model({"x": "-a*x**2 + sin(b*x)"}, initial={"x": 1.0}, estimate={"a": 3.0, "b": -4.0}),
@@ -142,7 +144,7 @@ def test_what_did_not_converge_has_no_intervals_and_says_nothing_of_what_is_dete
     assert "determined" not in found.summary()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_a_search_ends_with_a_sentence_when_its_time_is_over(method):
     data = record(0, t=T[:100])
     found = fit(

@@ -15,12 +15,14 @@ from timedomain_cases import (
     fitzhugh_nagumo_record,
 )
 
-from rotorid.timedomain.fit import METHODS, fit
+from rotorid.base.registry import names
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.methods.search import METHODS
 from rotorid.timedomain.models.model import ode_model
 from rotorid.timedomain.models.record import Record
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_three_masses_with_each_method(method):
     found = fit(chain(), chain_record(), method=method)
     assert found.converged
@@ -75,7 +77,7 @@ def test_measured_input():
     model = ode_model({"x": "-a*x + b*u"}, initial={"x": 0.0}, inputs=["u"], estimate={"a": 1.0, "b": 1.0})
     t = np.linspace(0, 5, 51)
     record = Record(t, {"x": 1.5 / 4 * (2 * t - 1 + np.exp(-2 * t))}, {"u": t})
-    for method in METHODS:
+    for method in names(METHODS):
         assert fit(model, record, method=method).values == pytest.approx([2.0, 1.5], rel=1e-6)
 
 
@@ -95,12 +97,12 @@ def test_json_and_text():
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"method": "newton"}, "no method"),
+        ({"method": "newton"}, "method 'newton' is not known"),
         ({"start": {"z": 1.0}}, "z is no parameter"),
         ({"bounds": {"z": (0.0, 1.0)}}, "z is no parameter"),
         ({"bounds": {"a": (1.0, 0.0)}}, "below the upper"),
         ({"starts": 0}, "at least 1"),
-        ({"loss": "square"}, "unknown loss"),
+        ({"loss": "square"}, "loss 'square' is not known"),
     ],
 )
 def test_bad_options(options, words):

@@ -13,7 +13,9 @@ from timedomain_cases import (
     van_der_pol_record,
 )
 
-from rotorid.timedomain.fit import METHODS, fit
+from rotorid.base.registry import names
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.methods.search import METHODS
 from rotorid.timedomain.models.model import ode_model
 from rotorid.timedomain.models.record import Record
 
@@ -73,7 +75,7 @@ def test_parameter_at_its_bound():
     assert "at its bound" in found.summary()
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_only_a_combination_is_determined(method):
     model = ode_model({"x": "-(a + b)*x"}, initial={"x": 2.0}, estimate={"a": 0.3, "b": 0.3})
     found = fit(model, decay_record(), method=method)

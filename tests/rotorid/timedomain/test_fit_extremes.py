@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from repetitions import FULL
 
-from rotorid.timedomain.fit import METHODS, fit
+from rotorid.base.registry import names
+from rotorid.timedomain.fit import fit
+from rotorid.timedomain.methods.search import METHODS
 from rotorid.timedomain.models.model import ode_model
 from rotorid.timedomain.models.record import Record
 
@@ -32,7 +34,7 @@ def drawn(seed):
     return model, Record(t, {"y": y}, sigma=sigma)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
     answered, refused = 0, []
     for seed in range(400 if FULL else 16):
@@ -52,7 +54,7 @@ def test_numbers_of_any_size_are_answered_or_refused_in_words(method):
     assert all(len(words) > 20 and "array" not in words for words in refused)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", names(METHODS))
 @pytest.mark.parametrize("integrator", ["auto", "expm", "lsoda", "rk4"])
 def test_a_curve_without_states_is_fitted_by_every_method(method, integrator):
     model = ode_model({}, outputs={"y": "a*exp(-b*t) + c"}, estimate={"a": 1.5, "b": 0.5, "c": 0.0})

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_ode_model, read_record
-from rotorid.tables.data.records import read_sigma
 
 FOLDER = sample_data() / "fit"
 MODEL = """
@@ -202,21 +201,6 @@ def test_exactly_the_increasing_times_are_accepted(tmp_path_factory, times):
             np.testing.assert_array_equal(read_record(path, model).t, times)
         else:
             assert "column t_s" in refusal(lambda: read_record(path, model))
-
-
-def test_standard_deviations(model):
-    assert read_sigma(None, model) is None
-    assert read_sigma("0.5", model) == {"y": 0.5, "z": 0.5}
-    assert read_sigma("y=1, z=2e-3", model) == {"y": 1.0, "z": 0.002}
-    for text, said in [
-        ("y=1", "of z is missing"),
-        ("q=1,z=1", "'q' is no output"),
-        ("y=-1,z=1", "no number above 0"),
-        ("much", "no number above 0"),
-        ("1,2", "name each output"),
-    ]:
-        with pytest.raises(ValueError, match=said):
-            read_sigma(text, model)
 
 
 MATRICES = """

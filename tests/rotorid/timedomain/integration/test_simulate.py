@@ -335,7 +335,7 @@ def test_an_output_without_value_is_an_error():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "euler"}, "no integrator 'euler'; integrators are auto, expm"),
+        ({"method": "euler"}, "integrator 'euler' is not known: one of auto, expm"),
         ({"method": "expm"}, "expm solves linear models"),
         ({"rtol": 0.0}, "rtol must be between"),
         ({"atol": -1.0}, "atol must be above 0"),

@@ -1,0 +1,35 @@
+"""Methods of a kind, each told once: its name, one sentence for help and documents, and what does it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from rotorid.base.suggestions import one_of
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Method(Generic[_T]):
+    """One of a kind; a kind is a tuple of them, the usual one first."""
+
+    name: str
+    about: str
+    function: _T
+
+
+def names(methods: Sequence[Method[Any]]) -> tuple[str, ...]:
+    """As one types them."""
+    return tuple(method.name for method in methods)
+
+
+def find(methods: Sequence[Method[_T]], name: str, what: str) -> Method[_T]:
+    """The one of that name; ValueError for another, with the nearest."""
+    return methods[names(methods).index(one_of(name, what, names(methods)))]
+
+
+def described(methods: Sequence[Method[Any]]) -> str:
+    """All with their sentences, for help."""
+    return "; ".join(f"{method.name}: {method.about}" for method in methods) + "."

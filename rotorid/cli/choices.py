@@ -1,0 +1,54 @@
+"""Options that choose one of a few: help from the registries, and the nearest one for a misspelt one."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, get_type_hints
+
+import typer
+from typer.core import TyperCommand
+
+from rotorid.base.suggestions import suggest
+
+_CHOICE = re.compile(r"(?:Value error, )?('([^']*)' is not one of (.+?))\.?", re.DOTALL)
+
+
+class Command(TyperCommand):
+    """A command whose help tells what its options choose from."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - as typer declares it
+        """As typer's, with the methods of the registries."""
+        tell_choices(self)
+        super().format_help(ctx, formatter)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
+        """As typer's, with the nearest choice in a complaint."""
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as problem:
+            problem.message = nearest_choice(problem.message)
+            raise
+
+
+def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public type for it
+    """Put the methods behind the help of each option declared as Annotated[…, Option(…), choices].
+
+    `choices` is a function of the workflow: registries by the names of the options, read only for help.
+    """
+    from rotorid.base.registry import described
+
+    hints = get_type_hints(command.callback, include_extras=True)
+    for parameter in command.params:
+        declared: tuple[Any, ...] = getattr(hints.get(parameter.name), "__metadata__", ())
+        for choices in declared[1:]:
+            told = described(choices()[parameter.name])
+            parameter.help = f"{declared[0].help} {told}" if declared[0].help else told
+
+
+def nearest_choice(message: str) -> str:
+    """A complaint about a value that is none of a few, with the nearest one; others as they are."""
+    found = _CHOICE.fullmatch(message)
+    if found is None:
+        return message
+    near = suggest(found[2], re.findall(r"'([^']*)'", found[3]))
+    return f"{found[1]}." + (f" Did you mean {near!r}?" if near else "")

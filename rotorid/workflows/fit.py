@@ -1,0 +1,274 @@
+"""`fit`: parameters of ordinary differential equations from time records."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.suggestions import did_you_mean, one_of
+from rotorid.base.text import listing
+from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.parameters import number, pairs
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from rotorid.base.registry import Method
+    from rotorid.timedomain import OdeModel, Record
+    from rotorid.timedomain.result import Fit
+
+WITHOUT_CONTROL = ("expm", "heun", "rk4")
+"""Integrators that know no tolerance."""
+Values = str | Mapping[str, float]
+"""As "k=2,d=0.1", or by name."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of `fit`.
+
+    Attributes
+    ----------
+    method, integrator, loss
+        One of `choices`.
+    start
+        Starting values instead of the model's; the others stay.
+    starts, seed
+        How many places to begin from, and which others.
+    max_iterations, max_seconds
+        Limits of the search.
+    trajectory
+        Where quasilinearization and multiple shooting begin: "model" or "data".
+    pieces
+        Of each record in multiple shooting.
+    rtol
+        Relative tolerance of the integration.
+    allow_missing
+        Blank cells, NaN and absent outputs were not measured.
+    sigma
+        Standard deviation of a sample of every output, or of each; "auto": from the residuals.
+    """
+
+    method: str = "levenberg-marquardt"
+    integrator: str = "auto"
+    loss: str = "linear"
+    start: Values | None = None
+    starts: int = 1
+    seed: int | None = None
+    max_iterations: int = 100
+    max_seconds: float = 60.0
+    trajectory: str | None = None
+    pieces: int | None = None
+    rtol: float | None = None
+    allow_missing: bool = False
+    sigma: Values | float | None = None
+
+
+def choices() -> dict[str, tuple[Method[Any], ...]]:
+    """What the options of these names choose from."""
+    from rotorid.regression.robust import LOSSES
+    from rotorid.timedomain.integration.simulate import INTEGRATORS
+    from rotorid.timedomain.methods.search import METHODS
+
+    return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordFit(Outcome):
+    """What the fit found."""
+
+    fit: Fit
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return self.fit.to_dict()
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return self.fit.summary()
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per parameter."""
+        return self.fit.to_frame()
+
+    def figure(self) -> Figure:
+        """Record and model, residuals, sensitivities, iterations."""
+        from rotorid.timedomain.plots import figure_fit
+
+        return figure_fit(self.fit)
+
+
+@workflow
+def fit(
+    model: OdeModel | Path | str,
+    records: Sequence[Record | Path | str],
+    options: FitOptions | None = None,
+) -> RecordFit:
+    """Estimate parameters of differential equations from time records, with intervals.
+
+    Parameters
+    ----------
+    model
+        A model, or its file.
+    records
+        Records, or their files.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For files, options or records that cannot be.
+    """
+    from rotorid.tables import read_ode_model
+    from rotorid.timedomain.fit import fit as estimate
+    from rotorid.timedomain.methods.problem import RTOL
+
+    options = options or FitOptions()
+    _check(options)
+    paths = [Path(given) for given in records if isinstance(given, Path | str)]
+    _check_once(paths)
+    files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
+    equations = read_ode_model(model) if isinstance(model, Path | str) else model
+    begin = None if options.start is None else _start(options.start, equations, len(records))
+    weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
+    deviations = None if weigh or options.sigma is None else _sigma(options.sigma, equations.outputs)
+    data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
+    with phase("fit"):
+        found = estimate(
+            equations,
+            data,
+            method=options.method,
+            integrator=options.integrator,
+            loss=options.loss,
+            start=begin,
+            starts=options.starts,
+            seed=options.seed or 0,
+            max_iterations=options.max_iterations,
+            max_seconds=options.max_seconds,
+            trajectory=options.trajectory,
+            pieces=options.pieces,
+            rtol=RTOL if options.rtol is None else options.rtol,
+            weigh=weigh,
+        )
+    log.info("degrees_of_freedom = %s", found.estimate.dof)
+    log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))
+    return RecordFit(fit=found, provenance=provenance(files, options))
+
+
+def _check(options: FitOptions) -> None:
+    """Refuse names that are not known, and options that the method or the integrator would not look at."""
+    from rotorid.base.registry import names
+
+    for option, known in choices().items():
+        one_of(getattr(options, option), f"--{option}", names(known))
+    if options.trajectory is not None:
+        one_of(options.trajectory, "--trajectory", ("model", "data"))
+        if options.method not in ("quasilinearization", "multiple-shooting"):
+            raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
+    if options.pieces is not None and options.method != "multiple-shooting":
+        raise ValueError("--pieces belongs to --method multiple-shooting")
+    if options.seed is not None and options.starts == 1:
+        raise ValueError("--seed belongs to --starts N: it chooses the other places to begin from")
+    if options.rtol is None:
+        return
+    if not 1e-13 <= options.rtol <= 0.01:
+        raise ValueError(f"--rtol takes a number from 1e-13 to 0.01, not {options.rtol:g}")
+    if options.integrator in WITHOUT_CONTROL:
+        raise ValueError(
+            f"--rtol belongs to --integrator dop853, lsoda or auto: {options.integrator} has none"
+        )
+
+
+def _check_once(records: Sequence[Path]) -> None:
+    """Refuse a file that is given twice, perhaps by another name: its samples would count double."""
+    for i, path in enumerate(records):
+        for other in records[:i]:
+            same = path.samefile(other) if path.exists() and other.exists() else path == other
+            if same:
+                also = "" if path == other else f" (it is {other}, too)"
+                raise ValueError(f"{path}: this record is given twice{also}; its samples would count double")
+
+
+def _read(
+    given: Sequence[Record | Path | str],
+    model: OdeModel,
+    sigma: dict[str, float] | None,
+    *,
+    allow_missing: bool,
+    weigh: bool,
+) -> list[Record]:
+    """All records, with standard deviations for all of them or for none."""
+    from rotorid.tables import read_record
+    from rotorid.tables.data.records import STD
+
+    records = [
+        read_record(one, model, allow_missing=allow_missing, sigma=sigma)
+        if isinstance(one, Path | str)
+        else replace(one, sigma=one.sigma if sigma is None else sigma)
+        for one in given
+    ]
+    stated = [record for record in records if record.sigma is not None]
+    if stated and weigh:
+        raise ValueError(f"{stated[0].name}: leave out either the columns NAME{STD} or --sigma auto")
+    if 0 < len(stated) < len(records):
+        bare = next(record for record in records if record.sigma is None)
+        raise ValueError(
+            f"{bare.name} has no columns NAME{STD}, but {stated[0].name} has: all records or none"
+        )
+    return records
+
+
+def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
+    """Starting values inside their bounds; x0_2 is that of the second record, where each has its own."""
+    from rotorid.timedomain.models.several import models_of
+
+    copy = models_of(model, count)[0]
+    limits = {
+        name: (float(low), float(high))
+        for one in (copy, model)
+        for name, (low, high) in zip(one.parameters, one.bounds, strict=True)
+    }
+
+    def inside(name: str, text: str) -> float:
+        if name not in limits:
+            hint = did_you_mean(name, limits) or f"; parameters are {listing(limits, 'and')}"
+            raise ValueError(f"--start: {name!r} is no parameter of the model{hint}")
+        value, (low, high) = number(text), limits[name]
+        if math.isnan(value):
+            raise ValueError(f"--start: {name} = {text!r} is no number, such as 2 or 1e-3")
+        if not low <= value <= high:
+            raise ValueError(f"--start: {name} = {value:g} is outside its bounds {low:g} to {high:g}")
+        return value
+
+    found = pairs(given, "--start", inside, "k=2,d=0.1")
+    # what holds for all records first: a value for one of them replaces it
+    return dict(sorted(found.items(), key=lambda item: item[0] not in model.parameters))
+
+
+def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
+    """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
+    from rotorid.tables.reader.number import NotANumber, check_size
+
+    def positive(name: str, text: str) -> float:
+        if name not in outputs:
+            hint = did_you_mean(name, outputs) or f"; outputs are {listing(outputs, 'and')}"
+            raise ValueError(f"--sigma: {name!r} is no output of the model{hint}")
+        value = number(text)
+        with contextlib.suppress(NotANumber):
+            check_size(value)
+            if value > 0:
+                return value
+        raise ValueError(f"--sigma: {name} = {text} is no number above 0; use y1=0.01,y2=0.02")
+
+    if isinstance(given, float | int) or (isinstance(given, str) and not {"=", ","} & set(given)):
+        given = ",".join(f"{name}={given}" for name in outputs)
+    found = pairs(given, "--sigma", positive, "y1=0.01,y2=0.02")
+    if lost := [name for name in outputs if name not in found]:
+        raise ValueError(f"--sigma: the standard deviation of {listing(lost, 'and')} is missing")
+    return found

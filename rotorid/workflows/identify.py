@@ -1,0 +1,228 @@
+"""`identify`: coefficients of a model from harmonic tests, natural frequencies and shapes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.suggestions import one_of
+from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.parameters import Speeds, speeds
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from rotorid.base.registry import Method
+    from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, Identification
+    from rotorid.harmonic.design import Design
+    from rotorid.tables import HarmonicFile
+
+MOST_CANDIDATES = 2000
+_NO_DATA = "give a table of measured amplitudes after the model file (only --design does without)"
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """Options of `identify`.
+
+    Attributes
+    ----------
+    method, loss
+        One of `choices`.
+    amplitude_error, phase_error
+        One standard deviation of an amplitude, percent, and of a phase, degrees; before those of the model.
+    design
+        Which of these frequencies to measure next, "10:30:1" or rad/s.
+    choose
+        How many of them; default as many as the parameters, at least 2.
+    """
+
+    method: str = "equation-error"
+    loss: str = "linear"
+    amplitude_error: float | None = None
+    phase_error: float | None = None
+    design: Speeds | None = None
+    choose: int | None = None
+
+
+def choices() -> dict[str, tuple[Method[Any], ...]]:
+    """What the options of these names choose from."""
+    from rotorid.harmonic.identification import METHODS
+    from rotorid.regression.robust import LOSSES
+
+    return {"method": METHODS, "loss": LOSSES}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Coefficients(Outcome):
+    """What data told, and which frequencies to measure next; one of them may be missing."""
+
+    identification: Identification | None
+    design: Design | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        document = {} if self.identification is None else self.identification.to_dict()
+        return document if self.design is None else {**document, "design": self.design.to_dict()}
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return "\n\n".join(part.summary() for part in self._parts)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The frequencies, or else one row per parameter."""
+        return self._parts[-1].to_frame()
+
+    def figure(self) -> Figure:
+        """Amplitudes, phases or shapes, residuals and correlations."""
+        from rotorid.harmonic.plots import figure_identification
+
+        if self.identification is None:
+            raise ValueError(_NO_DATA)
+        return figure_identification(self.identification)
+
+    @property
+    def _parts(self) -> list[Identification | Design]:
+        return [part for part in (self.identification, self.design) if part is not None]
+
+
+@workflow
+def identify(
+    model: HarmonicModel | HarmonicFile | Path | str,
+    data: Experiments | Path | str | None = None,
+    options: IdentifyOptions | None = None,
+) -> Coefficients:
+    """Identify coefficients from measured amplitudes, with intervals, or say what the data do tell.
+
+    Parameters
+    ----------
+    model
+        A model, or its file.
+    data
+        Measured amplitudes, or their table; only the choice of frequencies does without.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For files, options or data that cannot be.
+    """
+    from rotorid.harmonic import HarmonicModel
+    from rotorid.harmonic import identify as estimate
+    from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
+
+    options = options or IdentifyOptions()
+    if data is None and options.design is None:
+        raise ValueError(_NO_DATA)
+    _check(options)
+    files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
+    if isinstance(model, HarmonicModel):
+        model = HarmonicFile(model)
+    elif not isinstance(model, HarmonicFile):
+        model = read_harmonic_model(model)
+    file = replace(model, errors=_errors(model.errors, options.amplitude_error, options.phase_error))
+    result = None
+    if data is not None:
+        experiments = read_measurements(data, file) if isinstance(data, Path | str) else data
+        with phase("identification"):
+            result = estimate(
+                file.model,
+                experiments,
+                method=options.method,
+                bounds=file.bounds or None,
+                loss=options.loss,
+                start=(file.start or None) if options.method == "output-error" else None,
+            )
+        log.info("degrees_of_freedom = %s", result.dof)
+    return Coefficients(
+        identification=result,
+        design=None if options.design is None else _plan(file, result, options.design, options.choose),
+        provenance=provenance(files, options),
+    )
+
+
+def _check(options: IdentifyOptions) -> None:
+    """Refuse names that are not known, and options that do not go together."""
+    from rotorid.base.registry import names
+
+    for option, known in choices().items():
+        one_of(getattr(options, option), f"--{option}", names(known))
+    if options.loss != "linear" and options.method != "output-error":
+        raise ValueError("--loss belongs to --method output-error: linear regression has none")
+    if options.choose is not None and options.design is None:
+        raise ValueError("--choose belongs to --design FIRST:LAST:STEP")
+
+
+def _errors(
+    stated: AmplitudeErrors | None, percent: float | None, degrees: float | None
+) -> AmplitudeErrors | None:
+    """Errors of the model file, those of the options before them."""
+    if percent is None and degrees is None:
+        return stated
+    for name, value, high in (("--amplitude-error", percent, 1000.0), ("--phase-error", degrees, 360.0)):
+        if value is not None and not 0 <= value <= high:
+            raise ValueError(f"{name} takes a number from 0 to {high:g}, not {value:g}")
+    from rotorid.harmonic import AmplitudeErrors
+
+    relative = percent / 100.0 if percent is not None else (stated.relative if stated else 0.0)
+    phase = math.radians(degrees) if degrees is not None else (stated.phase if stated else 0.0)
+    return AmplitudeErrors(relative, phase, stated.floor if stated else 0.0)
+
+
+def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, choose: int | None) -> Design:
+    """Choose frequencies for a model whose parameters are known roughly.
+
+    Its `[start]` guesses what is not identified. The excitation is that of the experiments; without them
+    every input has the amplitude 1.
+    """
+    from rotorid.harmonic.design import design
+
+    frequencies = speeds(candidates, what="--design")
+    if len(frequencies) > MOST_CANDIDATES:
+        raise ValueError(f"--design takes at most {MOST_CANDIDATES} frequencies, not {len(frequencies)}")
+    if file.errors is None:
+        raise ValueError(
+            "--design needs the errors of the readings: --amplitude-error and --phase-error, or [errors] "
+            "in the model file"
+        )
+    guess = dict(file.start)
+    if found is not None:
+        # of several solutions the first, where no guess says which is meant
+        several = dict(found.solutions[0]) if found.solutions else {}
+        single = dict(zip(found.parameters, found.values.tolist(), strict=True))
+        for source in (several, file.start, single):
+            guess.update({name: value for name, value in source.items() if math.isfinite(value)})
+    lost = [name for name in file.model.parameters if name not in guess]
+    if lost:
+        raise ValueError(
+            f"--design needs a guess of {', '.join(lost)}: put it under [start] in the model file"
+        )
+    usual = min(max(2, len(file.model.parameters)), len(frequencies))
+    number = usual if choose is None else choose
+    return design(file.model, guess, frequencies, number, errors=file.errors, inputs=_inputs(file, found))
+
+
+def _inputs(file: HarmonicFile, found: Identification | None) -> dict[str, complex]:
+    """One amplitude of each input."""
+    import numpy as np
+
+    model = file.model
+    if found is None:
+        if len(model.inputs) > 1:
+            raise ValueError(
+                f"--design without DATA excites one input; this model has {', '.join(model.inputs)}: "
+                "give a table that shows their amplitudes"
+            )
+        return dict.fromkeys(model.inputs, 1.0 + 0j)
+    forced = np.flatnonzero(~found.experiments.free)
+    if not len(forced):
+        raise ValueError("--design is for harmonic tests; these data are free vibrations")
+    table = {name: found.experiments.signals[name][forced] for name in model.inputs}
+    complete = [i for i in range(len(forced)) if not any(np.isnan(z[i]) for z in table.values())]
+    if not complete:
+        raise ValueError("--design needs an experiment in which every input is known")
+    return {name: complex(z[complete[0]]) for name, z in table.items()}

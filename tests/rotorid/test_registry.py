@@ -1,0 +1,29 @@
+"""Registries: every method is told once, and found by its name."""
+
+import pytest
+
+from rotorid.base.registry import Method, described, find, names
+from rotorid.harmonic.identification import METHODS as IDENTIFICATIONS
+from rotorid.regression.robust import LOSSES
+from rotorid.timedomain.integration.simulate import INTEGRATORS
+from rotorid.timedomain.methods.search import METHODS
+
+KINDS = (METHODS, INTEGRATORS, LOSSES, IDENTIFICATIONS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_names_are_unique_and_sentences_there(kind):
+    assert len(set(names(kind))) == len(kind)
+    for method in kind:
+        assert method.about
+        assert not method.about.endswith(".")
+        assert find(kind, method.name, "method") is method
+
+
+def test_words():
+    kind = (Method("one", "the first", 1), Method("other", "the second", 2))
+    assert described(kind) == "one: the first; other: the second."
+    with pytest.raises(
+        ValueError, match=r"^method 'othr' is not known \(did you mean 'other'\?\): one of one, other$"
+    ):
+        find(kind, "othr", "method")

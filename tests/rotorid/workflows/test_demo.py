@@ -1,0 +1,22 @@
+"""`rotorid.workflows.demo` from Python: files, commands and the documents of whoever runs them."""
+
+from rotorid.workflows.demo import DemoOptions, demo, samples
+from rotorid.workflows.demo_samples import SAMPLES
+
+
+def test_files_are_written_and_commands_told(tmp_path, cli):
+    made = demo(tmp_path / "d", DemoOptions(sample="identification"))
+    document = made.document
+    assert {entry["file"] for entry in document["provenance"]["inputs"]} == {
+        str(path) for path in (tmp_path / "d").rglob("*") if path.is_file()
+    }
+    assert document["provenance"]["options"] == {"sample": "identification"}
+    assert [heading.splitlines()[1] for heading, _ in made.told()] == [f"$ {c}" for c in document["commands"]]
+    assert made.to_frame()["command"].tolist() == document["commands"]
+    ran = made.run(lambda words: {"words": words, "provenance": None}).to_dict()
+    assert [ran[step.key] for step in made.sample.steps] == [{"words": words} for words in made.commands]
+
+
+def test_the_list(cli):
+    assert samples().to_frame()["name"].tolist() == list(SAMPLES)
+    assert samples().summary() == cli("demo", "--list").out.rstrip("\n")

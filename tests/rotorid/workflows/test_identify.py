@@ -1,0 +1,48 @@
+"""`rotorid.workflows.identify` from Python: what the command prints, and models and data without files."""
+
+import json
+
+import pytest
+
+from rotorid.samples import sample_data
+from rotorid.tables import read_harmonic_model, read_measurements
+from rotorid.workflows.identify import IdentifyOptions, identify
+
+FOLDER = sample_data() / "identify" / "task_5_1"
+FILES = FOLDER / "model.toml", FOLDER / "data.csv"
+WORDS = (
+    *("--method", "output-error", "--loss", "huber", "--amplitude-error", "2", "--phase-error", "1"),
+    *("--design", "5:40:5", "--choose", "2"),
+)
+OPTIONS = {"method": "output-error", "loss": "huber", "amplitude_error": 2.0, "phase_error": 1.0, "choose": 2}
+
+
+def plain(document):
+    document["provenance"].pop("date")
+    return json.loads(json.dumps(document))
+
+
+def test_texts_and_numbers_give_what_the_command_prints(cli):
+    printed = plain(cli("identify", *FILES, *WORDS, "--json").json)
+    assert printed["provenance"]["options"] == {**OPTIONS, "design": "5:40:5"}
+    assert plain(identify(*FILES, IdentifyOptions(**OPTIONS, design="5:40:5")).document) == printed
+    frequencies = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0]
+    found = plain(identify(*FILES, IdentifyOptions(**OPTIONS, design=frequencies)).document)
+    assert found["provenance"].pop("options") == {**OPTIONS, "design": frequencies}
+    printed["provenance"].pop("options")
+    assert found == printed
+
+
+def test_models_and_experiments_need_no_files():
+    file = read_harmonic_model(FILES[0])
+    found = identify(file.model, read_measurements(FILES[1], file))
+    assert found.document["provenance"]["inputs"] == []
+    assert found.document["provenance"]["options"] == {}
+    assert found.to_dict() == identify(*FILES).to_dict()
+    assert found.to_frame()["parameter"].tolist() == list(file.model.parameters)
+    assert found.figure().axes
+
+
+def test_without_data_there_is_nothing_to_identify():
+    with pytest.raises(ValueError, match="give a table of measured amplitudes"):
+        identify(FILES[0])
