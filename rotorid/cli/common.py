@@ -44,6 +44,40 @@ OperatingOption = Annotated[
     typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
 ]
 
+PhaseOption = Annotated[
+    str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
+]
+AnglesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="DIRECTION",
+        help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
+        "where the job states its rotation.",
+        show_default=False,
+    ),
+]
+AmplitudeErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="PERCENT", min=0.0, help="Standard deviation of a reading's amplitude.", show_default=False
+    ),
+]
+PhaseErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="DEGREES", min=0.0, help="Standard deviation of a reading's phase.", show_default=False
+    ),
+]
+RunErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="PERCENT",
+        min=0.0,
+        help="Standard deviation of what changes from run to run, percent of a reading.",
+        show_default=False,
+    ),
+]
+
 
 def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str, Any]:
     """Program version, input files with their hashes, date and options of a result."""

@@ -9,10 +9,15 @@ from warnings import catch_warnings
 import typer
 
 from rotorid.cli.common import (
+    AmplitudeErrorOption,
+    AnglesOption,
     JsonOption,
     OutputOption,
+    PhaseErrorOption,
+    PhaseOption,
     PlotOption,
     ReportOption,
+    RunErrorOption,
     emit,
 )
 from rotorid.cli.output import (
@@ -84,34 +89,11 @@ def balance(  # noqa: PLR0915
             show_default=False,
         ),
     ] = None,
-    amplitude_error: Annotated[
-        float | None,
-        typer.Option(metavar="PERCENT", help="Standard deviation of a reading's amplitude.", min=0.0),
-    ] = None,
-    phase_error: Annotated[
-        float | None,
-        typer.Option(metavar="DEGREES", help="Standard deviation of a reading's phase.", min=0.0),
-    ] = None,
-    run_error: Annotated[
-        float | None,
-        typer.Option(
-            metavar="PERCENT",
-            help="Standard deviation of what changes from run to run, percent of a reading.",
-            min=0.0,
-        ),
-    ] = None,
-    phase: Annotated[
-        str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
-    ] = None,
-    angles: Annotated[
-        str | None,
-        typer.Option(
-            metavar="DIRECTION",
-            help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
-            "where the job states its rotation.",
-            show_default=False,
-        ),
-    ] = None,
+    amplitude_error: AmplitudeErrorOption = None,
+    phase_error: PhaseErrorOption = None,
+    run_error: RunErrorOption = None,
+    phase: PhaseOption = None,
+    angles: AnglesOption = None,
     planes: Annotated[
         str | None, typer.Option(metavar="LIST", help="Use these planes only.", show_default=False)
     ] = None,
