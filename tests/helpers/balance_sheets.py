@@ -9,11 +9,11 @@ from balancing import correct
 from balancing.correction.check import compare_check
 from balancing.mounting.mounted import mount
 from rotorid.cli.commands.balance_report import Report
-from rotorid.cli.commands.coefficients import choose
 from rotorid.cli.commands.verdict import Places, judge, tolerance_of
 from rotorid.cli.common import provenance
 from rotorid.report import balance
 from rotorid.tables import read_job
+from rotorid.workflows.coefficients import choose, used_planes
 
 DATA = Path(__file__).parents[2] / "sample_data"
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -104,24 +104,24 @@ def value_at(document, key):
 def parts_of(path, *, split=False, refine=False, grade=(None, None, None), **settings):
     """Everything that the command makes of a job, as the command makes it."""
     job = read_job(path, **settings)
-    found = choose(job, None, None, refined=refine)
+    influence, baseline = choose(job, refined=refine)
     result = correct(
-        found.influence,
-        baseline=found.baseline,
-        planes=list(found.used),
-        limits=job.limits_of(found.influence.planes),
+        influence,
+        baseline=baseline,
+        planes=used_planes(job, influence),
+        limits=job.limits_of(influence.planes),
         row_weights=job.row_weights,
         remove=sorted(job.remove),
     )
-    report = Report(result, found.influence)
+    report = Report(result, influence)
     if split:
         report.mounted = mount(
-            result, found.influence, found.baseline, job.holes, row_weights=job.row_weights, on_top=refine
+            result, influence, baseline, job.holes, row_weights=job.row_weights, on_top=refine
         )
     if job.check is not None and not refine:
-        report.check = compare_check(result, job.check, found.influence, found.baseline)
+        report.check = compare_check(result, job.check, influence, baseline)
     tolerance = tolerance_of(*grade, result.planes, Places(None, None, None))
-    report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
+    report.verdict = judge(result, influence, job, tolerance, report.mounted)
     return job, report
 
 

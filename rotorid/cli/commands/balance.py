@@ -24,20 +24,17 @@ from rotorid.cli.output import (
     check_inputs,
     check_targets,
 )
+from rotorid.workflows.coefficients import KINDS, MODEL_ERROR
 from rotorid.workflows.parameters import (
     names,
     speeds,
 )
 
 if TYPE_CHECKING:
-    from balancing import Correction
-    from rotorid.cli.commands.coefficients import Chosen
+    from balancing import Correction, Influence, Trials
     from rotorid.tables import Job
 
 METHODS = ("least-squares", "weighted", "minmax")
-COEFFICIENTS = ("measured", "computed", "combined")
-MODEL_ERROR = 20.0
-"""Percent by which a computed coefficient may be wrong (one standard deviation) if nobody says."""
 
 
 class Overrides(TypedDict):
@@ -75,7 +72,7 @@ def balance(  # noqa: PLR0915
         str | None,
         typer.Option(
             metavar="KIND",
-            help=f"{', '.join(COEFFICIENTS)}: from the runs, from the job's rotor, or both; default: "
+            help=f"{', '.join(KINDS)}: from the runs, from the job's rotor, or both; default: "
             "measured where there are trial weights.",
             show_default=False,
         ),
@@ -217,16 +214,17 @@ def balance(  # noqa: PLR0915
     """
     from balancing import correct
     from balancing.correction.check import compare_check
+    from balancing.correction.subsets import compare_planes
     from balancing.mounting.mounted import mount
     from rotorid.cli.commands.balance_report import Report
     from rotorid.cli.commands.balance_workbook import as_workbook, workbook, write_template
-    from rotorid.cli.commands.coefficients import choose, compare_planes
     from rotorid.cli.commands.verdict import Places, judge, tolerance_of
     from rotorid.cli.other_readings import ask_runs, with_contradiction, with_other_readings
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.job.source import JobSource
     from rotorid.tables.runs.influence_table import influence_bytes
+    from rotorid.workflows.coefficients import choose, used_planes
 
     if template is not None:
         write_template(template, files)
@@ -258,22 +256,30 @@ def balance(  # noqa: PLR0915
         return with_limits(job, max_mass, limit or []) if max_mass is not None or limit else job
 
     job = with_contradiction(read(settings))
-    found = choose(job, coefficients, model_error, refined=refine)
+    influence_found, baseline = choose(job, coefficients, model_error, refined=refine)
     used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
-    candidates = names(planes) or (list(found.used) if job.left_out else list(found.influence.planes))
+    candidates = names(planes) or used_planes(job, influence_found)
     subsets = None
     if best_planes is not None:
-        subsets = compare_planes(found, candidates, used, best_planes, method, job.row_weights)
+        subsets = compare_planes(
+            influence_found,
+            baseline,
+            candidates,
+            best_planes,
+            speeds=used,
+            criterion="max" if method == "minmax" else "rms",
+            row_weights=job.row_weights,
+        )
         candidates = list(subsets.planes[0])
 
-    def solved(job: Job, found: Chosen) -> Correction:
+    def solved(job: Job, influence: Influence, baseline: Trials | None) -> Correction:
         return correct(
-            found.influence,
-            baseline=found.baseline,
+            influence,
+            baseline=baseline,
             planes=candidates,
             speeds=used,
             method=method,
-            limits=job.limits_of(found.influence.planes),
+            limits=job.limits_of(influence.planes),
             row_weights=job.row_weights,
             strength=_strength(ridge),
             keep=truncate,
@@ -283,32 +289,32 @@ def balance(  # noqa: PLR0915
     def again(phase: str, angles: str) -> Correction:
         with catch_warnings(action="ignore"):  # said when the job was read
             job = read({**settings, "phase": phase, "angles": angles})
-        return solved(job, choose(job, coefficients, model_error, refined=refine))
+        return solved(job, *choose(job, coefficients, model_error, refined=refine))
 
-    result = solved(job, found)
+    result = solved(job, influence_found, baseline)
     # what was mounted as proposed, before it was refined, was proposed by these conventions and by no others
     known = not refine or job.check_mounted
     test = ask_runs(job, result if known else None)
     result = with_other_readings(result, test, again if known else None)
     source = JobSource(tuple(files), influence, **settings, max_mass=max_mass, limits=tuple(limit or ()))
-    report = Report(result, found.influence, subsets=subsets)
+    report = Report(result, influence_found, subsets=subsets)
     if split:
         report.mounted = mount(
             result,
-            found.influence,
-            found.baseline,
+            influence_found,
+            baseline,
             job.holes,
             row_weights=job.row_weights,
             time_limit=split_seconds,
             on_top=refine,
         )
     if job.check is not None and not refine:
-        report.check = compare_check(result, job.check, found.influence, found.baseline)
+        report.check = compare_check(result, job.check, influence_found, baseline)
     if history:
         report.add_history(job)
     places = Places(positions, bearings, centre)
     tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes, places)
-    report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
+    report.verdict = judge(result, influence_found, job, tolerance, report.mounted)
     if trade_off:
         report.add_trade_off(job)
     options = {
@@ -341,7 +347,7 @@ def balance(  # noqa: PLR0915
         figure=(plot, report.figure),
         table=(None if as_workbook(output) else output, report.frame),
         more=[
-            (save_influence, lambda: influence_bytes(save_influence or Path(), found.influence)),
+            (save_influence, lambda: influence_bytes(save_influence or Path(), influence_found)),
             workbook(job, source, output, report, options),
         ],
         report=(sheet, lambda document, record: report.sheet(document, job, record)),
@@ -353,7 +359,7 @@ def _check_options(
 ) -> None:
     for option, value, known in (
         ("--method", method, (*METHODS, None)),
-        ("--coefficients", coefficients, (*COEFFICIENTS, None)),
+        ("--coefficients", coefficients, (*KINDS, None)),
     ):
         if value not in known:
             from rotorid.base.suggestions import did_you_mean

@@ -228,16 +228,16 @@ def _from_job(
 
     from balancing.coefficients.baseline import starting_point
     from balancing.trial_weight import GRAVITY, trial_from_coefficients
-    from rotorid.cli.commands.coefficients import choose
     from rotorid.tables import read_job
     from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.reader import units
+    from rotorid.workflows.coefficients import choose, used_planes
 
     job = read_job(path, phase=asked["phase"], angles=asked["angles"])
     if asked["max_mass"] is not None:
         job = with_limits(job, asked["max_mass"], [])
-    chosen = choose(job, None, None)
-    start = starting_point(chosen.influence, chosen.baseline)
+    influence, baseline = choose(job)
+    start = starting_point(influence, baseline)
     labels = start.labels
     by_mass = labels.weight_unit in units.MASS
     own = None if asked["radius"] is None else quantity(asked["radius"], "--radius", units.LENGTH, "200mm")
@@ -253,13 +253,13 @@ def _from_job(
     if load is not None and not load > 0:
         raise ValueError("the load must be above 0: --rotor-mass or --bearing-load")
     found = []
-    for name in names(asked["plane"]) or list(chosen.used):
+    for name in names(asked["plane"]) or used_planes(job, influence):
         limit, radius = inf, (job.radii.get(name) or own) if by_mass else None
         if job.limits is not None and name in job.planes:
             limit = float(job.limits.max_weight[job.planes.index(name)])
         found.append(
             trial_from_coefficients(
-                chosen.influence,
+                influence,
                 start.readings,
                 name,
                 share=asked["share"] / 100,

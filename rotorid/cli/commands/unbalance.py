@@ -94,7 +94,7 @@ def _estimate(
 ) -> Unbalance:
     from balancing.coefficients.from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
-    from rotorid.cli.commands.coefficients import computed
+    from rotorid.workflows.coefficients import computed
 
     if job.rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
