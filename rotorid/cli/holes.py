@@ -8,7 +8,8 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from balancing.mounting.holes import Holes, equal_holes, from_list
-from rotorid.cli.amounts import degrees, inside, weight_of, weights_of
+from rotorid.workflows.parameters import degrees
+from rotorid.workflows.quantities import weight, weights
 
 _APART = 1e-3
 """Degrees between holes that count as one."""
@@ -58,15 +59,15 @@ def read_holes(
             )
         if mounted[int(name) - 1]:
             raise ValueError(f"--taken: hole {int(name)} is listed twice")
-        mounted[int(name) - 1] = inside(weight_of(text, "--taken", "3:10g"), labels, radius)
+        mounted[int(name) - 1] = weight(text, "--taken", labels, radius, "3:10g")
     return from_list(
         angles,
-        () if pieces is None else weights_of(pieces, "--pieces", labels, radius),
+        () if pieces is None else weights(pieces, "--pieces", labels, radius),
         per_hole=per_hole,
-        step=0.0 if step is None else inside(weight_of(step, "--step", "0.5g"), labels, radius),
+        step=0.0 if step is None else weight(step, "--step", labels, radius, "0.5g"),
         taken=mounted,
         stock=None if stock is None else _whole(stock),
-        max_weight=np.inf if max_mass is None else inside(weight_of(max_mass, "--max-mass"), labels, radius),
+        max_weight=np.inf if max_mass is None else weight(max_mass, "--max-mass", labels, radius),
     )
 
 

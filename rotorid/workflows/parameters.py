@@ -96,36 +96,44 @@ def names(given: Names | None) -> list[str] | None:
 
 
 def pairs(
-    given: str | Mapping[str, _T], what: str, read: Callable[[str, str], _T], example: str
+    given: str | Sequence[str] | Mapping[str, _T],
+    what: str,
+    read: Callable[[str, str], _T],
+    example: str,
+    alone: Callable[[str], Mapping[str, _T]] | None = None,
 ) -> dict[str, _T]:
     """Read "alpha12=1.3,U31=-0.3" as names with values.
 
     Parameters
     ----------
     given
-        The text, or the pairs themselves.
+        The text, its parts, or the pairs themselves.
     what
         The option, for complaints.
     read
         Makes a value of its name and its text.
     example
         How it is written.
+    alone
+        What a part without "=" stands for; None: nothing.
 
     Raises
     ------
     ValueError
         For anything else, and for a name that stands twice.
     """
-    if not isinstance(given, str):
+    if isinstance(given, Mapping):
         return dict(given)
+    shown = given if isinstance(given, str) else ",".join(given)
     found: dict[str, _T] = {}
-    for part in given.split(","):
-        name, sign, text = (piece.strip() for piece in part.partition("="))
-        if not sign or not name:
-            raise ValueError(f"{what} {given!r}: {part.strip()!r} is no NAME=VALUE; use {example}")
-        if name in found:
-            raise ValueError(f"{what} {given!r}: {name} stands twice")
-        found[name] = read(name, text)
+    for part in given.split(",") if isinstance(given, str) else given:
+        name, sign, text = (piece.strip() for piece in part.rpartition("="))
+        if not (name and sign) and (sign or not text or alone is None):
+            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME=VALUE; use {example}")
+        new = alone(text) if alone is not None and not sign else {name: read(name, text)}
+        if twice := next((one for one in new if one in found), None):
+            raise ValueError(f"{what} {shown!r}: {twice} stands twice")
+        found |= new
     return found
 
 

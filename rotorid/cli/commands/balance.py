@@ -221,10 +221,10 @@ def balance(  # noqa: PLR0915
     from rotorid.cli.commands.verdict import Places, judge, tolerance_of
     from rotorid.cli.other_readings import ask_runs, with_contradiction, with_other_readings
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.job.source import JobSource
     from rotorid.tables.runs.influence_table import influence_bytes
     from rotorid.workflows.coefficients import choose, used_planes
+    from rotorid.workflows.quantities import largest_amplitudes, largest_weights, limited
 
     if template is not None:
         write_template(template, files)
@@ -253,7 +253,7 @@ def balance(  # noqa: PLR0915
 
     def read(said: Overrides) -> Job:
         job = read_job(files[0], **said) if is_job else job_from_files(files, influence=influence, **said)
-        return with_limits(job, max_mass, limit or []) if max_mass is not None or limit else job
+        return limited(job, max_mass, limit or [])
 
     job = with_contradiction(read(settings))
     influence_found, baseline = choose(job, coefficients, model_error, refined=refine)
@@ -296,7 +296,13 @@ def balance(  # noqa: PLR0915
     known = not refine or job.check_mounted
     test = ask_runs(job, result if known else None)
     result = with_other_readings(result, test, again if known else None)
-    source = JobSource(tuple(files), influence, **settings, max_mass=max_mass, limits=tuple(limit or ()))
+    source = JobSource(
+        tuple(files),
+        influence,
+        **settings,
+        max_weights=largest_weights(job, max_mass),
+        limits=largest_amplitudes(job, limit or []),
+    )
     report = Report(result, influence_found, subsets=subsets)
     if split:
         report.mounted = mount(

@@ -183,10 +183,10 @@ def split(
     rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
     from balancing.mounting.hand_mounting import combine, trim
-    from rotorid.cli.amounts import length_of, vectors_of
     from rotorid.cli.commands import split_answers as answers
     from rotorid.cli.holes import read_holes
     from rotorid.tables.reader.units import MASS
+    from rotorid.workflows.quantities import size, vectors
 
     options: dict[str, object] = {
         "--holes": holes,
@@ -212,18 +212,18 @@ def split(
         "--spacing": spacing,
     }
     check_targets(plot, output)
-    labels, weights = vectors_of(vector, angles)
+    labels, weights = vectors(vector, angles)
     single = len(weights) == 1 and mounted is None and step is None and angle_step is None
     _check_options(options, single)
     target = combine(weights)
     if mounted is not None:
-        other, there = vectors_of(mounted, angles, "--mounted")
+        other, there = vectors(mounted, angles, "--mounted")
         if (labels.weight_unit in MASS) != (other.weight_unit in MASS):
             raise ValueError("--mounted: write it as VECTOR is written, both masses or both unbalances")
         target = trim(target, there)
     if target == 0 and any(options[way] is not None for way in _WAYS):
         raise ValueError("there is nothing to mount: the weight is 0")
-    away = None if radius is None else length_of(radius, "--radius")
+    away = None if radius is None else size(radius, "--radius")
     wanted = answers.Wanted(target, labels, away)
     if holes is not None:
         plane = read_holes(

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.text import counted
-from rotorid.cli.amounts import inside, length_of, weight_of, weights_of
+from rotorid.workflows.quantities import size as length_of
+from rotorid.workflows.quantities import weight, weights
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -113,7 +114,7 @@ def at_two_angles(wanted: Wanted, two: str) -> Answer:
     """Two fixed weights at free angles."""
     from balancing.mounting.hand_mounting import two_positions
 
-    masses = weights_of(two, "--two", wanted.labels, wanted.radius)
+    masses = weights(two, "--two", wanted.labels, wanted.radius)
     if len(masses) != 2:
         raise ValueError(f"--two {two!r}: give two weights, such as 20g,30g")
     scale, unit = wanted.labels.weight_scale, wanted.labels.weight_unit
@@ -269,7 +270,7 @@ def as_one(wanted: Wanted, step: str | None, angle_step: float) -> Answer:
 
     if not 0 <= angle_step <= 360:
         raise ValueError(f"--angle-step: {angle_step:g} is no step of an angle, 0 to 360 degrees")
-    size = 0.0 if step is None else inside(weight_of(step, "--step", "0.5g"), wanted.labels, wanted.radius)
+    size = 0.0 if step is None else weight(step, "--step", wanted.labels, wanted.radius, "0.5g")
     # steps count from the job's 0° either way, so the sign of the angle does not matter
     found = rounded(wanted.target, size, float(np.radians(angle_step)))
     scale = wanted.labels.weight_scale

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rotorid.cli.commands.tolerance import quantity, speed_with_unit
 from rotorid.cli.common import (
     JsonOption,
     OutputOption,
@@ -19,6 +18,7 @@ from rotorid.cli.output import check_targets
 from rotorid.cli.verbose import note
 from rotorid.plots import plot
 from rotorid.workflows.parameters import names
+from rotorid.workflows.quantities import limited, quantity, speed_with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -229,13 +229,11 @@ def _from_job(
     from balancing.coefficients.baseline import starting_point
     from balancing.trial_weight import GRAVITY, trial_from_coefficients
     from rotorid.tables import read_job
-    from rotorid.tables.job.job_limits import with_limits
     from rotorid.tables.reader import units
     from rotorid.workflows.coefficients import choose, used_planes
 
     job = read_job(path, phase=asked["phase"], angles=asked["angles"])
-    if asked["max_mass"] is not None:
-        job = with_limits(job, asked["max_mass"], [])
+    job = limited(job, asked["max_mass"], [])
     influence, baseline = choose(job)
     start = starting_point(influence, baseline)
     labels = start.labels
@@ -319,14 +317,9 @@ def _weight(text: str, labels: Labels) -> float:
 
 
 def _force(text: str) -> float:
-    from rotorid.tables.reader.units import Unit
+    from rotorid.tables.reader.units import FORCE
 
-    known = {
-        "N": Unit("N", "force"),
-        "kN": Unit("kN", "force", 1e3),
-        "lbf": Unit("lbf", "force", 4.4482216152605),
-    }
-    return quantity(text, "--bearing-load", known, "2500N")
+    return quantity(text, "--bearing-load", FORCE, "2500N")
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.cli.commands.tolerance import plane_positions, quantity, speed_with_unit, two_positions
+from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
@@ -27,7 +27,11 @@ class Places:
 
 
 def tolerance_of(
-    grade: str | None, mass: str | None, service_speed: str | None, planes: tuple[str, ...], places: Places
+    grade: str | None,
+    rotor_mass: str | None,
+    service_speed: str | None,
+    planes: tuple[str, ...],
+    places: Places,
 ) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given.
 
@@ -37,28 +41,27 @@ def tolerance_of(
         For some of the options only, more than two planes, and values that cannot be.
     """
     from balancing.iso21940 import tolerance
-    from rotorid.tables.reader import units
 
     along = (places.positions, places.bearings, places.centre)
-    if grade is None and mass is None and service_speed is None and not any(along):
+    if grade is None and rotor_mass is None and service_speed is None and not any(along):
         return None
-    if grade is None or mass is None or service_speed is None:
+    if grade is None or rotor_mass is None or service_speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
     if len(planes) > 2:
         raise ValueError(
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
-    at = dict.fromkeys(planes) if places.positions is None else plane_positions(places.positions)
+    at = dict.fromkeys(planes) if places.positions is None else positions(places.positions)
     if set(at) != set(planes):
         raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
     return tolerance(
-        quantity(mass, "--rotor-mass", units.MASS, "500kg"),
+        mass(rotor_mass, "--rotor-mass"),
         speed_with_unit(service_speed, "--service-speed"),
         grade,
         planes=at,
         bearings=None if places.bearings is None else two_positions(places.bearings),
-        centre=None if places.centre is None else quantity(places.centre, "--centre", units.LENGTH, "350mm"),
+        centre=None if places.centre is None else length(places.centre, "--centre", "350mm"),
     )
 
 
