@@ -150,6 +150,27 @@ def discs(
     return fig
 
 
+def placed(
+    labels: Labels,
+    weight: complex,
+    *ways: Sequence[complex],
+    holes: Holes | None = None,
+    mounting: Mounting | None = None,
+    remove: bool = False,
+) -> Figure:
+    """A new figure with a disc for each of several ways to place one weight; see `disc`."""
+    from matplotlib.figure import Figure
+
+    several = ways or ((),)
+    fig = Figure(figsize=(4.6 * len(several) + 0.4, 5.6), layout="constrained")
+    for k, loose in enumerate(several, start=1):
+        ax = fig.add_subplot(1, len(several), k)
+        title = "weight" if len(several) == 1 else f"solution {k}"
+        disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose)
+    fig.suptitle(seen_from(labels).replace("; ", "\n"), fontsize="small")
+    return fig
+
+
 def seen_from(labels: Labels, clockwise: bool = False) -> str:
     """From which end the discs are seen and how angles count, in words."""
     way = "clockwise" if clockwise else "counter-clockwise"

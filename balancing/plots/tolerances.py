@@ -14,7 +14,7 @@ from balancing.plots.polar import MARKERS
 from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -74,6 +74,16 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
     polar.set_title(f"Residual unbalance and tolerance, {v.labels.weight_unit}", fontsize="medium", pad=14)
     _legend(polar)
     return polar
+
+
+def trial_figure(found: Sequence[TrialWeight]) -> Figure:
+    """A new figure with `trial_arrow` of each."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.5 * len(found), 5.5), layout="constrained")
+    for k, one in enumerate(found, start=1):
+        trial_arrow(one, figure.add_subplot(1, len(found), k, projection="polar"))
+    return figure
 
 
 def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:

@@ -76,8 +76,14 @@ def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
     return wrapper
 
 
-def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: ANN401 - any options dataclass
+def provenance(
+    files: Iterable[Path],
+    options: Any,  # noqa: ANN401 - any options dataclass
+    **given: object,
+) -> dict[str, Any]:
     """Program version, input files with their hashes, date, and options that differ from their defaults.
+
+    What is `given` in place of files stands before the options.
 
     Raises
     ------
@@ -92,12 +98,14 @@ def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: 
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
-        "options": {
-            field.name: _plain(getattr(options, field.name))
-            for field in dataclasses.fields(options)
-            if getattr(options, field.name) != field.default
-        },
+        "options": {key: _plain(value) for key, value in (given | changed(options)).items()},
     }
+
+
+def changed(options: Any) -> dict[str, object]:  # noqa: ANN401 - any options dataclass
+    """Options that differ from their defaults."""
+    values = {field.name: getattr(options, field.name) for field in dataclasses.fields(options)}
+    return {f.name: values[f.name] for f in dataclasses.fields(options) if values[f.name] != f.default}
 
 
 def _plain(value: object) -> object:

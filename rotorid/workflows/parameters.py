@@ -43,6 +43,11 @@ def one_of(value: str, what: str, known: Sequence[str]) -> str:
     return value
 
 
+def option_name(field: str) -> str:
+    """As the command line writes it: "--first-hole"."""
+    return f"--{field.replace('_', '-')}"
+
+
 def number(text: str) -> float:
     """A finite number, or NaN for anything else."""
     try:
@@ -77,11 +82,11 @@ def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sens
     return found
 
 
-def degrees(text: str, what: str) -> float:
+def degrees(given: str | float, what: str) -> float:
     """An angle from −360 to 360 degrees."""
-    angle = number(text)
+    angle = number(given) if isinstance(given, str) else given
     if not -360 <= angle <= 360:
-        raise ValueError(f"{what}: {text.strip()!r} is no angle from -360 to 360 degrees")
+        raise ValueError(f"{what}: {str(given).strip()!r} is no angle from -360 to 360 degrees")
     return angle
 
 
@@ -101,6 +106,7 @@ def pairs(
     read: Callable[[str, str], _T],
     example: str,
     alone: Callable[[str], Mapping[str, _T]] | None = None,
+    sign: str = "=",
 ) -> dict[str, _T]:
     """Read "alpha12=1.3,U31=-0.3" as names with values.
 
@@ -115,7 +121,9 @@ def pairs(
     example
         How it is written.
     alone
-        What a part without "=" stands for; None: nothing.
+        What a part without `sign` stands for; None: nothing.
+    sign
+        Between name and value.
 
     Raises
     ------
@@ -127,10 +135,10 @@ def pairs(
     shown = given if isinstance(given, str) else ",".join(given)
     found: dict[str, _T] = {}
     for part in given.split(",") if isinstance(given, str) else given:
-        name, sign, text = (piece.strip() for piece in part.rpartition("="))
-        if not (name and sign) and (sign or not text or alone is None):
-            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME=VALUE; use {example}")
-        new = alone(text) if alone is not None and not sign else {name: read(name, text)}
+        name, found_sign, text = (piece.strip() for piece in part.rpartition(sign))
+        if not (name and found_sign) and (found_sign or not text or alone is None):
+            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}")
+        new = alone(text) if alone is not None and not found_sign else {name: read(name, text)}
         if twice := next((one for one in new if one in found), None):
             raise ValueError(f"{what} {shown!r}: {twice} stands twice")
         found |= new

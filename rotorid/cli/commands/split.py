@@ -2,40 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    JsonOption,
-    OutputOption,
-    PlotOption,
-    emit,
-)
-from rotorid.cli.output import check_targets
-
-_WAYS = ("--holes", "--two", "--drill", "--grind")
-_HOLES, _DRILL, _ROUND = ("--holes",), ("--drill",), ()
-_BELONGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(
-        (
-            "--first-hole",
-            "--pieces",
-            "--stock",
-            "--per-hole",
-            "--most-pieces",
-            "--good-enough",
-            "--taken",
-            "--max-mass",
-        ),
-        _HOLES,
-    ),
-    **dict.fromkeys(("--axial", "--depth", "--density", "--tip-angle", "--spacing"), _DRILL),
-    "--step": ("--holes", ""),
-    "--angle-step": ("",),
-}
-"""Options that mean something only with one of these ways ("": none of them, one weight)."""
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.workflows.split import SplitOptions
+from rotorid.workflows.split import split as work
 
 
 def split(
@@ -169,7 +143,7 @@ def split(
     ] = None,
     angles: Annotated[
         str, typer.Option(metavar="WAY", help='"with rotation" or "against rotation", of all angles.')
-    ] = "with rotation",
+    ] = SplitOptions.angles,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
@@ -182,103 +156,6 @@ def split(
 
     rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
-    from balancing.mounting.hand_mounting import combine, trim
-    from rotorid.cli.commands import split_answers as answers
-    from rotorid.cli.holes import read_holes
-    from rotorid.tables.reader.units import MASS
-    from rotorid.workflows.quantities import size, vectors
-
-    options: dict[str, object] = {
-        "--holes": holes,
-        "--first-hole": first_hole,
-        "--pieces": pieces,
-        "--stock": stock,
-        "--per-hole": per_hole,
-        "--most-pieces": most_pieces,
-        "--good-enough": good_enough,
-        "--taken": taken,
-        "--max-mass": max_mass,
-        "--step": step,
-        "--angle-step": angle_step,
-        "--mounted": mounted,
-        "--two": two,
-        "--drill": drill,
-        "--grind": grind or None,
-        "--radius": radius,
-        "--axial": axial or None,
-        "--depth": depth,
-        "--density": density,
-        "--tip-angle": tip_angle,
-        "--spacing": spacing,
-    }
+    options = chosen(SplitOptions, locals())
     check_targets(plot, output)
-    labels, weights = vectors(vector, angles)
-    single = len(weights) == 1 and mounted is None and step is None and angle_step is None
-    _check_options(options, single)
-    target = combine(weights)
-    if mounted is not None:
-        other, there = vectors(mounted, angles, "--mounted")
-        if (labels.weight_unit in MASS) != (other.weight_unit in MASS):
-            raise ValueError("--mounted: write it as VECTOR is written, both masses or both unbalances")
-        target = trim(target, there)
-    if target == 0 and any(options[way] is not None for way in _WAYS):
-        raise ValueError("there is nothing to mount: the weight is 0")
-    away = None if radius is None else size(radius, "--radius")
-    wanted = answers.Wanted(target, labels, away)
-    if holes is not None:
-        plane = read_holes(
-            labels,
-            away,
-            holes,
-            first_hole or 0.0,
-            pieces,
-            stock,
-            1 if per_hole is None else per_hole,
-            taken,
-            max_mass,
-            step,
-        )
-        answer = answers.on_holes(wanted, plane, most_pieces, good_enough or 0.0)
-    elif two is not None:
-        answer = answers.at_two_angles(wanted, two)
-    elif drill is not None:
-        answer = answers.drilled(
-            wanted,
-            drill,
-            axial,
-            depth,
-            7850.0 if density is None else density,
-            118.0 if tip_angle is None else tip_angle,
-            spacing,
-        )
-    elif grind:
-        answer = answers.ground(wanted)
-    else:
-        answer = answers.as_one(wanted, step, angle_step or 0.0)
-    emit(
-        answer.document,
-        answer.text,
-        as_json=json,
-        files=[],
-        options={"vector": vector, **{k.strip("-"): v for k, v in options.items()}, "angles": angles},
-        figure=(plot, answer.figure),
-        table=(output, answer.table),
-    )
-
-
-def _check_options(options: Mapping[str, object], single: bool) -> None:
-    """Exactly one way to mount the weight, and no option that means nothing with it."""
-    ways = [name for name in _WAYS if options[name] is not None]
-    if len(ways) > 1:
-        raise ValueError(f"{' and '.join(ways)} are different ways to mount a weight: give one of them")
-    if not ways and single:
-        raise ValueError(
-            "say how to mount the weight: --holes, --two, --drill or --grind "
-            "(or --step, to round it to a scale)"
-        )
-    way = ways[0] if ways else ""
-    for name, belongs in _BELONGS.items():
-        if options[name] is not None and way not in belongs:
-            needed = " or ".join(w for w in belongs if w)
-            how = f"only with {needed}" if needed else f"not with {way}"
-            raise ValueError(f"{name} means something {how}")
+    deliver("split", lambda: work(vector, options), as_json=json, plot=plot, output=output)

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    JsonOption,
-    OutputOption,
-    PlotOption,
-    emit,
-)
-from rotorid.cli.output import check_targets
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from balancing.iso21940 import Tolerance
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.workflows.tolerance import ToleranceOptions
+from rotorid.workflows.tolerance import tolerance as work
 
 
 def tolerance(
@@ -58,39 +50,6 @@ def tolerance(
     Example: rotorid tolerance --mass 500kg --speed 3000rpm --grade G2.5
     --planes left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm --plot tolerance.png
     """
-    from balancing.iso21940 import tolerance as permissible
-    from rotorid.workflows.quantities import length, positions, speed_with_unit, two_positions
-    from rotorid.workflows.quantities import mass as read_mass
-
+    options = chosen(ToleranceOptions, locals())
     check_targets(plot, output)
-    ends = None if bearings is None else two_positions(bearings)
-    found = permissible(
-        read_mass(mass, "--mass"),
-        speed_with_unit(speed, "--speed"),
-        grade,
-        planes=None if planes is None else positions(planes),
-        bearings=ends,
-        centre=None if centre is None else length(centre, "--centre", "350mm"),
-    )
-    emit(
-        found.to_dict(),
-        found.summary,
-        as_json=json,
-        files=[],
-        options={
-            "mass": mass,
-            "speed": speed,
-            "grade": grade,
-            "planes": planes,
-            "bearings": bearings,
-            "centre": centre,
-        },
-        figure=(plot, lambda: _figure(found)),
-        table=(output, found.to_frame),
-    )
-
-
-def _figure(found: Tolerance) -> Figure:
-    from balancing.plots.tolerances import polar_figure, tolerance_circles
-
-    return polar_figure(lambda ax: tolerance_circles(found, ax))
+    deliver("tolerance", lambda: work(options), as_json=json, plot=plot, output=output)

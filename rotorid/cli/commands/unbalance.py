@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    JsonOption,
-    OutputOption,
-    PlotOption,
-    emit,
-    picture,
-)
-from rotorid.cli.output import check_targets
-from rotorid.workflows.parameters import nodes as parse_nodes
-
-if TYPE_CHECKING:
-    from balancing.unbalance_result import Unbalance
-    from rotorid.tables import Job
-
-METHODS = ("minimum-norm", "ridge", "modal")
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.workflows.unbalance import METHODS, UnbalanceOptions
+from rotorid.workflows.unbalance import unbalance as work
 
 
 def unbalance(
@@ -35,7 +24,7 @@ def unbalance(
             metavar="METHOD",
             help=f"{', '.join(METHODS)}; minimum-norm is least squares where the readings suffice.",
         ),
-    ] = METHODS[0],
+    ] = UnbalanceOptions.method,
     modes: Annotated[
         int | None,
         typer.Option(min=1, metavar="K", help="Of the rotor, for modal: 1 … K.", show_default=False),
@@ -60,52 +49,6 @@ def unbalance(
 
     Example: rotorid unbalance sample_data/model_job/job.toml --stations 6,12,19
     """
-    from balancing.plots.unbalance_bars import unbalance_bars
-    from rotorid.tables import read_job
-
-    if method not in METHODS:
-        raise ValueError(f"--method {method!r} is not known: one of {', '.join(METHODS)}")
-    if (modes is not None) != (method == "modal"):
-        raise ValueError("--method modal and --modes K belong together")
-    if ridge is not None and method != "ridge":
-        raise ValueError("--ridge is an option of --method ridge")
+    options = chosen(UnbalanceOptions, locals())
     check_targets(plot, output)
-    read = read_job(job)
-    result = _estimate(read, stations, method, modes, ridge, model_error)
-    emit(
-        result.to_dict(),
-        result.summary,
-        as_json=json,
-        files=read.files,
-        options={
-            "stations": stations,
-            "method": method,
-            "modes": modes,
-            "ridge": ridge,
-            "model_error": model_error,
-        },
-        figure=(plot, picture(lambda ax: unbalance_bars(result, ax))),
-        table=(output, result.to_frame),
-    )
-
-
-def _estimate(
-    job: Job, stations: str, method: str, modes: int | None, ridge: float | None, model_error: float | None
-) -> Unbalance:
-    from balancing.coefficients.from_model import modal_shapes
-    from balancing.unbalance import unbalance_of_run
-    from rotorid.workflows.coefficients import computed
-
-    if job.rotor is None:
-        raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')
-    asked = parse_nodes(stations, "--stations")
-    places = {str(node): job.rotor.node(node) for node in asked}
-    if len(set(places.values())) < len(asked):
-        raise ValueError(f"--stations {stations!r}: every station may stand only once")
-    influence = computed(job, (model_error or 0.0), places)
-    shapes = modal_shapes(job.rotor, places, modes) if modes is not None else None
-    if method == "modal":
-        return unbalance_of_run(influence, job.trials, method="modal", shapes=shapes)
-    if method == "ridge":
-        return unbalance_of_run(influence, job.trials, method="ridge", ridge=ridge)
-    return unbalance_of_run(influence, job.trials)
+    deliver("unbalance", lambda: work(job, options), as_json=json, plot=plot, output=output)

@@ -8,9 +8,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rotorid.cli.commands import split_answers as answers
 from rotorid.cli.commands.split import split
 from rotorid.workflows.quantities import vectors
+from rotorid.workflows.split import SplitOptions
+from rotorid.workflows.split import split as work
 
 
 @pytest.fixture
@@ -190,7 +191,7 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --holes 4 --pieces 10g --most-pieces 0", "1 or more"),
         ("35g@120 --holes 4 --pieces 10g --good-enough -1", "no error from 0 to 100"),
         ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),
-        ("35g@120 --holes 4 --taken 1:10g,1:3g", "listed twice"),
+        ("35g@120 --holes 4 --taken 1:10g,1:3g", "1 stands twice"),
         ("35g@120 --holes 2 --taken 1:3g,2:3g", "nothing can be mounted"),
         ("35g@120 --holes 0,10 --taken 1:3g --max-mass 1g", "no admissible weight at all"),
         ("35g@120 --drill 8mm --radius 0mm", "expected a value above 0"),
@@ -247,16 +248,16 @@ def test_what_the_picture_shows_makes_what_is_wanted(monkeypatch, unit):
 
     monkeypatch.setattr(discs, "disc", disc)
     size = 35 if unit == "g" else 3500
-    labels, (target,) = vectors(f"{size}{unit}@120", "with rotation")
-    wanted = answers.Wanted(target, labels, 0.1)
+    _, (target,) = vectors(f"{size}{unit}@120", "with rotation")
     two = "20g,30g" if unit == "g" else "2000g_mm,3000g_mm"
-    made = {
-        "two": answers.at_two_angles(wanted, two),
-        "drilled": answers.drilled(wanted, "8mm", False, "12mm", 7800.0, 118.0, None),
-        "ground": answers.ground(wanted),
-        "one": answers.as_one(wanted, None, 0.0),
+    options = {
+        "two": SplitOptions(two=two),
+        "drilled": SplitOptions(drill="8mm", depth="12mm", density=7800.0, radius="100mm"),
+        "ground": SplitOptions(grind=True, radius="100mm"),
+        "one": SplitOptions(step="1mg" if unit == "g" else "1mg_mm"),
     }
-    figures = {name: answer.figure() for name, answer in made.items()}
+    made = {name: work(f"{size}{unit}@120", chosen) for name, chosen in options.items()}
+    figures = {name: found.figure() for name, found in made.items()}
     assert [plane for plane, _ in drawn] == ["solution 1", "solution 2", "weight", "weight", "weight"]
     assert [options["remove"] for _, options in drawn] == [False, False, True, True, False]
     for _, options in drawn:
@@ -286,8 +287,9 @@ def test_no_weight_is_rounded_by_more_than_the_largest_possible_error(step, angl
     worst = 0.0
     for size in np.linspace(20.0, 24.0, 9):
         for angle in np.linspace(0.0, 30.0, 13):
-            labels, (target,) = vectors(f"{size:.10g}g@{angle:.10g}", "with rotation")
-            document = answers.as_one(answers.Wanted(target, labels, None), step, angle_step).document
+            _, (target,) = vectors(f"{size:.10g}g@{angle:.10g}", "with rotation")
+            options = SplitOptions(step=step, angle_step=angle_step)
+            document = work(f"{size:.10g}g@{angle:.10g}", options).document
             error = vector([document["weight"]]) - 1e3 * target
             assert document["error"]["mass"] == pytest.approx(abs(error), abs=1e-9)
             assert document["relative_error"] == pytest.approx(abs(error) / size, abs=1e-9)

@@ -1,0 +1,89 @@
+"""`tolerance`: permissible residual unbalance of a rigid rotor (ISO 21940-11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rotorid.workflows.outcome import Outcome, provenance, workflow
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from balancing.iso21940 import Tolerance
+    from rotorid.workflows.quantities import Amount, Positions
+
+
+@dataclass(frozen=True)
+class ToleranceOptions:
+    """Options of `tolerance`.
+
+    Attributes
+    ----------
+    mass, speed
+        Of the rotor, and its highest service speed.
+    grade
+        Balance quality grade, "G0.4" to "G4000", or mm/s.
+    planes
+        One or two correction planes, with positions along the shaft or without.
+    bearings
+        Positions of both bearings; None: the planes are the tolerance planes.
+    centre
+        Position of the centre of mass.
+    """
+
+    mass: Amount
+    speed: Amount
+    grade: str | float
+    planes: Positions | None = None
+    bearings: str | tuple[float, float] | None = None
+    centre: Amount | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PermissibleUnbalance(Outcome):
+    """The tolerance of a rotor and of its planes."""
+
+    tolerance: Tolerance
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return self.tolerance.to_dict()
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return self.tolerance.summary()
+
+    def to_frame(self) -> pd.DataFrame:
+        """The rotor, its bearings and planes."""
+        return self.tolerance.to_frame()
+
+    def figure(self) -> Figure:
+        """Tolerance circles."""
+        from balancing.plots.tolerances import polar_figure, tolerance_circles
+
+        return polar_figure(lambda ax: tolerance_circles(self.tolerance, ax))
+
+
+@workflow
+def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
+    """Compute the permissible residual unbalance of a rigid rotor, and the share of each plane.
+
+    Raises
+    ------
+    ValueError
+        For an option that cannot be.
+    """
+    from balancing.iso21940 import tolerance as permissible
+    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+
+    found = permissible(
+        mass(options.mass, "--mass"),
+        speed_with_unit(options.speed, "--speed"),
+        options.grade,
+        planes=None if options.planes is None else positions(options.planes),
+        bearings=None if options.bearings is None else two_positions(options.bearings),
+        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
+    )
+    return PermissibleUnbalance(tolerance=found, provenance=provenance((), options))
