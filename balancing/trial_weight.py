@@ -56,7 +56,8 @@ def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int
     """
     if rotor_mass is not None and bearing_load is not None:
         raise ValueError(
-            "the mass of the rotor and the load of the bearing are two ways to the same load: choose one of them"
+            "the mass of the rotor and the load of the bearing are two ways to the same load: "
+            "choose one of them"
         )
     positive("number of planes", planes)
     if rotor_mass is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, radians
 from pathlib import Path
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from balancing.trial_angle import Lag, Quantity
     from balancing.trial_result import TrialWeight
     from rotorid.tables import Job
-    from rotorid.workflows.quantities import Amount, Weights
+    from rotorid.workflows.quantities import Amount
 
 MEASURES = ("displacement", "velocity", "acceleration")
 _WITH_JOB = ("plane", "mass", "share")
@@ -87,7 +88,7 @@ class TrialWeightOptions:
     share: float = 40.0
     plane: Names | None = None
     mass: Amount | None = None
-    max_mass: Weights | None = None
+    max_mass: Amount | None = None
     reading_phase: float | None = None
     lag: str | float | None = None
     critical: Amount | None = None
@@ -134,7 +135,7 @@ class TrialWeights(Outcome):
 def trial_weight(
     job: Job | Path | str | None = None, options: TrialWeightOptions | None = None
 ) -> TrialWeights:
-    """Propose a first trial weight: amount from the load or the sensitivity, angle opposite to the heavy spot.
+    """Propose a first trial weight: amount from load or sensitivity, angle opposite to the heavy spot.
 
     Parameters
     ----------
@@ -159,24 +160,26 @@ def trial_weight(
         None if load is None else quantity(load, "--bearing-load", FORCE, "2500N"),
         options.carried_by,
     )
-    given = changed(options)
-    needless, why = _WITH_JOB, "needs a job with coefficients"
-    if job is not None:
-        needless = _WITHOUT_JOB
-        why = "is for a trial weight without a job, which has phases, speeds and coefficients"
-    for name in needless:
-        if name in given:
-            raise ValueError(f"{option_name(name)} {why}")
+    files: Sequence[Path] = ()
     if job is None:
-        found, files = [_from_force(options, carried)], ()
+        _refuse(options, _WITH_JOB, "needs a job with coefficients")
+        found = [_from_force(options, carried)]
     else:
+        why = "is for a trial weight without a job, which has phases, speeds and coefficients"
+        _refuse(options, _WITHOUT_JOB, why)
         read = job_source(job, options.phase, options.angles)
-        found, files = _from_job(read, options, carried), tuple(read.files)
+        found, files = _from_job(read, options, carried), read.files
     first = found[0]
     for name, value in {"force_N": first.force, "load_N": first.load}.items():
         if value is not None:
             log.info("%s = %.6g", name, value)
     return TrialWeights(weights=tuple(found), provenance=provenance(files, options))
+
+
+def _refuse(options: TrialWeightOptions, needless: Sequence[str], why: str) -> None:
+    for name in changed(options):
+        if name in needless:
+            raise ValueError(f"{option_name(name)} {why}")
 
 
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
@@ -195,7 +198,6 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     known = Conventions(as_phase(options.phase or "lead"), as_angles(options.angles or "with rotation"))
     shown = units.one_of(units.MASS)(options.unit)
     speed, phase, most = speed_with_unit(options.speed, "--speed"), options.reading_phase, options.max_mass
-    assert not isinstance(most, dict)
     return trial_from_force(
         "1",
         speed,
@@ -272,7 +274,7 @@ def _lag(options: TrialWeightOptions, speed: float) -> Lag | None:
     if lag is None:
         return None
     if lag in ("below", "at", "above"):
-        return expected_lag(lag)
+        return expected_lag(str(lag))
     angle = number(str(lag))
     if not 0 <= angle <= 360:
         raise ValueError(f"--lag {lag!r}: below, at or above, or degrees from 0 to 360, are needed")
