@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,6 +18,28 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def options_of(kind: type) -> Callable[..., object]:
+    """Make the options of a command: their help is the documentation of its dataclass, field by field.
+
+    What is given back takes the name of a field, its metavar, names in place of its own, and the least value.
+    """
+    texts: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(kind) or "").partition("----------\n")[2].splitlines():
+        if line.startswith(" "):
+            texts |= {name: f"{texts.get(name, '')} {line.strip()}".strip() for name in names}
+        elif line:
+            names = line.split(", ")
+    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+
+    def option(field: str, metavar: str | None = None, *names: str, least: float | None = None) -> object:
+        shown = defaults[field] is not None
+        return typer.Option(*names, metavar=metavar, help=texts.get(field), show_default=shown, min=least)
+
+    return option
+
 
 JsonOption = Annotated[
     bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")

@@ -25,21 +25,11 @@ if TYPE_CHECKING:
     Mount = Callable[[complex, Labels, float | None, "SplitOptions"], Found]
 
 _WAYS = ("holes", "two", "drill", "grind")
+_HOLES = ("first_hole", "pieces", "stock", "per_hole", "most_pieces", "good_enough", "taken", "max_mass")
+_DRILL = ("axial", "depth", "density", "tip_angle", "spacing")
 _BELONGS: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(
-        (
-            "first_hole",
-            "pieces",
-            "stock",
-            "per_hole",
-            "most_pieces",
-            "good_enough",
-            "taken",
-            "max_mass",
-        ),
-        ("holes",),
-    ),
-    **dict.fromkeys(("axial", "depth", "density", "tip_angle", "spacing"), ("drill",)),
+    **dict.fromkeys(_HOLES, ("holes",)),
+    **dict.fromkeys(_DRILL, ("drill",)),
     "step": ("holes", ""),
     "angle_step": ("",),
 }
@@ -50,26 +40,26 @@ _APART = 1e-3
 
 @dataclass(frozen=True)
 class SplitOptions:
-    """Options of `split`; angles are in degrees.
+    """Options of `split`: angles in degrees, `good_enough` in percent, `density` in kg/m³.
 
     Attributes
     ----------
     holes
-        How many equally spaced holes, or their angles, ascending.
+        Number of equally spaced holes, or their angles, ascending.
     first_hole
-        Angle of hole 1 of equally spaced ones.
+        Angle of hole 1 of equally spaced ones; default: 0.
     pieces
-        Available pieces, "10g,20g"; without them amounts are free.
+        Available pieces; without them amounts are free.
     stock
         How many there are of each of the pieces.
     per_hole
-        Pieces in one hole, at most; None: 1.
+        Pieces in one hole, at most; default: 1.
     most_pieces
         Pieces altogether, at most.
     good_enough
-        Percent: fewest pieces whose error is not larger.
+        Fewest pieces whose error is not larger.
     taken
-        Holes in which something is mounted already, "3:10g,7:20g".
+        Holes in which something is mounted already, such as 3:10g,7:20g.
     max_mass
         Largest weight of the plane, as a vector sum.
     step
@@ -77,27 +67,27 @@ class SplitOptions:
     angle_step
         Step of the angle for one weight.
     mounted
-        What is mounted already and counts towards the weight.
+        What is mounted already and counts towards VECTOR, such as 10g@30+20g@200 (trim).
     two
-        Two fixed weights, whose angles are wanted, instead of holes.
+        Angles of two fixed weights instead of holes.
     drill
-        Diameter of a drill that takes material away opposite to the weight instead.
+        Drill material away opposite to VECTOR instead, such as 8mm.
     grind
-        Grind it off there instead.
+        Grind it off opposite to VECTOR instead.
     radius
         Where the masses stand; from where radial holes are drilled, or where axial ones are.
     axial
-        Drill along the rotor's axis, not towards it.
+        Drill along the rotor's axis or towards it.
     depth
-        Largest depth of the full diameter.
+        Largest depth of the full diameter, such as 20mm.
     density
-        Of the material drilled, kg/m³; None: 7850.
+        Of the material drilled; default: 7850.
     tip_angle
-        Of the drill; 180 for a flat one; None: 118.
+        Of the drill; 180 for a flat one; default: 118.
     spacing
-        Between holes in a row, where one would be too deep; None: 1.5 diameters.
+        Between holes in a row, where one would be too deep; default: 1.5 diameters.
     angles
-        How all angles count, "with rotation" or "against rotation".
+        "with rotation" or "against rotation", of all angles.
     """
 
     holes: str | int | Sequence[float] | None = None

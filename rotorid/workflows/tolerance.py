@@ -21,16 +21,18 @@ class ToleranceOptions:
 
     Attributes
     ----------
-    mass, speed
-        Of the rotor, and its highest service speed.
+    mass
+        Of the rotor, such as 500kg.
+    speed
+        Highest service speed, such as 3000rpm.
     grade
-        Balance quality grade, "G0.4" to "G4000", or mm/s.
+        Balance quality grade, G0.4 to G4000.
     planes
-        One or two correction planes, with positions along the shaft or without.
+        One or two correction planes, with positions along the shaft or without: left=100mm,right=600mm.
     bearings
-        Positions of both bearings; None: the planes are the tolerance planes.
+        Positions of both bearings, 0mm,700mm; default: the planes are the tolerance planes.
     centre
-        Position of the centre of mass.
+        Of the centre of mass, such as 350mm.
     """
 
     mass: Amount

@@ -23,60 +23,54 @@ if TYPE_CHECKING:
 
 MEASURES = ("displacement", "velocity", "acceleration")
 _WITH_JOB = ("plane", "mass", "share")
-_WITHOUT_JOB = (
-    "reading_phase",
-    "lag",
-    "critical",
-    "speed",
-    "fraction",
-    "damping",
-    "sensor_angle",
-    "key_phasor",
-    "measures",
-    "unit",
-)
+_ANGLE = ("reading_phase", "lag", "critical", "damping", "sensor_angle", "key_phasor", "measures")
+_WITHOUT_JOB = (*_ANGLE, "speed", "fraction", "unit")
 
 
 @dataclass(frozen=True)
 class TrialWeightOptions:
-    """Options of `trial_weight`; angles are in degrees.
+    """Options of `trial_weight`: angles in degrees, `fraction` and `share` in percent.
 
     Attributes
     ----------
-    rotor_mass, bearing_load
-        Of the rotor; or carried at the plane, N.
+    rotor_mass
+        Of the rotor, such as 500kg.
+    bearing_load
+        Carried at the plane, such as 2500N.
     carried_by
         Planes that share the mass of the rotor.
     speed
-        Of the machine, without a job.
+        Such as 3000rpm.
     radius
-        Where the weight goes.
+        Where the weight goes, 200mm.
     fraction
-        Force of the weight, percent of the load, without a job.
+        Force of the weight, of the load (without a job).
     share
-        Change, percent of the largest reading, with a job.
+        Change, of the largest reading (with a job).
     plane
-        Planes of the job; None: all that it uses.
+        Planes of the job; default: all of them.
     mass
-        Try this weight, with a job.
+        Try this weight, with a job: what would it do?
     max_mass
-        Largest weight of the plane.
+        Largest weight of the plane, 30g.
     reading_phase
-        Of the largest initial reading, without a job.
+        Of the largest initial reading, no job.
     lag
-        "below", "at" or "above" the critical speed, or the lag.
+        Speed against the critical one, or the lag.
     critical
-        Critical speed, in place of the lag.
+        Critical speed, in place of --lag: 2400rpm.
     damping
         Damping ratio at the critical speed.
-    sensor_angle, key_phasor
-        Where they are, without a job.
+    sensor_angle
+        Where the sensor is (without a job).
+    key_phasor
+        Where the key phasor is (without a job).
     measures
-        What the sensor measures, one of `MEASURES`, without a job.
+        displacement, velocity, acceleration (without a job).
     phase, angles
         What a positive phase means, and how angles count.
     unit
-        Of the result, without a job.
+        Of the result without a job: g, oz, kg, mg or lb.
     """
 
     rotor_mass: Amount | None = None

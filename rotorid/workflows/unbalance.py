@@ -23,20 +23,20 @@ METHODS = ("minimum-norm", "ridge", "modal")
 
 @dataclass(frozen=True)
 class UnbalanceOptions:
-    """Options of `unbalance`.
+    """Options of `unbalance`; `model_error` in percent.
 
     Attributes
     ----------
     stations
-        Nodes or stations where unbalance may be.
+        Nodes or stations where unbalance may be: 6,9,12.
     method
-        One of `METHODS`; minimum-norm is least squares where the readings suffice.
+        minimum-norm, ridge, modal; minimum-norm is least squares where the readings suffice.
     modes
-        Of the rotor, for modal: 1 … this one.
+        Of the rotor, for modal: 1 … K.
     ridge
-        For ridge; None: from the errors.
+        For ridge; default: from the errors.
     model_error
-        Standard deviation of the coefficients, percent.
+        Standard deviation of the coefficients.
     """
 
     stations: Nodes

@@ -4,39 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.tolerance import ToleranceOptions
 from rotorid.workflows.tolerance import tolerance as work
 
+say = options_of(ToleranceOptions)
+
 
 def tolerance(
-    mass: Annotated[str, typer.Option(metavar="MASS", help="Of the rotor, such as 500kg.")],
-    speed: Annotated[str, typer.Option(metavar="SPEED", help="Highest service speed, such as 3000rpm.")],
-    grade: Annotated[str, typer.Option(metavar="GRADE", help="Balance quality grade, G0.4 to G4000.")],
-    planes: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LIST",
-            help="One or two correction planes, with positions along the shaft or without: "
-            "left=100mm,right=600mm.",
-            show_default=False,
-        ),
-    ] = None,
-    bearings: Annotated[
-        str | None,
-        typer.Option(
-            metavar="A,B",
-            help="Positions of both bearings, 0mm,700mm; default: the planes are the tolerance planes.",
-            show_default=False,
-        ),
-    ] = None,
-    centre: Annotated[
-        str | None,
-        typer.Option(metavar="POSITION", help="Of the centre of mass, such as 350mm.", show_default=False),
-    ] = None,
+    mass: Annotated[str, say("mass", "MASS")],
+    speed: Annotated[str, say("speed", "SPEED")],
+    grade: Annotated[str, say("grade", "GRADE")],
+    planes: Annotated[str | None, say("planes", "LIST")] = None,
+    bearings: Annotated[str | None, say("bearings", "A,B")] = None,
+    centre: Annotated[str | None, say("centre", "POSITION")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

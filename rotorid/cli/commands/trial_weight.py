@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import AnglesOption, JsonOption, OutputOption, PhaseOption, PlotOption
+from rotorid.cli.common import AnglesOption, JsonOption, OutputOption, PhaseOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.trial_weight import MEASURES, TrialWeightOptions
+from rotorid.workflows.trial_weight import TrialWeightOptions
 from rotorid.workflows.trial_weight import trial_weight as work
+
+say = options_of(TrialWeightOptions)
 
 
 def trial_weight(
@@ -22,75 +24,26 @@ def trial_weight(
             show_default=False,
         ),
     ] = None,
-    rotor_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="Of the rotor, such as 500kg.", show_default=False)
-    ] = None,
-    bearing_load: Annotated[
-        str | None,
-        typer.Option(metavar="FORCE", help="Carried at the plane, such as 2500N.", show_default=False),
-    ] = None,
-    carried_by: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Planes that share the mass of the rotor.")
-    ] = TrialWeightOptions.carried_by,
-    speed: Annotated[
-        str | None, typer.Option(metavar="SPEED", help="Such as 3000rpm.", show_default=False)
-    ] = None,
-    radius: Annotated[
-        str | None, typer.Option(metavar="RADIUS", help="Where the weight goes, 200mm.", show_default=False)
-    ] = None,
-    fraction: Annotated[
-        float, typer.Option(metavar="PERCENT", help="Force of the weight, of the load (without a job).")
-    ] = TrialWeightOptions.fraction,
-    share: Annotated[
-        float, typer.Option(metavar="PERCENT", help="Change, of the largest reading (with a job).")
-    ] = TrialWeightOptions.share,
-    plane: Annotated[
-        str | None,
-        typer.Option(metavar="LIST", help="Planes of the job; default: all of them.", show_default=False),
-    ] = None,
-    mass: Annotated[
-        str | None,
-        typer.Option(
-            metavar="MASS", help="Try this weight, with a job: what would it do?", show_default=False
-        ),
-    ] = None,
-    max_mass: Annotated[
-        str | None,
-        typer.Option(metavar="MASS", help="Largest weight of the plane, 30g.", show_default=False),
-    ] = None,
-    reading_phase: Annotated[
-        float | None,
-        typer.Option(metavar="DEGREES", help="Of the largest initial reading, no job.", show_default=False),
-    ] = None,
-    lag: Annotated[
-        str | None,
-        typer.Option(
-            metavar="below|at|above|DEGREES",
-            help="Speed against the critical one, or the lag.",
-            show_default=False,
-        ),
-    ] = None,
-    critical: Annotated[
-        str | None,
-        typer.Option(metavar="SPEED", help="Critical speed, in place of --lag: 2400rpm.", show_default=False),
-    ] = None,
-    damping: Annotated[
-        float, typer.Option(metavar="RATIO", help="Damping ratio at the critical speed.")
-    ] = TrialWeightOptions.damping,
-    sensor_angle: Annotated[
-        float, typer.Option(metavar="DEGREES", help="Where the sensor is (without a job).")
-    ] = TrialWeightOptions.sensor_angle,
-    key_phasor: Annotated[
-        float, typer.Option(metavar="DEGREES", help="Where the key phasor is (without a job).")
-    ] = TrialWeightOptions.key_phasor,
-    measures: Annotated[
-        str, typer.Option(metavar="QUANTITY", help=f"{', '.join(MEASURES)} (without a job).")
-    ] = TrialWeightOptions.measures,
+    rotor_mass: Annotated[str | None, say("rotor_mass", "MASS")] = None,
+    bearing_load: Annotated[str | None, say("bearing_load", "FORCE")] = None,
+    carried_by: Annotated[int, say("carried_by", "N", least=1)] = TrialWeightOptions.carried_by,
+    speed: Annotated[str | None, say("speed", "SPEED")] = None,
+    radius: Annotated[str | None, say("radius", "RADIUS")] = None,
+    fraction: Annotated[float, say("fraction", "PERCENT")] = TrialWeightOptions.fraction,
+    share: Annotated[float, say("share", "PERCENT")] = TrialWeightOptions.share,
+    plane: Annotated[str | None, say("plane", "LIST")] = None,
+    mass: Annotated[str | None, say("mass", "MASS")] = None,
+    max_mass: Annotated[str | None, say("max_mass", "MASS")] = None,
+    reading_phase: Annotated[float | None, say("reading_phase", "DEGREES")] = None,
+    lag: Annotated[str | None, say("lag", "below|at|above|DEGREES")] = None,
+    critical: Annotated[str | None, say("critical", "SPEED")] = None,
+    damping: Annotated[float, say("damping", "RATIO")] = TrialWeightOptions.damping,
+    sensor_angle: Annotated[float, say("sensor_angle", "DEGREES")] = TrialWeightOptions.sensor_angle,
+    key_phasor: Annotated[float, say("key_phasor", "DEGREES")] = TrialWeightOptions.key_phasor,
+    measures: Annotated[str, say("measures", "QUANTITY")] = TrialWeightOptions.measures,
     phase: PhaseOption = None,
     angles: AnglesOption = None,
-    unit: Annotated[
-        str, typer.Option(metavar="UNIT", help="Of the result without a job: g, oz, kg, mg or lb.")
-    ] = TrialWeightOptions.unit,
+    unit: Annotated[str, say("unit", "UNIT")] = TrialWeightOptions.unit,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

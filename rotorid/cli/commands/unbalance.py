@@ -7,40 +7,23 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.unbalance import METHODS, UnbalanceOptions
+from rotorid.workflows.unbalance import UnbalanceOptions
 from rotorid.workflows.unbalance import unbalance as work
+
+say = options_of(UnbalanceOptions)
 
 
 def unbalance(
     job: Annotated[
         Path, typer.Argument(metavar="JOB.toml", help="Job with a rotor and the place of every sensor in it.")
     ],
-    stations: Annotated[str, typer.Option(help="Nodes or stations where unbalance may be: 6,9,12.")],
-    method: Annotated[
-        str,
-        typer.Option(
-            metavar="METHOD",
-            help=f"{', '.join(METHODS)}; minimum-norm is least squares where the readings suffice.",
-        ),
-    ] = UnbalanceOptions.method,
-    modes: Annotated[
-        int | None,
-        typer.Option(min=1, metavar="K", help="Of the rotor, for modal: 1 … K.", show_default=False),
-    ] = None,
-    ridge: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, metavar="STRENGTH", help="For ridge; default: from the errors.", show_default=False
-        ),
-    ] = None,
-    model_error: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, metavar="PERCENT", help="Standard deviation of the coefficients.", show_default=False
-        ),
-    ] = None,
+    stations: Annotated[str, say("stations")],
+    method: Annotated[str, say("method", "METHOD")] = UnbalanceOptions.method,
+    modes: Annotated[int | None, say("modes", "K", least=1)] = None,
+    ridge: Annotated[float | None, say("ridge", "STRENGTH", least=0.0)] = None,
+    model_error: Annotated[float | None, say("model_error", "PERCENT", least=0.0)] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,
