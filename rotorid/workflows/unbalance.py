@@ -66,9 +66,10 @@ class UnbalanceAtStations(Outcome):
 
     def figure(self) -> Figure:
         """The size of the unbalance at each station."""
+        from balancing.plots.unbalance_bars import unbalance_bars
         from rotorid.base.style import on_figure
 
-        return on_figure(self.found.plot)
+        return on_figure(lambda ax: unbalance_bars(self.found, ax))
 
 
 @workflow
