@@ -63,6 +63,33 @@ class Outcome(ABC):
         return {**self.to_dict(), "provenance": dict(self.provenance)}
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Outcome):
+    """One result of the library as it is; subclasses say which."""
+
+    found: Any
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return dict(self.found.to_dict())
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return str(self.found.summary())
+
+    def to_frame(self) -> pd.DataFrame:
+        """Its table."""
+        frame: pd.DataFrame = self.found.to_frame()
+        return frame
+
+    def figure(self) -> Figure:
+        """Its picture."""
+        from rotorid.base.style import on_figure
+        from rotorid.plots import plot
+
+        return on_figure(lambda ax: plot(self.found, ax))
+
+
 def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """While it works each file is read once, so that its hash is that of what was read."""
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.outcome import Found, provenance, workflow
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from balancing.iso21940 import Tolerance
@@ -44,28 +43,16 @@ class ToleranceOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PermissibleUnbalance(Outcome):
+class PermissibleUnbalance(Found):
     """The tolerance of a rotor and of its planes."""
 
-    tolerance: Tolerance
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return self.tolerance.to_dict()
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.tolerance.summary()
-
-    def to_frame(self) -> pd.DataFrame:
-        """The rotor, its bearings and planes."""
-        return self.tolerance.to_frame()
+    found: Tolerance
 
     def figure(self) -> Figure:
         """Tolerance circles."""
         from balancing.plots.tolerances import polar_figure, tolerance_circles
 
-        return polar_figure(lambda ax: tolerance_circles(self.tolerance, ax))
+        return polar_figure(lambda ax: tolerance_circles(self.found, ax))
 
 
 @workflow
@@ -88,4 +75,4 @@ def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
         bearings=None if options.bearings is None else two_positions(options.bearings),
         centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
     )
-    return PermissibleUnbalance(tolerance=found, provenance=provenance((), options))
+    return PermissibleUnbalance(found=found, provenance=provenance((), options))

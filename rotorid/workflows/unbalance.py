@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.outcome import Found, provenance, workflow
 from rotorid.workflows.parameters import Nodes, nodes, one_of
 from rotorid.workflows.sources import job_source
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from balancing.unbalance import Method
     from balancing.unbalance_result import Unbalance
     from rotorid.tables import Job
@@ -47,29 +44,10 @@ class UnbalanceOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class UnbalanceAtStations(Outcome):
+class UnbalanceAtStations(Found):
     """The unbalance that explains the readings."""
 
     found: Unbalance
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return self.found.to_dict()
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.found.summary()
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per station."""
-        return self.found.to_frame()
-
-    def figure(self) -> Figure:
-        """The size of the unbalance at each station."""
-        from balancing.plots.unbalance_bars import unbalance_bars
-        from rotorid.base.style import on_figure
-
-        return on_figure(lambda ax: unbalance_bars(self.found, ax))
 
 
 @workflow
