@@ -131,8 +131,13 @@ def provenance(
 
 def changed(options: Any) -> dict[str, object]:  # noqa: ANN401 - any options dataclass
     """Options that differ from their defaults."""
-    values = {field.name: getattr(options, field.name) for field in dataclasses.fields(options)}
-    return {f.name: values[f.name] for f in dataclasses.fields(options) if values[f.name] != f.default}
+    found = {}
+    for field in dataclasses.fields(options):
+        value = getattr(options, field.name)
+        same = value == field.default
+        if hasattr(same, "__len__") or not same:  # an array is no default
+            found[field.name] = value
+    return found
 
 
 def _plain(value: object) -> object:

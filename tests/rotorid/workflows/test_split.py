@@ -3,12 +3,20 @@
 import cmath
 import math
 
+import numpy as np
 import pytest
 from documents import same
 
 from rotorid.workflows.split import SplitOptions, split
 
 WEIGHT = cmath.rect(0.035, math.radians(120))
+
+
+def test_arrays_are_lists():
+    listed = split(WEIGHT, SplitOptions(holes=[0.0, 90.0, 200.0], pieces=[0.01, 0.02]))
+    arrays = split(WEIGHT, SplitOptions(holes=np.array([0.0, 90.0, 200.0]), pieces=np.array([0.01, 0.02])))
+    assert arrays.document["provenance"]["options"] == listed.document["provenance"]["options"]
+    same(arrays.document, listed.document)
 
 
 @pytest.mark.parametrize(
