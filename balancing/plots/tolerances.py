@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from balancing.plots.polar import MARKERS
+from balancing.plots.polar import MARKERS, corrections
 from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
+    from balancing.correction.correction_result import Correction
     from balancing.correction.verdict import Verdict
     from balancing.iso21940 import Tolerance
     from balancing.trial_result import TrialWeight
@@ -33,6 +34,16 @@ def polar_figure(draw: Callable[[Axes], object]) -> Figure:
 
     figure = Figure(figsize=(5, 6), layout="constrained")
     draw(figure.add_subplot(projection="polar"))
+    return figure
+
+
+def overview(c: Correction, v: Verdict) -> Figure:
+    """A new figure: corrections, and residual unbalance inside or outside its tolerance circles."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 7.5), layout="constrained")
+    corrections(c, figure.add_subplot(1, 2, 1, projection="polar"))
+    residuals(v, figure.add_subplot(1, 2, 2, projection="polar"))
     return figure
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict
-from warnings import catch_warnings
+from typing import Annotated
 
 import typer
 
@@ -18,36 +18,14 @@ from rotorid.cli.common import (
     PlotOption,
     ReportOption,
     RunErrorOption,
-    emit,
 )
-from rotorid.cli.output import (
-    check_inputs,
-    check_targets,
-)
+from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.workflows.balance import BalanceOptions
+from rotorid.workflows.balance import balance as work
 from rotorid.workflows.coefficients import KINDS, MODEL_ERROR
-from rotorid.workflows.parameters import (
-    names,
-    speeds,
-)
-
-if TYPE_CHECKING:
-    from balancing import Correction, Influence, Trials
-    from rotorid.tables import Job
-
-METHODS = ("least-squares", "weighted", "minmax")
 
 
-class Overrides(TypedDict):
-    """What the command line says in place of the job file."""
-
-    phase: str | None
-    angles: str | None
-    amplitude_error_percent: float | None
-    phase_error_deg: float | None
-    run_error_percent: float | None
-
-
-def balance(  # noqa: PLR0915
+def balance(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -94,10 +72,9 @@ def balance(  # noqa: PLR0915
     planes: Annotated[
         str | None, typer.Option(metavar="LIST", help="Use these planes only.", show_default=False)
     ] = None,
-    speed: Annotated[
+    speeds: Annotated[
         str | None,
         typer.Option(
-            "--speeds",
             metavar="LIST",
             help="Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.",
             show_default=False,
@@ -141,7 +118,7 @@ def balance(  # noqa: PLR0915
     ] = False,
     split_seconds: Annotated[
         float, typer.Option(metavar="SECONDS", min=0.1, help="For the proof that no choice is better.")
-    ] = 5.0,
+    ] = BalanceOptions.split_seconds,
     refine: Annotated[
         bool,
         typer.Option(
@@ -212,179 +189,50 @@ def balance(  # noqa: PLR0915
     Example: rotorid balance --template job.xlsx, and when it is filled in: rotorid balance job.xlsx --output
     sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
     """
-    from balancing import correct
-    from balancing.correction.check import compare_check
-    from balancing.correction.subsets import compare_planes
-    from balancing.mounting.mounted import mount
-    from rotorid.cli.commands.balance_report import Report
-    from rotorid.cli.commands.balance_workbook import as_workbook, workbook, write_template
-    from rotorid.cli.commands.verdict import Places, judge, tolerance_of
-    from rotorid.cli.other_readings import ask_runs, with_contradiction, with_other_readings
-    from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.source import JobSource
-    from rotorid.tables.runs.influence_table import influence_bytes
-    from rotorid.workflows.coefficients import choose, used_planes
-    from rotorid.workflows.quantities import largest_amplitudes, largest_weights, limited
-
+    options = chosen(BalanceOptions, locals())
     if template is not None:
-        write_template(template, files)
+        _write_template(template, files or ())
         return
     if not files:
         raise ValueError(
             "give a job (.toml, .xlsx) or a runs table and a weights table; --template writes a form"
         )
-    _check_options(method, coefficients, ridge, truncate)
-    if split and (ridge is not None or truncate is not None):
-        raise ValueError(
-            "--split takes the planes as they are, and would undo --ridge and --truncate: use fewer planes "
-            "(--planes, --best-planes) instead"
-        )
     check_targets(plot, output, save_influence, report=sheet)
-    targets = [path for path in (plot, output, save_influence, sheet) if path is not None]
-    check_inputs(targets, [*files, *([influence] if influence is not None else [])])
-    settings: Overrides = {
-        "phase": phase,
-        "angles": angles,
-        "amplitude_error_percent": amplitude_error,
-        "phase_error_deg": phase_error,
-        "run_error_percent": run_error,
-    }
-    is_job = len(files) == 1 and influence is None and files[0].suffix.lower() in (".toml", ".xlsx")
-
-    def read(said: Overrides) -> Job:
-        job = read_job(files[0], **said) if is_job else job_from_files(files, influence=influence, **said)
-        return limited(job, max_mass, limit or [])
-
-    job = with_contradiction(read(settings))
-    influence_found, baseline = choose(job, coefficients, model_error, refined=refine)
-    used = None if speed is None else speeds(speed, job.trials.labels.speed_unit)
-    candidates = names(planes) or used_planes(job, influence_found)
-    subsets = None
-    if best_planes is not None:
-        subsets = compare_planes(
-            influence_found,
-            baseline,
-            candidates,
-            best_planes,
-            speeds=used,
-            criterion="max" if method == "minmax" else "rms",
-            row_weights=job.row_weights,
-        )
-        candidates = list(subsets.planes[0])
-
-    def solved(job: Job, influence: Influence, baseline: Trials | None) -> Correction:
-        return correct(
-            influence,
-            baseline=baseline,
-            planes=candidates,
-            speeds=used,
-            method=method,
-            limits=job.limits_of(influence.planes),
-            row_weights=job.row_weights,
-            strength=_strength(ridge),
-            keep=truncate,
-            remove=sorted(job.remove),
-        )
-
-    def again(phase: str, angles: str) -> Correction:
-        with catch_warnings(action="ignore"):  # said when the job was read
-            job = read({**settings, "phase": phase, "angles": angles})
-        return solved(job, *choose(job, coefficients, model_error, refined=refine))
-
-    result = solved(job, influence_found, baseline)
-    # what was mounted as proposed, before it was refined, was proposed by these conventions and by no others
-    known = not refine or job.check_mounted
-    test = ask_runs(job, result if known else None)
-    result = with_other_readings(result, test, again if known else None)
-    source = JobSource(
-        tuple(files),
-        influence,
-        **settings,
-        max_weights=largest_weights(job, max_mass),
-        limits=largest_amplitudes(job, limit or []),
-    )
-    report = Report(result, influence_found, subsets=subsets)
-    if split:
-        report.mounted = mount(
-            result,
-            influence_found,
-            baseline,
-            job.holes,
-            row_weights=job.row_weights,
-            time_limit=split_seconds,
-            on_top=refine,
-        )
-    if job.check is not None and not refine:
-        report.check = compare_check(result, job.check, influence_found, baseline)
-    if history:
-        report.add_history(job)
-    places = Places(positions, bearings, centre)
-    tolerance = tolerance_of(grade, rotor_mass, service_speed, result.planes, places)
-    report.verdict = judge(result, influence_found, job, tolerance, report.mounted)
-    if trade_off:
-        report.add_trade_off(job)
-    options = {
-        **settings,
-        "method": method,
-        "planes": planes,
-        "speeds": speed,
-        "influence": influence,
-        "coefficients": coefficients,
-        "model_error": model_error,
-        "max_mass": max_mass,
-        "limit": ", ".join(limit) if limit else None,
-        "ridge": ridge,
-        "truncate": truncate,
-        "split": split,
-        "refine": refine,
-        "grade": grade,
-        "rotor_mass": rotor_mass,
-        "service_speed": service_speed,
-        "positions": positions,
-        "bearings": bearings,
-        "centre": centre,
-    }
-    emit(
-        report.to_dict(),
-        report.text,
+    workbook = output if output is not None and output.suffix.lower() == ".xlsx" else None
+    deliver(
+        "correction weights",
+        lambda: work(files, options),
         as_json=json,
-        files=job.files,
-        options=options,
-        figure=(plot, report.figure),
-        table=(None if as_workbook(output) else output, report.frame),
+        plot=plot,
+        output=None if workbook else output,
+        report=sheet,
         more=[
-            (save_influence, lambda: influence_bytes(save_influence or Path(), influence_found)),
-            workbook(job, source, output, report, options),
+            (save_influence, lambda found: found.influence_table(save_influence or "")),
+            (workbook, lambda found: found.workbook(workbook or "")),
         ],
-        report=(sheet, lambda document, record: report.sheet(document, job, record)),
     )
 
 
-def _check_options(
-    method: str | None, coefficients: str | None, ridge: str | None, truncate: float | None
-) -> None:
-    for option, value, known in (
-        ("--method", method, (*METHODS, None)),
-        ("--coefficients", coefficients, (*KINDS, None)),
-    ):
-        if value not in known:
-            from rotorid.base.suggestions import did_you_mean
+def _write_template(path: Path, files: Sequence[Path]) -> None:
+    """Write an empty workbook, and say so.
 
-            names = [name for name in known if name is not None]
-            raise ValueError(
-                f"{option} {value!r} is not known{did_you_mean(str(value), names)}: one of {', '.join(names)}"
-            )
-    if ridge is not None and truncate is not None:
-        raise ValueError("--ridge and --truncate are two ways to the same end: choose one")
+    Raises
+    ------
+    ValueError
+        If there is a job as well, or the name is no workbook's or one of an existing file, which may be
+        filled in already.
+    """
+    from rotorid.tables.job.workbook_template import template_bytes
+    from rotorid.tables.reader.writing import write_bytes
 
-
-def _strength(text: str | None) -> float | str | None:
-    if text is None or text == "auto":
-        return text
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value < float("inf"):
-        raise ValueError(f"--ridge {text!r}: a strength above 0, such as 0.03, or auto")
-    return value
+    if files:
+        raise ValueError(
+            "--template writes an empty workbook: leave the job away, or use --output for its own"
+        )
+    check_targets(None, path)
+    if path.suffix.lower() != ".xlsx":
+        raise ValueError(f"{path}: the form is a workbook; the name must end in .xlsx")
+    if path.exists():
+        raise ValueError(f"{path}: exists already, and may be filled in; choose another name or delete it")
+    write_bytes(path, template_bytes())
+    typer.echo(f"written: {path}\nFill it in (its sheet notes says how), then: rotorid balance {path}")

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
-
-import numpy as np
-
-from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
@@ -15,25 +11,26 @@ if TYPE_CHECKING:
     from balancing.iso21940 import Tolerance
     from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where planes, bearings and the centre of mass are, as the command line says it."""
-
-    positions: str | None
-    bearings: str | None
-    centre: str | None
+    from rotorid.workflows.quantities import Amount, Positions
 
 
 def tolerance_of(
+    planes: Sequence[str],
     grade: str | None,
-    rotor_mass: str | None,
-    service_speed: str | None,
-    planes: tuple[str, ...],
-    places: Places,
+    rotor_mass: Amount | None,
+    service_speed: Amount | None,
+    places: Positions | None,
+    bearings: str | tuple[float, float] | None,
+    centre: Amount | None,
 ) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given.
+
+    Parameters
+    ----------
+    planes
+        Those that are used.
+    grade, rotor_mass, service_speed, places, bearings, centre
+        As in `BalanceOptions`; `places` are the positions.
 
     Raises
     ------
@@ -41,9 +38,9 @@ def tolerance_of(
         For some of the options only, more than two planes, and values that cannot be.
     """
     from balancing.iso21940 import tolerance
+    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
 
-    along = (places.positions, places.bearings, places.centre)
-    if grade is None and rotor_mass is None and service_speed is None and not any(along):
+    if all(x is None for x in (grade, rotor_mass, service_speed, places, bearings, centre)):
         return None
     if grade is None or rotor_mass is None or service_speed is None:
         raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
@@ -52,7 +49,7 @@ def tolerance_of(
             "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
             f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
         )
-    at = dict.fromkeys(planes) if places.positions is None else positions(places.positions)
+    at = dict.fromkeys(planes) if places is None else positions(places)
     if set(at) != set(planes):
         raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
     return tolerance(
@@ -60,8 +57,8 @@ def tolerance_of(
         speed_with_unit(service_speed, "--service-speed"),
         grade,
         planes=at,
-        bearings=None if places.bearings is None else two_positions(places.bearings),
-        centre=None if places.centre is None else length(places.centre, "--centre", "350mm"),
+        bearings=None if bearings is None else two_positions(bearings),
+        centre=None if centre is None else length(centre, "--centre", "350mm"),
     )
 
 
@@ -69,6 +66,8 @@ def judge(
     result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
 ) -> Verdict | None:
     """Of the check run if there is one, else of the prediction; None without anything to judge by."""
+    import numpy as np
+
     from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
     from rotorid.tables.reader.units import weight
 
