@@ -15,7 +15,7 @@ from rotorid.workflows.other_readings import with_contradiction, with_other_read
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.sources import JobGiven, job_files, read_source
-from rotorid.workflows.verdict import judge, tolerance_of
+from rotorid.workflows.verdict import judge
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -371,15 +371,32 @@ def _check_runs(result: Correction, job: Job, known: Known) -> CheckComparison |
     return None if job.check is None else compare_check(result, job.check, *known)
 
 
-def _tolerance(planes: tuple[str, ...], options: BalanceOptions) -> Tolerance | None:
-    return tolerance_of(
-        planes,
-        options.grade,
-        options.rotor_mass,
-        options.service_speed,
-        options.positions,
-        options.bearings,
-        options.centre,
+def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
+    """Tolerance of one or two planes; None where no grade is given."""
+    from balancing.iso21940 import tolerance
+    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+
+    grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
+    along = (options.positions, options.bearings, options.centre)
+    if all(value is None for value in (grade, weight, speed, *along)):
+        return None
+    if grade is None or weight is None or speed is None:
+        raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
+    if len(planes) > 2:
+        raise ValueError(
+            "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
+            f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
+        )
+    at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
+    if set(at) != set(planes):
+        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
+    return tolerance(
+        mass(weight, "--rotor-mass"),
+        speed_with_unit(speed, "--service-speed"),
+        grade,
+        planes=at,
+        bearings=None if options.bearings is None else two_positions(options.bearings),
+        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
     )
 
 

@@ -1,8 +1,7 @@
-"""Verdict of a balance: limits of the readings, and a tolerance of the planes."""
+"""Verdict of a balance: by limits of the readings, and by a tolerance of the planes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,55 +10,6 @@ if TYPE_CHECKING:
     from balancing.iso21940 import Tolerance
     from balancing.mounting.mounted_result import Mounted
     from rotorid.tables import Job
-    from rotorid.workflows.quantities import Amount, Positions
-
-
-def tolerance_of(
-    planes: Sequence[str],
-    grade: str | None,
-    rotor_mass: Amount | None,
-    service_speed: Amount | None,
-    places: Positions | None,
-    bearings: str | tuple[float, float] | None,
-    centre: Amount | None,
-) -> Tolerance | None:
-    """Tolerance of one or two planes; None where no grade is given.
-
-    Parameters
-    ----------
-    planes
-        Those that are used.
-    grade, rotor_mass, service_speed, places, bearings, centre
-        As in `BalanceOptions`; `places` are the positions.
-
-    Raises
-    ------
-    ValueError
-        For some of the options only, more than two planes, and values that cannot be.
-    """
-    from balancing.iso21940 import tolerance
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
-
-    if all(x is None for x in (grade, rotor_mass, service_speed, places, bearings, centre)):
-        return None
-    if grade is None or rotor_mass is None or service_speed is None:
-        raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
-    if len(planes) > 2:
-        raise ValueError(
-            "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
-            f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
-        )
-    at = dict.fromkeys(planes) if places is None else positions(places)
-    if set(at) != set(planes):
-        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
-    return tolerance(
-        mass(rotor_mass, "--rotor-mass"),
-        speed_with_unit(service_speed, "--service-speed"),
-        grade,
-        planes=at,
-        bearings=None if bearings is None else two_positions(bearings),
-        centre=None if centre is None else length(centre, "--centre", "350mm"),
-    )
 
 
 def judge(
