@@ -48,40 +48,53 @@ class BalanceOptions:
     Attributes
     ----------
     method
-        "weighted" (by the errors of the readings; the default where they are known), "least-squares" or
-        "minmax" (the smallest largest amplitude).
+        weighted (by the errors of the readings; the default), least-squares, or minmax (the smallest largest
+        amplitude).
     influence
-        File of stored coefficients, beside tables.
+        Stored influence coefficients.
     coefficients
-        "measured" by the runs, "computed" from the job's rotor, or "combined"; default: measured where there
-        are trial weights or stored coefficients.
+        measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
+        there are trial weights.
     model_error
-        Standard deviation of computed coefficients, percent.
-    amplitude_error, phase_error, run_error
-        Standard deviations of a reading, percent and degrees, and between runs, percent; in place of the
-        job's, as are the conventions.
-    phase, angles
-        "lead" or "lag"; "with rotation" or "against rotation", or clockwise and counter-clockwise where the
-        job states its rotation.
-    planes, speeds
-        To use; default all.
-    max_mass, limit
-        Largest weights of the planes and amplitudes of the sensors, in place of the job's.
-    ridge, truncate
-        Small weights where planes act alike: strength or "auto"; how many combinations of planes to keep, or
-        above which share.
-    split, split_seconds
-        Choose pieces in the holes of the job, and how long to look for a proof that none is better.
+        Standard deviation of computed coefficients; combined: 20 if not given.
+    amplitude_error, phase_error, run_error, phase, angles
+        In place of what the job says, errors in percent and degrees.
+    planes
+        Use these planes only.
+    speeds
+        Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.
+    max_mass
+        Largest weight of every plane, 5g; or left=5g,right=3g.
+    limit
+        Largest amplitude of a sensor; VALUE alone: of all. May be repeated.
+    ridge
+        Small weights where planes act alike: 0.01 … 0.1, or auto.
+    truncate
+        Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
+    split
+        Choose pieces in the holes of the job, all planes together (a picture of discs).
+    split_seconds
+        For the proof that no choice is better.
     refine
-        Add the check runs to the trial runs.
-    history, trade_off
-        All runs in one table; residual against total weight.
+        Add the job's check runs to its trial runs: coefficients and trim from all of them.
+    history
+        All runs and check runs of the job in one table, too.
     best_planes
-        Use so many planes, the best ones.
-    grade, rotor_mass, service_speed
-        Judge the planes by ISO 21940-11.
-    positions, bearings, centre
-        Of planes, both bearings and the centre of mass along the shaft, for the grade.
+        Use the best K planes, after comparing all choices.
+    trade_off
+        Residual against total weight, too (a second picture).
+    grade
+        Judge the planes by ISO 21940-11: G0.4 to G4000.
+    rotor_mass
+        For --grade, such as 500kg.
+    service_speed
+        For --grade, such as 3000rpm.
+    positions
+        For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.
+    bearings
+        For --positions, 0mm,700mm.
+    centre
+        For --positions: of the centre of mass.
     """
 
     method: str | None = None

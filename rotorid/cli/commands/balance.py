@@ -18,11 +18,13 @@ from rotorid.cli.common import (
     PlotOption,
     ReportOption,
     RunErrorOption,
+    options_of,
 )
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
-from rotorid.workflows.coefficients import KINDS, MODEL_ERROR
+
+say = options_of(BalanceOptions)
 
 
 def balance(
@@ -34,137 +36,35 @@ def balance(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METHOD",
-            help="weighted (by the errors of the readings; the default), least-squares, or minmax (the "
-            "smallest largest amplitude).",
-            show_default=False,
-        ),
-    ] = None,
-    influence: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Stored influence coefficients.", show_default=False)
-    ] = None,
-    coefficients: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help=f"{', '.join(KINDS)}: from the runs, from the job's rotor, or both; default: "
-            "measured where there are trial weights.",
-            show_default=False,
-        ),
-    ] = None,
-    model_error: Annotated[
-        float | None,
-        typer.Option(
-            metavar="PERCENT",
-            min=0.0,
-            help=f"Standard deviation of computed coefficients; combined: {MODEL_ERROR:g} if not given.",
-            show_default=False,
-        ),
-    ] = None,
+    method: Annotated[str | None, say("method", "METHOD")] = None,
+    influence: Annotated[Path | None, say("influence", "FILE")] = None,
+    coefficients: Annotated[str | None, say("coefficients", "KIND")] = None,
+    model_error: Annotated[float | None, say("model_error", "PERCENT", least=0.0)] = None,
     amplitude_error: AmplitudeErrorOption = None,
     phase_error: PhaseErrorOption = None,
     run_error: RunErrorOption = None,
     phase: PhaseOption = None,
     angles: AnglesOption = None,
-    planes: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Use these planes only.", show_default=False)
-    ] = None,
-    speeds: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LIST",
-            help="Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.",
-            show_default=False,
-        ),
-    ] = None,
-    max_mass: Annotated[
-        str | None,
-        typer.Option(
-            metavar="MASS", help="Largest weight of every plane, 5g; or left=5g,right=3g.", show_default=False
-        ),
-    ] = None,
-    limit: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="SENSOR=VALUE",
-            help="Largest amplitude of a sensor; VALUE alone: of all. May be repeated.",
-            show_default=False,
-        ),
-    ] = None,
-    ridge: Annotated[
-        str | None,
-        typer.Option(
-            metavar="STRENGTH",
-            help="Small weights where planes act alike: 0.01 … 0.1, or auto.",
-            show_default=False,
-        ),
-    ] = None,
-    truncate: Annotated[
-        float | None,
-        typer.Option(
-            metavar="NUMBER",
-            help="Keep this many combinations of planes (1, 2, …), or those above this share (below 1).",
-            show_default=False,
-        ),
-    ] = None,
-    split: Annotated[
-        bool,
-        typer.Option(
-            "--split", help="Choose pieces in the holes of the job, all planes together (a picture of discs)."
-        ),
-    ] = False,
+    planes: Annotated[str | None, say("planes", "LIST")] = None,
+    speeds: Annotated[str | None, say("speeds", "LIST")] = None,
+    max_mass: Annotated[str | None, say("max_mass", "MASS")] = None,
+    limit: Annotated[list[str] | None, say("limit", "SENSOR=VALUE")] = None,
+    ridge: Annotated[str | None, say("ridge", "STRENGTH")] = None,
+    truncate: Annotated[float | None, say("truncate", "NUMBER")] = None,
+    split: Annotated[bool, say("split", None, "--split")] = False,
     split_seconds: Annotated[
-        float, typer.Option(metavar="SECONDS", min=0.1, help="For the proof that no choice is better.")
+        float, say("split_seconds", "SECONDS", least=0.1)
     ] = BalanceOptions.split_seconds,
-    refine: Annotated[
-        bool,
-        typer.Option(
-            "--refine",
-            help="Add the job's check runs to its trial runs: coefficients and trim from all of them.",
-        ),
-    ] = False,
-    history: Annotated[
-        bool, typer.Option("--history", help="All runs and check runs of the job in one table, too.")
-    ] = False,
-    best_planes: Annotated[
-        int | None,
-        typer.Option(
-            metavar="K", min=1, help="Use the best K planes, after comparing all choices.", show_default=False
-        ),
-    ] = None,
-    trade_off: Annotated[
-        bool, typer.Option("--trade-off", help="Residual against total weight, too (a second picture).")
-    ] = False,
-    grade: Annotated[
-        str | None,
-        typer.Option(
-            metavar="GRADE", help="Judge the planes by ISO 21940-11: G0.4 to G4000.", show_default=False
-        ),
-    ] = None,
-    rotor_mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help="For --grade, such as 500kg.", show_default=False)
-    ] = None,
-    service_speed: Annotated[
-        str | None, typer.Option(metavar="SPEED", help="For --grade, such as 3000rpm.", show_default=False)
-    ] = None,
-    positions: Annotated[
-        str | None,
-        typer.Option(
-            metavar="LIST",
-            help="For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.",
-            show_default=False,
-        ),
-    ] = None,
-    bearings: Annotated[
-        str | None, typer.Option(metavar="A,B", help="For --positions, 0mm,700mm.", show_default=False)
-    ] = None,
-    centre: Annotated[
-        str | None,
-        typer.Option(metavar="POSITION", help="For --positions: of the centre of mass.", show_default=False),
-    ] = None,
+    refine: Annotated[bool, say("refine", None, "--refine")] = False,
+    history: Annotated[bool, say("history", None, "--history")] = False,
+    best_planes: Annotated[int | None, say("best_planes", "K", least=1)] = None,
+    trade_off: Annotated[bool, say("trade_off", None, "--trade-off")] = False,
+    grade: Annotated[str | None, say("grade", "GRADE")] = None,
+    rotor_mass: Annotated[str | None, say("rotor_mass", "MASS")] = None,
+    service_speed: Annotated[str | None, say("service_speed", "SPEED")] = None,
+    positions: Annotated[str | None, say("positions", "LIST")] = None,
+    bearings: Annotated[str | None, say("bearings", "A,B")] = None,
+    centre: Annotated[str | None, say("centre", "POSITION")] = None,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
