@@ -7,7 +7,7 @@ import pytest
 from documents import same
 
 from rotorid.samples import sample_data
-from rotorid.tables import read_job
+from rotorid.tables import job_from_files, read_job
 from rotorid.workflows import Balance, BalanceOptions, balance
 
 TURBO = sample_data() / "turbo_job"
@@ -90,6 +90,10 @@ def test_a_job_that_was_read(tmp_path):
     same(found.document, balance(TURBO / "job.toml").document)
     with pytest.raises(ValueError, match="stated where it is read"):
         balance(job, BalanceOptions(phase="lag"))
+    assumed = balance(job_from_files(TABLES)).document  # what it would be otherwise cannot be told
+    assert assumed["conventions"]["assumed"] == ["phase"]
+    assert assumed["other_readings"] == []
+    assert balance(TABLES).document["other_readings"] != []
     with pytest.raises(ValueError, match="files of a job"):
         found.workbook(tmp_path / "sheet.xlsx")
 
