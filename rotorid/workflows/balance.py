@@ -247,22 +247,25 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     files = source if isinstance(source, JobSource) else None
     read = with_contradiction(_read(source, options))
     known = _choose(read, options)
+    influence = known[0]
     planes, subsets = _planes(read, known, options)
     result = _correct(read, known, planes, options)
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
     mounted = _mount(result, read, known, options) if options.split else None
+    check = None if options.refine else _check_runs(result, read, known)
+    verdict = judge(result, influence, read, _tolerance(result.planes, options), mounted)
     return Balance(
         result=result,
-        influence=known[0],
+        influence=influence,
         job=read,
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
-        check=None if options.refine else _check_runs(result, read, known),
-        verdict=judge(result, known[0], read, _tolerance(result.planes, options), mounted),
+        check=check,
+        verdict=verdict,
         subsets=subsets,
-        curve=_trade_off(result, known[0], read) if options.trade_off else None,
-        history=_history(result, known[0], read) if options.history else None,
+        curve=_trade_off(result, influence, read) if options.trade_off else None,
+        history=_history(result, influence, read) if options.history else None,
         provenance=provenance(read.files, options),
     )
 
