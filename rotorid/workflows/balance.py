@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,6 @@ from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.other_readings import with_contradiction, with_other_readings
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
-from rotorid.workflows.sources import JobGiven, job_files, read_source
 from rotorid.workflows.verdict import judge
 
 if TYPE_CHECKING:
@@ -37,6 +36,8 @@ if TYPE_CHECKING:
     from rotorid.tables.job.source import JobSource
     from rotorid.workflows.quantities import Amount, Amplitudes, Positions, Weights
 
+    JobGiven = Job | Path | str | Sequence[Path | str]
+    """A job, its file, or a runs table and a weights table."""
     Known = tuple[Influence, Trials | None]
     """Coefficients, and the runs that give the vibration."""
 
@@ -239,6 +240,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     ValueError
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
+    from balancing import compare_check
     from rotorid.tables.job.source import JobSource
 
     options = options or BalanceOptions()
@@ -253,7 +255,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     again = None if files is None else partial(_again, files, planes, options)
     result = with_other_readings(result, read, again, refined=options.refine)
     mounted = _mount(result, read, known, options) if options.split else None
-    check = None if options.refine else _check_runs(result, read, known)
+    checked = None if options.refine else read.check
     verdict = judge(result, influence, read, _tolerance(result.planes, options), mounted)
     return Balance(
         result=result,
@@ -261,7 +263,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         job=read,
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
-        check=check,
+        check=None if checked is None else compare_check(result, checked, *known),
         verdict=verdict,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -288,21 +290,33 @@ def _check(options: BalanceOptions) -> None:
 
 
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
-    return job_files(
-        job,
-        options.influence,
-        phase=options.phase,
-        angles=options.angles,
-        amplitude_error_percent=options.amplitude_error,
-        phase_error_deg=options.phase_error,
-        run_error_percent=options.run_error,
-    )
+    """A job that has been read, or what is to be read."""
+    from rotorid.tables.job.source import JobSource
+
+    stored = None if options.influence is None else Path(options.influence)
+    errors = options.amplitude_error, options.phase_error, options.run_error
+    said = (options.phase, options.angles, *errors)
+    files = [job] if isinstance(job, Path | str) else job
+    if isinstance(files, Sequence):
+        return JobSource(tuple(Path(file) for file in files), stored, *said)
+    if any(value is not None for value in (stored, *said)):
+        raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
+    return files
 
 
 def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
+    from rotorid.tables import job_from_files, read_job
+    from rotorid.tables.job.source import JobSource
     from rotorid.workflows.quantities import limited
 
-    return limited(read_source(source), options.max_mass, options.limit)
+    if isinstance(source, JobSource):
+        files, said = source.files, asdict(source.overrides)
+        single = len(files) == 1 and source.influence is None
+        if single and files[0].suffix.lower() in (".toml", ".xlsx"):
+            source = read_job(files[0], **said)
+        else:
+            source = job_from_files(files, influence=source.influence, **said)
+    return limited(source, options.max_mass, options.limit)
 
 
 def _choose(job: Job, options: BalanceOptions) -> Known:
@@ -378,13 +392,6 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
         time_limit=options.split_seconds,
         on_top=options.refine,
     )
-
-
-def _check_runs(result: Correction, job: Job, known: Known) -> CheckComparison | None:
-    """Check runs beside what was predicted for them."""
-    from balancing.correction.check import compare_check
-
-    return None if job.check is None else compare_check(result, job.check, *known)
 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
