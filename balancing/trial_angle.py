@@ -42,13 +42,22 @@ class Lag:
 
 
 def expected_lag(
-    where: Literal["below", "at", "above"] | None = None,
+    where: str | None = None,
     *,
     degrees: float | None = None,
     ratio: float | None = None,
     damping: float = DAMPING,
 ) -> Lag:
-    """How far the vibration lags, from one of: a region, degrees, or the ratio speed / critical speed.
+    """How far the vibration lags, from one of these.
+
+    Parameters
+    ----------
+    where
+        "below", "at" or "above" the critical speed.
+    degrees
+        The lag.
+    ratio
+        Speed / critical speed, of one mode with this damping ratio.
 
     Raises
     ------

@@ -65,7 +65,7 @@ class TrialWeight:
     @property
     def force(self) -> float | None:
         """Centrifugal force at the highest speed, N; None for masses without a radius."""
-        if self.radius is None and not self.labels.weight_unit.endswith(("_mm", "_m", "_in")):
+        if self.radius is None and not self.labels.unbalances:
             return None
         return self.amount * (1.0 if self.radius is None else self.radius) * self.speed**2
 

@@ -44,6 +44,30 @@ _SEEN = 2.448 * math.sqrt(2)
 """Standard deviations of a reading that the difference of two must exceed to be no chance (95 %)."""
 
 
+def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int = 1) -> float | None:
+    """What a plane carries, N: its share of the rotor's mass, kg, or the load of its bearing, N.
+
+    None where nothing is known.
+
+    Raises
+    ------
+    ValueError
+        For both of them, and for a number that is not positive.
+    """
+    if rotor_mass is not None and bearing_load is not None:
+        raise ValueError(
+            "the mass of the rotor and the load of the bearing are two ways to the same load: "
+            "choose one of them"
+        )
+    positive("number of planes", planes)
+    if rotor_mass is not None:
+        positive("mass of the rotor", rotor_mass)
+        return rotor_mass * GRAVITY / planes
+    if bearing_load is not None:
+        positive("load of the bearing", bearing_load)
+    return bearing_load
+
+
 def force_amount(
     speed: float,
     radius: float,
@@ -83,14 +107,11 @@ def force_amount(
     >>> f"{1e3 * mass:.2f} g"
     '24.84 g'
     """
-    if (rotor_mass is None) == (bearing_load is None):
+    load = plane_load(rotor_mass, bearing_load, planes)
+    if load is None:
         raise ValueError("give the mass of the rotor or the load of the bearing, one of them")
-    numbers = {"speed": speed, "radius": radius, "fraction of the load": fraction, "number of planes": planes}
-    numbers |= {"mass of the rotor": rotor_mass} if rotor_mass is not None else {}
-    numbers |= {"load of the bearing": bearing_load} if bearing_load is not None else {}
-    for what, value in numbers.items():
+    for what, value in {"speed": speed, "radius": radius, "fraction of the load": fraction}.items():
         positive(what, value)
-    load = bearing_load if bearing_load is not None else (rotor_mass or 0.0) * GRAVITY / planes
     return fraction * load / (radius * speed**2), load
 
 

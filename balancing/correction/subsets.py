@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import comb
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.influence import Influence
+from balancing.correction.choice import plane_indices, rows_of
 from balancing.data.conventions import Labels
+from balancing.data.trials import Trials
 from balancing.solvers.conditioning import check_stack, scaled_columns
 from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
@@ -237,6 +241,42 @@ def best_subsets(  # noqa: PLR0913
         dependent=int(np.count_nonzero(~solid)),
         labels=labels or Labels(),
         weighted=bool(np.ptp(w) > 0),
+    )
+
+
+def compare_planes(
+    influence: Influence,
+    baseline: Trials | ArrayLike | None,
+    planes: Sequence[str],
+    k: int,
+    *,
+    speeds: ArrayLike | None = None,
+    criterion: Criterion = "rms",
+    row_weights: FloatArray | None = None,
+) -> Subsets:
+    """Compare all choices of k of these planes, without limits.
+
+    Parameters
+    ----------
+    influence, baseline, speeds, row_weights
+        As `balancing.correct` takes them.
+    planes, k, criterion
+        As `best_subsets` does.
+    """
+    start = starting_point(influence, baseline)
+    used = list(range(len(influence.speeds))) if speeds is None else match_speeds(speeds, influence.speeds)
+    known = replace(influence, baseline=start.readings, covariance=start.covariance)
+    part = known.part(used, None, plane_indices(influence, planes))
+    P, covariance = len(part.planes), part.covariance
+    return best_subsets(
+        part.W.reshape(-1, P),
+        start.readings[used].ravel(),
+        part.planes,
+        k,
+        criterion=criterion,
+        row_weights=rows_of(row_weights, start.readings.shape, used),
+        covariance=None if covariance is None else covariance.reshape(-1, 2 * P + 2, 2 * P + 2),
+        labels=start.labels,
     )
 
 

@@ -85,6 +85,20 @@ class Labels:
         """The size of a weight, given in SI."""
         return f"{size * self.weight_scale:.4g} {self.weight_unit}".rstrip()
 
+    def weight_entry(self, weight: complex) -> dict[str, float]:
+        """A weight as JSON has it: `mass` in the job's unit and `angle_deg`, without the last digits."""
+        size, angle = self.weight(weight)
+        return {"mass": float(f"{size:.12g}"), "angle_deg": float(f"{angle:.12g}")}
+
+    def weight_at(self, weight: complex) -> str:
+        """A weight as text, such as "35 g at 120.0°"."""
+        size, angle = self.weight(weight)
+        return f"{size:.5g} {self.weight_unit} at {angle:.1f}°"
+
+    def directions(self, angles: FloatArray) -> list[float]:
+        """Angles in rad with the rotation in degrees as the job counts them, without the last digits."""
+        return [float(f"{angle:.12g}") for angle in self.weight(np.exp(1j * angles))[1]]
+
     def vibration_covariance(self, covariance: FloatArray) -> FloatArray:
         """Covariance (…, 2, 2) of amplitude·cos(phase) and amplitude·sin(phase) as the job writes them."""
         return _mirror(covariance, self.vibration_scale, self.phase_sign)
@@ -102,6 +116,11 @@ class Labels:
     def angle_sign(self) -> int:
         """+1 with the rotation, −1 against it."""
         return 1 if self.angles == "with rotation" else -1
+
+    @property
+    def unbalances(self) -> bool:
+        """Whether weights are unbalances, mass × radius, and not masses."""
+        return "_" in self.weight_unit
 
     @property
     def angle_words(self) -> str:

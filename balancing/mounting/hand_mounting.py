@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import percent
 
 _EDGE = 1e-12
 """Relative; a target this close to the limit of its range is on it."""
@@ -37,9 +40,42 @@ class TwoPositions:
     angles: FloatArray
     target: complex
 
+    def weights(self) -> ComplexArray:
+        """Both weights of each solution (row), shape (2, 2)."""
+        return np.asarray(np.exp(1j * self.angles) * self.masses)
+
     def vectors(self) -> ComplexArray:
         """The sum of both weights in each solution, shape (2,)."""
-        return np.asarray(np.exp(1j * self.angles) @ self.masses)
+        return np.asarray(self.weights().sum(axis=1))
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, in the labels' unit and angles."""
+        return {
+            "method": "two positions",
+            "unit": labels.weight_unit,
+            "angles": labels.angles,
+            "target": labels.weight_entry(self.target),
+            "masses": (self.masses * labels.weight_scale).tolist(),
+            "solutions": [{"angles_deg": labels.directions(row)} for row in self.angles],
+        }
+
+    def rows(self, labels: Labels) -> list[dict[str, Any]]:
+        """Each weight of each solution."""
+        found, mass = self.to_dict(labels), f"mass_{labels.weight_unit}"
+        return [
+            {"solution": k, mass: size, "angle_deg": angle}
+            for k, solution in enumerate(found["solutions"], start=1)
+            for size, angle in zip(found["masses"], solution["angles_deg"], strict=True)
+        ]
+
+    def summary(self, labels: Labels) -> str:
+        """Text: both solutions."""
+        unit, (one, other) = labels.weight_unit, self.masses * labels.weight_scale
+        lines = [f"{labels.weight_at(self.target)} from two weights:"]
+        for row, word in zip(self.angles, ("either", "or"), strict=True):
+            a, b = labels.directions(row)
+            lines.append(f"  {word:<6} {one:g} {unit} at {a:.1f}° and {other:g} {unit} at {b:.1f}°")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
@@ -48,8 +84,10 @@ class Rounded:
 
     Attributes
     ----------
+    wanted
+        Before rounding.
     weight
-        After rounding.
+        After it.
     error
         `weight` minus the wanted one.
     relative_error
@@ -58,10 +96,41 @@ class Rounded:
         The largest |error| that rounding with these steps can make of a weight of this size.
     """
 
+    wanted: complex
     weight: complex
     error: complex
     relative_error: float
     worst: float
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, in the labels' unit and angles."""
+        return {
+            "method": "one weight",
+            "unit": labels.weight_unit,
+            "angles": labels.angles,
+            "target": labels.weight_entry(self.wanted),
+            "weight": labels.weight_entry(self.weight),
+            "error": labels.weight_entry(self.error),
+            "relative_error": self.relative_error,
+            "largest_possible_error": self.worst * labels.weight_scale,
+        }
+
+    def rows(self, labels: Labels) -> list[dict[str, Any]]:
+        """The weight."""
+        shown = labels.weight_entry(self.weight)
+        return [{f"mass_{labels.weight_unit}": shown["mass"], "angle_deg": shown["angle_deg"]}]
+
+    def summary(self, labels: Labels) -> str:
+        """Text: the weight, and what rounding did to it."""
+        scale, unit = labels.weight_scale, labels.weight_unit
+        if not self.worst:
+            return labels.weight_at(self.weight)
+        return (
+            f"{labels.weight_at(self.weight)}\n"
+            f"instead of {labels.weight_at(self.wanted)}: error "
+            f"{abs(self.error) * scale:.3g} {unit} ({percent(self.relative_error)} %); with these steps at "
+            f"most {self.worst * scale:.3g} {unit}"
+        )
 
 
 def two_positions(target: complex, mass_a: float, mass_b: float) -> TwoPositions:
@@ -205,7 +274,7 @@ def rounded(weight: complex, mass_step: float = 0.0, angle_step: float = 0.0) ->
     worst = float(np.abs(sizes * np.exp(0.5j * angle_step) - size).max())
     error = new - weight
     relative = abs(error) / size if size > 0 else 0.0
-    return Rounded(new, error, relative, worst)
+    return Rounded(weight, new, error, relative, worst)
 
 
 def _finite(value: complex) -> complex:

@@ -28,11 +28,13 @@ u₁ Σ e^{i(k − (n − 1)/2)σ} = u₁ sin(nσ/2)/sin(σ/2), exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from balancing.data.conventions import Labels
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.text import counted
 
 Way = Literal["radial", "axial"]
 
@@ -173,6 +175,8 @@ class Drilling:
         Taken away by one hole, kg and kg·m.
     weight
         The equivalent added unbalance of all of them, −Σ u e^{iφ}, kg·m.
+    wanted
+        What it was to be, kg·m.
     """
 
     drill: Drill
@@ -182,6 +186,60 @@ class Drilling:
     mass: float
     unbalance: float
     weight: complex
+    wanted: complex
+
+    def added(self, labels: Labels) -> ComplexArray:
+        """The weights that would have to be added instead of the holes, kg or kg·m as the labels', (n,)."""
+        each = -self.unbalance * np.exp(1j * self.angles)
+        return np.asarray(each if labels.unbalances else each / self.drill.radius)
+
+    def target(self, labels: Labels) -> complex:
+        """The one weight that was to be added, kg or kg·m as the labels'."""
+        return self.wanted if labels.unbalances else self.wanted / self.drill.radius
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, angles as the labels count them."""
+        return {
+            "method": "drilling",
+            "unit": labels.weight_unit,
+            "angles": labels.angles,
+            "target": labels.weight_entry(self.target(labels)),
+            "way": self.drill.way,
+            "diameter_m": self.drill.diameter,
+            "radius_m": self.drill.radius,
+            "depth_m": self.depth,
+            "tip_depth_m": self.tip_depth,
+            "mass_of_one_kg": self.mass,
+            "unbalance_of_one_kg_m": self.unbalance,
+            "holes": [{"angle_deg": angle} for angle in labels.directions(self.angles)],
+        }
+
+    def rows(self, labels: Labels) -> list[dict[str, Any]]:
+        """Each hole."""
+        same = {
+            "diameter_mm": 1e3 * self.drill.diameter,
+            "depth_mm": 1e3 * self.depth,
+            "tip_depth_mm": 1e3 * self.tip_depth,
+            "mass_g": 1e3 * self.mass,
+        }
+        at = enumerate(labels.directions(self.angles), start=1)
+        return [{"hole": k, "angle_deg": angle, **same} for k, angle in at]
+
+    def summary(self, labels: Labels) -> str:
+        """Text: where and how deep."""
+        at = ", ".join(f"{a:.1f}°" for a in labels.directions(self.angles))
+        tool, n = self.drill, len(self.angles)
+        where = "towards the axis from" if tool.way == "radial" else "parallel to the axis at"
+        deep = f"full diameter {1e3 * self.depth:.2f} mm deep" if self.depth else "only the tip goes in"
+        return "\n".join(
+            [
+                f"Instead of adding {labels.weight_at(self.target(labels))}, take away opposite:",
+                f"  {counted(n, 'hole')} of diameter {1e3 * tool.diameter:g} mm at {at}, {where} a "
+                f"radius of {1e3 * tool.radius:g} mm",
+                f"  {deep}, tip at {1e3 * self.tip_depth:.2f} mm",
+                f"  each takes away {1e3 * self.mass:.4g} g, {1e6 * self.unbalance:.5g} g·mm",
+            ]
+        )
 
 
 @dataclass(frozen=True)
@@ -193,6 +251,37 @@ class Grinding:
     radius: float
     angle: float
     weight: complex
+
+    def target(self, labels: Labels) -> complex:
+        """The weight that would have to be added instead, kg or kg·m as the labels'."""
+        return self.weight if labels.unbalances else self.weight / self.radius
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, angles as the labels count them."""
+        return {
+            "method": "grinding",
+            "unit": labels.weight_unit,
+            "angles": labels.angles,
+            "target": labels.weight_entry(self.target(labels)),
+            "radius_m": self.radius,
+            "mass_kg": self.mass,
+            "unbalance_kg_m": self.unbalance,
+            "angle_deg": labels.directions(np.array([self.angle]))[0],
+        }
+
+    def rows(self, labels: Labels) -> list[dict[str, Any]]:
+        """The one place."""
+        angle = self.to_dict(labels)["angle_deg"]
+        return [{"angle_deg": angle, "mass_g": 1e3 * self.mass, "radius_mm": 1e3 * self.radius}]
+
+    def summary(self, labels: Labels) -> str:
+        """Text: how much, and where."""
+        (angle,) = labels.directions(np.array([self.angle]))
+        return (
+            f"Instead of adding {labels.weight_at(self.target(labels))}, "
+            f"grind off {1e3 * self.mass:.5g} g at {angle:.1f}°, "
+            f"radius {1e3 * self.radius:g} mm ({1e6 * self.unbalance:.5g} g·mm)"
+        )
 
 
 def opposite(weight: complex) -> complex:
@@ -304,7 +393,7 @@ def _row(weight: complex, size: float, drill: Drill, n: int, spacing: float) -> 
     angles = _turn(middle + spacing * (np.arange(n) - (n - 1) / 2))
     done = -complex(unbalance * np.exp(1j * angles).sum())
     depth = max(tip_depth - drill.tip_height, 0.0)
-    return Drilling(drill, angles, depth, tip_depth, mass, unbalance, done)
+    return Drilling(drill, angles, depth, tip_depth, mass, unbalance, done, complex(weight))
 
 
 def _overlap(found: Drilling, spacing: float) -> bool:

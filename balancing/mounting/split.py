@@ -23,6 +23,7 @@ from balancing.data.conventions import Labels
 from balancing.mounting.holes import Holes, Mounting, mounting
 from balancing.mounting.split_amounts import nearest_amounts
 from balancing.mounting.split_pieces import nearest_pieces
+from rotorid.base.text import percent
 
 _PROVEN = 1e-9
 
@@ -85,9 +86,6 @@ class Split:
 
     def to_dict(self, labels: Labels) -> dict[str, Any]:
         """As JSON types, in the labels' unit and angles."""
-        (wanted, got, off), (to, at, error_at) = labels.weight(
-            [self.target, self.mounting.vector, self.error]
-        )
         rows = []
         for h in np.flatnonzero(self.mounting.amounts):
             angle = _plain(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
@@ -107,10 +105,10 @@ class Split:
         return {
             "unit": labels.weight_unit,
             "angles": labels.angles,
-            "target": {"mass": _plain(wanted), "angle_deg": _plain(to)},
+            "target": labels.weight_entry(self.target),
             "holes": rows,
-            "mounted": {"mass": _plain(got), "angle_deg": _plain(at)},
-            "error": {"mass": _plain(off), "angle_deg": _plain(error_at)},
+            "mounted": labels.weight_entry(self.mounting.vector),
+            "error": labels.weight_entry(self.error),
             "relative_error": self.relative_error,
             "bound": self.bound * labels.weight_scale,
             "proven": self.proven,
@@ -131,6 +129,54 @@ class Split:
                 f"{self.bound * labels.weight_scale:.2g} {unit} exists"
             )
         return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class OnHoles:
+    """The nearest vector in the holes, and those of fewer pieces."""
+
+    nearest: Split
+    fewer: tuple[Split, ...]
+
+    def to_dict(self, labels: Labels) -> dict[str, Any]:
+        """As JSON types, in the labels' unit and angles."""
+        return {
+            "method": "holes",
+            **self.nearest.to_dict(labels),
+            "words": self.nearest.lines(labels),
+            "fewer_pieces": [one.to_dict(labels) for one in self.fewer],
+        }
+
+    def rows(self, labels: Labels) -> list[dict[str, Any]]:
+        """Each hole in use."""
+        found = self.to_dict(labels)
+        return [
+            {
+                "hole": row["hole"],
+                "angle_deg": row["angle_deg"],
+                f"mass_{labels.weight_unit}": row["mass"],
+                "pieces": words.partition(" in hole")[0],
+            }
+            for row, words in zip(found["holes"], found["words"], strict=False)
+        ]
+
+    def summary(self, labels: Labels) -> str:
+        """Text: what goes where, and what fewer pieces can do."""
+        lines = [self.nearest.summary(labels)]
+        if self.fewer:
+            lines += ["", "With fewer pieces:"]
+        for one in self.fewer:
+            words = ", ".join(one.lines(labels))
+            lines.append(f"  {one.pieces}: error {percent(one.relative_error)} %: {words}")
+        return "\n".join(lines)
+
+
+def split_on_holes(
+    target: complex, holes: Holes, *, most_pieces: int | None = None, good_enough: float = 0.0
+) -> OnHoles:
+    """`split` and `fewer_pieces` together."""
+    nearest = split(target, holes, most_pieces=most_pieces, good_enough=good_enough)
+    return OnHoles(nearest, tuple(fewer_pieces(nearest)))
 
 
 def split(
@@ -215,11 +261,6 @@ def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
         if one.pieces == n:
             out.append(one)
     return out
-
-
-def percent(share: float) -> str:
-    """A relative error in percent, two digits, never as 1e+02."""
-    return f"{100 * share:.0f}" if share >= 0.0995 else f"{100 * share:.2g}"
 
 
 def _degrees(angle: float) -> str:

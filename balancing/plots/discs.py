@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.correction.correction_result import Correction
+    from balancing.mounting.mounted_result import Mounted
 
 _HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.66, 1.11, 1.25, 1.8, 1.6
 _LARGEST = 0.13
@@ -148,6 +149,38 @@ def discs(
         )
     fig.suptitle(seen_from(correction.labels, clockwise), fontsize="medium")
     return fig
+
+
+def placed(
+    labels: Labels,
+    weight: complex,
+    *ways: Sequence[complex],
+    holes: Holes | None = None,
+    mounting: Mounting | None = None,
+    remove: bool = False,
+) -> Figure:
+    """A new figure with a disc for each of several ways to place one weight; see `disc`."""
+    from matplotlib.figure import Figure
+
+    several = ways or ((),)
+    fig = Figure(figsize=(4.6 * len(several) + 0.4, 5.6), layout="constrained")
+    for k, loose in enumerate(several, start=1):
+        ax = fig.add_subplot(1, len(several), k)
+        title = "weight" if len(several) == 1 else f"solution {k}"
+        disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose)
+    fig.suptitle(seen_from(labels).replace("; ", "\n"), fontsize="small")
+    return fig
+
+
+def mounted_discs(m: Mounted) -> Figure:
+    """A new figure of what is mounted in the holes of all planes, drawn as the job counts."""
+    planes = m.correction.planes
+    return discs(
+        m.correction,
+        {p: h for p, h in zip(planes, m.holes, strict=True) if h is not None},
+        {p: k for p, k in zip(planes, m.found.mountings, strict=True) if k is not None},
+        clockwise=m.correction.labels.drawn_sign < 0,
+    )
 
 
 def seen_from(labels: Labels, clockwise: bool = False) -> str:

@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from balancing.plots.polar import MARKERS
+from balancing.plots.polar import MARKERS, corrections
 from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
+    from balancing.correction.correction_result import Correction
     from balancing.correction.verdict import Verdict
     from balancing.iso21940 import Tolerance
     from balancing.trial_result import TrialWeight
@@ -33,6 +34,16 @@ def polar_figure(draw: Callable[[Axes], object]) -> Figure:
 
     figure = Figure(figsize=(5, 6), layout="constrained")
     draw(figure.add_subplot(projection="polar"))
+    return figure
+
+
+def overview(c: Correction, v: Verdict) -> Figure:
+    """A new figure: corrections, and residual unbalance inside or outside its tolerance circles."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 7.5), layout="constrained")
+    corrections(c, figure.add_subplot(1, 2, 1, projection="polar"))
+    residuals(v, figure.add_subplot(1, 2, 2, projection="polar"))
     return figure
 
 
@@ -74,6 +85,16 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
     polar.set_title(f"Residual unbalance and tolerance, {v.labels.weight_unit}", fontsize="medium", pad=14)
     _legend(polar)
     return polar
+
+
+def trial_figure(found: Sequence[TrialWeight]) -> Figure:
+    """A new figure with `trial_arrow` of each."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.5 * len(found), 5.5), layout="constrained")
+    for k, one in enumerate(found, start=1):
+        trial_arrow(one, figure.add_subplot(1, len(found), k, projection="polar"))
+    return figure
 
 
 def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:

@@ -9,6 +9,11 @@ WIDTH = 80
 MOST_NAMES = 40
 
 
+def percent(share: float) -> str:
+    """A share in percent, two digits, never as 1e+02."""
+    return f"{100 * share:.0f}" if share >= 0.0995 else f"{100 * share:.2g}"
+
+
 def figures(value: float, digits: int = 4) -> str:
     """A number with so many significant digits, written out where that is short.
 

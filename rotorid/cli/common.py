@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,6 +18,28 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+def options_of(kind: type) -> Callable[..., object]:
+    """Make the options of a command: their help is the documentation of its dataclass, field by field.
+
+    What is given back takes the name of a field, its metavar, names in place of its own, and the least value.
+    """
+    texts: dict[str, str] = {}
+    names: list[str] = []
+    for line in (inspect.getdoc(kind) or "").partition("----------\n")[2].splitlines():
+        if line.startswith(" "):
+            texts |= {name: f"{texts.get(name, '')} {line.strip()}".strip() for name in names}
+        elif line:
+            names = line.split(", ")
+    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
+
+    def option(field: str, metavar: str | None = None, *names: str, least: float | None = None) -> object:
+        shown = defaults[field] is not None
+        return typer.Option(*names, metavar=metavar, help=texts.get(field), show_default=shown, min=least)
+
+    return option
+
 
 JsonOption = Annotated[
     bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")
@@ -42,6 +66,40 @@ RotorArgument = Annotated[
 OperatingOption = Annotated[
     str | None,
     typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
+]
+
+PhaseOption = Annotated[
+    str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
+]
+AnglesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="DIRECTION",
+        help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
+        "where the job states its rotation.",
+        show_default=False,
+    ),
+]
+AmplitudeErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="PERCENT", min=0.0, help="Standard deviation of a reading's amplitude.", show_default=False
+    ),
+]
+PhaseErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="DEGREES", min=0.0, help="Standard deviation of a reading's phase.", show_default=False
+    ),
+]
+RunErrorOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="PERCENT",
+        min=0.0,
+        help="Standard deviation of what changes from run to run, percent of a reading.",
+        show_default=False,
+    ),
 ]
 
 

@@ -38,7 +38,7 @@ def chosen(kind: type[_O], given: Mapping[str, Any]) -> _O:
         The parameters: `locals()` at the beginning of the command.
     """
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
-    found = {field.name: given[field.name] for field in fields}
+    found = {f.name: f.default if given[f.name] is None else given[f.name] for f in fields}
     return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in found.items()})
 
 

@@ -2,3 +2,7 @@
 
 Nothing here prints; the command line, reports, `validate`, the demo, a notebook and a worksheet call it.
 """
+
+from rotorid.workflows.balance import Balance as Balance
+from rotorid.workflows.balance import BalanceOptions as BalanceOptions
+from rotorid.workflows.balance import balance as balance

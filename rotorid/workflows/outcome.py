@@ -63,6 +63,33 @@ class Outcome(ABC):
         return {**self.to_dict(), "provenance": dict(self.provenance)}
 
 
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Outcome):
+    """One result of the library as it is; subclasses say which."""
+
+    found: Any
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return dict(self.found.to_dict())
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return str(self.found.summary())
+
+    def to_frame(self) -> pd.DataFrame:
+        """Its table."""
+        frame: pd.DataFrame = self.found.to_frame()
+        return frame
+
+    def figure(self) -> Figure:
+        """Its picture."""
+        from rotorid.base.style import on_figure
+        from rotorid.plots import plot
+
+        return on_figure(lambda ax: plot(self.found, ax))
+
+
 def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """While it works each file is read once, so that its hash is that of what was read."""
 
@@ -76,8 +103,14 @@ def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
     return wrapper
 
 
-def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: ANN401 - any options dataclass
+def provenance(
+    files: Iterable[Path],
+    options: Any,  # noqa: ANN401 - any options dataclass
+    **given: object,
+) -> dict[str, Any]:
     """Program version, input files with their hashes, date, and options that differ from their defaults.
+
+    What is `given` in place of files stands before the options.
 
     Raises
     ------
@@ -92,12 +125,19 @@ def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: 
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
-        "options": {
-            field.name: _plain(getattr(options, field.name))
-            for field in dataclasses.fields(options)
-            if getattr(options, field.name) != field.default
-        },
+        "options": {key: _plain(value) for key, value in (given | changed(options)).items()},
     }
+
+
+def changed(options: Any) -> dict[str, object]:  # noqa: ANN401 - any options dataclass
+    """Options that differ from their defaults."""
+    found = {}
+    for field in dataclasses.fields(options):
+        value = getattr(options, field.name)
+        same = value == field.default
+        if hasattr(same, "__len__") or not same:  # an array is no default
+            found[field.name] = value
+    return found
 
 
 def _plain(value: object) -> object:

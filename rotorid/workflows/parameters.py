@@ -28,6 +28,11 @@ SLOWEST, FASTEST = 1e-9, 1e9
 _SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
 
 
+def option_name(field: str) -> str:
+    """As the command line writes it: "--first-hole"."""
+    return f"--{field.replace('_', '-')}"
+
+
 def number(text: str) -> float:
     """A finite number, or NaN for anything else."""
     try:
@@ -62,11 +67,11 @@ def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sens
     return found
 
 
-def degrees(text: str, what: str) -> float:
+def degrees(given: str | float, what: str) -> float:
     """An angle from −360 to 360 degrees."""
-    angle = number(text)
+    angle = number(given) if isinstance(given, str) else given
     if not -360 <= angle <= 360:
-        raise ValueError(f"{what}: {text.strip()!r} is no angle from -360 to 360 degrees")
+        raise ValueError(f"{what}: {str(given).strip()!r} is no angle from -360 to 360 degrees")
     return angle
 
 
@@ -81,36 +86,47 @@ def names(given: Names | None) -> list[str] | None:
 
 
 def pairs(
-    given: str | Mapping[str, _T], what: str, read: Callable[[str, str], _T], example: str
+    given: str | Sequence[str] | Mapping[str, _T],
+    what: str,
+    read: Callable[[str, str], _T],
+    example: str,
+    alone: Callable[[str], Mapping[str, _T]] | None = None,
+    sign: str = "=",
 ) -> dict[str, _T]:
     """Read "alpha12=1.3,U31=-0.3" as names with values.
 
     Parameters
     ----------
     given
-        The text, or the pairs themselves.
+        The text, its parts, or the pairs themselves.
     what
         The option, for complaints.
     read
         Makes a value of its name and its text.
     example
         How it is written.
+    alone
+        What a part without `sign` stands for; None: nothing.
+    sign
+        Between name and value.
 
     Raises
     ------
     ValueError
         For anything else, and for a name that stands twice.
     """
-    if not isinstance(given, str):
+    if isinstance(given, Mapping):
         return dict(given)
+    shown = given if isinstance(given, str) else ",".join(given)
     found: dict[str, _T] = {}
-    for part in given.split(","):
-        name, sign, text = (piece.strip() for piece in part.partition("="))
-        if not sign or not name:
-            raise ValueError(f"{what} {given!r}: {part.strip()!r} is no NAME=VALUE; use {example}")
-        if name in found:
-            raise ValueError(f"{what} {given!r}: {name} stands twice")
-        found[name] = read(name, text)
+    for part in given.split(",") if isinstance(given, str) else given:
+        name, found_sign, text = (piece.strip() for piece in part.rpartition(sign))
+        if not (name and found_sign) and (found_sign or not text or alone is None):
+            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}")
+        new = alone(text) if alone is not None and not found_sign else {name: read(name, text)}
+        if twice := next((one for one in new if one in found), None):
+            raise ValueError(f"{what} {shown!r}: {twice} stands twice")
+        found |= new
     return found
 
 

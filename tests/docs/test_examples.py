@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import importlib.util
+import inspect
 import io
 import os
 import subprocess
@@ -24,6 +25,11 @@ PINNED = {
         "largest_with_pieces_um_pp": 1.51306549,
         "largest_in_check_um_pp": 0.96,
         "trim_left_g_mm": 13.5870451,
+    },
+    "balance_workflow": {
+        "holes": 11,
+        "largest_after_um_pp": 1.51306549,
+        "readings_that_pass": 20,
     },
     "plan_a_trial_weight": {
         "plain_g": 24.8405346,
@@ -182,6 +188,14 @@ def test_pictures_on_request(name, tmp_path):
     module = load(name)
     module.main(str(tmp_path / "p.png"))
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_sheet_of_a_job_in_twelve_lines(tmp_path):
+    module = load("balance_workflow")
+    module.main(str(tmp_path / "sheet.html"))
+    assert "Balancing sheet: turbo_job" in (tmp_path / "sheet.html").read_text(encoding="utf-8")
+    lines = inspect.getsource(module.main).splitlines()
+    assert len(lines) <= 12
 
 
 def test_the_model_file_of_a_reduction_is_read_by_fit(tmp_path):

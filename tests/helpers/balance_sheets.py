@@ -5,15 +5,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-from balancing import correct
-from balancing.correction.check import compare_check
-from balancing.mounting.mounted import mount
-from rotorid.cli.commands.balance_report import Report
-from rotorid.cli.commands.coefficients import choose
-from rotorid.cli.commands.verdict import Places, judge, tolerance_of
-from rotorid.cli.common import provenance
-from rotorid.report import balance
-from rotorid.tables import read_job
+from rotorid.workflows.balance import BalanceOptions, balance
 
 DATA = Path(__file__).parents[2] / "sample_data"
 VOID = {"meta", "link", "br", "img", "input", "hr"}
@@ -101,42 +93,17 @@ def value_at(document, key):
     return document
 
 
-def parts_of(path, *, split=False, refine=False, grade=(None, None, None), **settings):
-    """Everything that the command makes of a job, as the command makes it."""
-    job = read_job(path, **settings)
-    found = choose(job, None, None, refined=refine)
-    result = correct(
-        found.influence,
-        baseline=found.baseline,
-        planes=list(found.used),
-        limits=job.limits_of(found.influence.planes),
-        row_weights=job.row_weights,
-        remove=sorted(job.remove),
-    )
-    report = Report(result, found.influence)
-    if split:
-        report.mounted = mount(
-            result, found.influence, found.baseline, job.holes, row_weights=job.row_weights, on_top=refine
-        )
-    if job.check is not None and not refine:
-        report.check = compare_check(result, job.check, found.influence, found.baseline)
-    tolerance = tolerance_of(*grade, result.planes, Places(None, None, None))
-    report.verdict = judge(result, found.influence, job, tolerance, report.mounted)
-    return job, report
+def parts_of(path, *, grade=(None, None, None), **options):
+    """The job, and everything that is made of it."""
+    words = dict(zip(("grade", "rotor_mass", "service_speed"), grade, strict=True))
+    found = balance(path, BalanceOptions(**words, **options))
+    return found.job, found
 
 
 def sheet_of(path, **options):
-    job, report = parts_of(path, **options)
-    made = balance.balance_report(
-        report.to_dict(),
-        report.result,
-        report.influence,
-        job,
-        provenance(job.files, {"split": options.get("split", False)}),
-        mounted=report.mounted,
-        verdict=report.verdict,
-    ).decode()
-    return made, Sheet(made), report, job
+    job, found = parts_of(path, **options)
+    made = found.sheet().decode()
+    return made, Sheet(made), found, job
 
 
 def hard(folder, drop=""):

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.tables.job.job_data import Job
-from rotorid.tables.job.job_limits import limit_keys
 from rotorid.tables.job.keys import COLUMNS
+from rotorid.tables.job.quantity import Quantity
 from rotorid.tables.job.settings import Overrides
 from rotorid.tables.job.workbook_reading import TABLES, is_notes, read_job_book
 from rotorid.tables.reader.columns import read_grid
@@ -36,8 +36,8 @@ class JobSource:
         Influence table, beside tables.
     phase, angles, amplitude_error_percent, phase_error_deg, run_error_percent
         In place of what the job says.
-    max_mass, limits
-        As `joblimits.with_limits` takes them.
+    max_weights, limits
+        As `job_limits.with_limits` takes them.
     """
 
     files: tuple[Path, ...]
@@ -47,8 +47,8 @@ class JobSource:
     amplitude_error_percent: float | None = None
     phase_error_deg: float | None = None
     run_error_percent: float | None = None
-    max_mass: str | None = None
-    limits: tuple[str, ...] = ()
+    max_weights: Mapping[str, Quantity] = field(default_factory=dict)
+    limits: Mapping[str, Quantity] = field(default_factory=dict)
 
     @property
     def overrides(self) -> Overrides:
@@ -176,7 +176,18 @@ def _override(settings: dict[str, Any], source: JobSource, job: Job) -> None:
     given = {key: value for key, value in errors.items() if value is not None}
     if given:
         settings["errors"] = {**settings.get("errors", {}), **given}
-    planes, sensors = limit_keys(job, source.max_mass, source.limits)
+    labels = job.trials.labels
+    planes = {
+        name: (f"max_{'mass' if most.unit.kind == 'mass' else 'unbalance'}_{most.unit.name}", most.value)
+        for name, most in source.max_weights.items()
+    }
+    sensors = {
+        name: (
+            "limit",
+            most.value if most.unit.name == labels.vibration_unit else most.si * labels.vibration_scale,
+        )
+        for name, most in source.limits.items()
+    }
     for table, items in (("planes", planes), ("sensors", sensors)):
         for name, (key, value) in items.items():
             own = dict(settings.setdefault(table, {}).get(name, {}))

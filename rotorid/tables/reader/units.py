@@ -79,6 +79,7 @@ STIFFNESS = _table("stiffness", {"N_per_m": (1.0, 1.0), "N_per_mm": (1e3, 1.0), 
 DAMPING = _table("damping", {"N_s_per_m": (1.0, 1.0), "N_s_per_mm": (1e3, 1.0)})
 MODULUS = _table("modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1.0)})
 DENSITY = _table("density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0)})
+FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (4.4482216152605, 1.0)})
 TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3)})
 
 _PEAK = {

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from balancing.data.conventions import Labels
+from balancing.data.trials import Trials
+from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, make_table, must_be, read_table
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit, one_of
+from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs.conventions import FULL_TURN, Conventions, polar
 from rotorid.tables.runs.speeds import merge_speeds, same_speed, show_speed
 
@@ -33,23 +34,10 @@ _RUNS_NAMED, _SPEEDS_NAMED = 20, 10
 """Of runs with gaps, and of speeds that one run lacks, so many are named."""
 
 
-@dataclass(frozen=True, eq=False)
-class Runs:
-    """Readings of all runs; arrays as in `balancing.Trials`."""
-
-    source: str
-    runs: tuple[str, ...]
-    speeds: FloatArray
-    sensors: tuple[str, ...]
-    readings: ComplexArray
-    steps: FloatArray
-    unit: Unit
-    speed_unit: Unit
-    warnings: tuple[str, ...] = ()
-
-
-def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Problems) -> Runs | None:
-    """Read a runs table, or None and problems.
+def read_runs(
+    source: str | Path | Grid, conventions: Conventions, problems: Problems
+) -> tuple[tuple[str, ...] | None, Trials | None]:
+    """Read a runs table: names of its runs, and its readings without weights; None and problems.
 
     Parameters
     ----------
@@ -65,7 +53,7 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
     else:
         table = read_table(source, "runs", COLUMNS, problems)
     if table is None:
-        return None
+        return None, None
     speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
     must_be(table, "speed", speed > 0, "a speed above 0", problems)
     must_be(table, "amplitude", amplitude >= 0, "an amplitude of 0 or more", problems)
@@ -85,10 +73,8 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
         _complain_about_repeats(table, list(cells.values()), problems)
     if table.complete and len(usable) == len(table) and len(problems) == start:
         _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions, problems)
-    unit, speed_unit = table.unit("amplitude"), table.unit("speed")
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
-        nothing = np.empty((0, len(runs), len(speeds), len(sensors)), dtype=complex)
-        return Runs(table.source, runs, speeds, sensors, nothing, nothing.real, unit, speed_unit)
+        return runs, None
     values = polar(amplitude, phase, conventions.phase_sign)
     order = _repeat_order(table)
     most = max((len(rows) for rows in cells.values()), default=1)
@@ -99,7 +85,19 @@ def read_runs(source: str | Path | Grid, conventions: Conventions, problems: Pro
         for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
             readings[(k, *place)] = values[row]
             steps[(slice(None), k, *place)] = written[:, row]
-    return Runs(table.source, runs, speeds, sensors, readings, steps, unit, speed_unit, merged)
+    labels = Labels(
+        vibration_unit=table.unit("amplitude").name,
+        vibration_scale=table.unit("amplitude").scale,
+        weight_unit="g",
+        weight_scale=1e3,
+        phase=conventions.phase,
+        angles=conventions.angles,
+        speed_unit=table.unit("speed").name,
+    )
+    nothing = np.zeros((len(runs), 0), dtype=complex)
+    return runs, Trials(
+        runs, speeds, sensors, (), readings, nothing, labels=labels, warnings=merged, steps=steps
+    )
 
 
 def _repeat_order(table: Table) -> list[int]:

@@ -31,8 +31,8 @@ from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.runs.conventions import Conventions, polar
-from rotorid.tables.runs.runs_table import Runs, read_runs
 from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.trials import make_trials
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
@@ -216,7 +216,7 @@ def _from_file(
 ) -> _Found | None:
     """Vectors of a runs table."""
     own = Problems()  # what is wrong with the job must not hide what is wrong with this file, nor the reverse
-    runs = read_runs(path, conventions, own)
+    runs = make_trials(path, None, conventions, None, own)
     try:
         own.stop()
     except InputError as error:
@@ -224,28 +224,25 @@ def _from_file(
             problems.add(problem.file, problem.row, problem.column, problem.value, problem.expected)
         return None
     assert runs is not None
-    before = len(problems)
-    ours = units.vibration(trials.labels.vibration_unit)
-    if runs.unit.kind != ours.kind:
-        found = runs.unit.name or "no unit"
-        problems.add(runs.source, None, "amplitude", found, _other_unit(ours.name))
+    before, source = len(problems), path.source if isinstance(path, Grid) else str(path)
+    ours, its = (units.vibration(one.labels.vibration_unit) for one in (trials, runs))
+    if its.kind != ours.kind:
+        problems.add(source, None, "amplitude", its.name or "no unit", _other_unit(ours.name))
     if len(runs.runs) > 1:
         expected = f"one run, at slow speed; there are {listing(map(repr, runs.runs), 'and')}"
-        problems.add(runs.source, None, "run", runs.runs[1], expected)
+        problems.add(source, None, "run", runs.runs[1], expected)
     for name in runs.sensors:
         if name not in trials.sensors:
             expected = (
                 f"a sensor of the job{did_you_mean(name, trials.sensors)}; "
                 f"its sensors are {listing(trials.sensors, 'and')}"
             )
-            problems.add(runs.source, None, "sensor", name, expected)
-    rows = _rows(runs, trials, conventions, problems) if len(runs.speeds) > 1 else None
+            problems.add(source, None, "sensor", name, expected)
+    rows = _rows(runs, source, trials, conventions, problems) if len(runs.speeds) > 1 else None
     if len(problems) > before:
         return None
-    count = np.sum(~np.isnan(runs.readings[:, 0]), axis=0)
-    mean = np.nansum(runs.readings[:, 0], axis=0) / count
     all_sensors = np.zeros((len(runs.speeds), len(trials.sensors)), dtype=complex)
-    all_sensors[:, [trials.sensors.index(name) for name in runs.sensors]] = mean
+    all_sensors[:, [trials.sensors.index(name) for name in runs.sensors]] = runs.mean[0]
     if rows is not None:
         return _Found(all_sensors[rows], trials.speeds, runs.sensors)
     speed, lowest = float(runs.speeds[0]), float(trials.speeds.min())
@@ -259,7 +256,9 @@ def _from_file(
     return _Found(all_sensors[0], None, runs.sensors, words)
 
 
-def _rows(runs: Runs, trials: Trials, conventions: Conventions, problems: Problems) -> list[int]:
+def _rows(
+    runs: Trials, source: str, trials: Trials, conventions: Conventions, problems: Problems
+) -> list[int]:
     """Which row of the slow run belongs to each speed of the job, where there are several."""
     rows = []
     unit = units.SPEED[trials.labels.speed_unit]
@@ -271,7 +270,7 @@ def _rows(runs: Runs, trials: Trials, conventions: Conventions, problems: Proble
                 f"one slow speed, whose vectors hold for all speeds, or vectors at every speed of the job: "
                 f"{show_speed(float(speed), unit)} is not among {known}"
             )
-            problems.add(runs.source, None, "speed", None, expected)
+            problems.add(source, None, "speed", None, expected)
             break
         rows.append(near)
     return rows

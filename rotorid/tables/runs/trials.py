@@ -5,16 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from balancing.data.conventions import Labels
 from balancing.data.trials import ReadingErrors, Trials, off_axis
 from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.units import Unit
 from rotorid.tables.runs.conventions import DEFAULT_TOLERANCE, Angles, Conventions, Phase, StatedErrors
 from rotorid.tables.runs.runs_table import read_runs
-from rotorid.tables.runs.weights_table import Weights, read_weights
+from rotorid.tables.runs.weights_table import read_weights
 
 
 def read_trials(
@@ -74,35 +70,14 @@ def make_trials(
     problems: Problems,
 ) -> Trials | None:
     """Put both tables together, or None and problems."""
-    read = read_runs(runs, conventions, problems)
-    if weights is None:
-        names = read.runs if read else ()
-        mounted: Weights | None = Weights(
-            (), np.zeros((len(names), 0), dtype=complex), Unit("g", "mass", 1.0, 1e3)
-        )
-    else:
-        mounted = read_weights(weights, read.runs if read else None, conventions, problems)
-    if read is None or mounted is None or len(problems):
+    names, read = read_runs(runs, conventions, problems)
+    mounted = None if weights is None else read_weights(weights, names, conventions, problems)
+    if read is None or (mounted is None and weights is not None) or len(problems):
         return None
-    labels = Labels(
-        vibration_unit=read.unit.name,
-        vibration_scale=read.unit.scale,
-        weight_unit=mounted.unit.name,
-        weight_scale=mounted.unit.scale,
-        phase=conventions.phase,
-        angles=conventions.angles,
-        speed_unit=read.speed_unit.name,
-    )
-    return Trials(
-        runs=read.runs,
-        speeds=read.speeds,
-        sensors=read.sensors,
-        planes=mounted.planes,
-        readings=read.readings,
-        weights=mounted.weights,
-        errors=errors.in_si(labels) if isinstance(errors, StatedErrors) else errors,
-        labels=labels,
-        warnings=read.warnings,
-        steps=read.steps,
-        run_errors=errors.between_runs(labels) if isinstance(errors, StatedErrors) else None,
-    )
+    if mounted is not None:
+        unit = mounted.unit
+        labels = replace(read.labels, weight_unit=unit.name, weight_scale=unit.scale)
+        read = replace(read, planes=mounted.planes, weights=mounted.weights, labels=labels)
+    if not isinstance(errors, StatedErrors):
+        return replace(read, errors=errors)
+    return replace(read, errors=errors.in_si(read.labels), run_errors=errors.between_runs(read.labels))

@@ -9,7 +9,7 @@ from cases import each_of
 
 from balancing import correct, estimate_influence
 from balancing.mounting.mounted import mount
-from rotorid.cli.commands.balance_report import Report
+from balancing.plots.discs import mounted_discs
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
 
@@ -196,9 +196,9 @@ def test_a_plane_without_holes_shows_its_weight_beside_the_pieces_of_another(tmp
     job = read_job(job_with(tmp_path, "[planes.left]\nholes = 12\navailable_g_mm = [150]\nper_hole = 2\n"))
     influence = estimate_influence(job.trials)
     found = correct(influence)
-    report = Report(found, influence, mounted=mount(found, influence, None, job.holes))
-    assert report.mounted.holes[1] is None
-    figure = report.figure()
+    mounted = mount(found, influence, None, job.holes)
+    assert mounted.holes[1] is None
+    figure = mounted_discs(mounted)
     assert [ax.get_title() for ax in figure.axes] == ["left: add", "middle: add", "right: add"]
     left, middle, right = ({text.get_text() for text in ax.texts} for ax in figure.axes)
     assert {"1", "12"} <= left

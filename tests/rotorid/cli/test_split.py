@@ -8,9 +8,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from rotorid.cli.amounts import vectors_of
-from rotorid.cli.commands import split_answers as answers
 from rotorid.cli.commands.split import split
+from rotorid.workflows.quantities import vectors
+from rotorid.workflows.split import SplitOptions
+from rotorid.workflows.split import split as work
 
 
 @pytest.fixture
@@ -179,7 +180,7 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --holes -90,90,280", "a full turn or more apart"),
         ("35g@120 --holes 0", "number of equally spaced holes, 1 to 1000"),
         ("35g@120 --holes 4 --first-hole 500", "--first-hole"),
-        ("35g@120 --holes 4 --pieces 0g", "a weight must be above 0"),
+        ("35g@120 --holes 4 --pieces 0g", "expected a value above 0"),
         ("35g@120 --holes 4 --pieces 10", "a weight needs its unit"),
         ("35g@120 --holes 4 --pieces 10g,10g", "listed twice"),
         ("35g@120 --holes 4 --pieces 10g --step 1g", "either --pieces or a --step"),
@@ -190,12 +191,12 @@ def test_combining_trimming_and_rounding(run):
         ("35g@120 --holes 4 --pieces 10g --most-pieces 0", "1 or more"),
         ("35g@120 --holes 4 --pieces 10g --good-enough -1", "no error from 0 to 100"),
         ("35g@120 --holes 4 --taken 5:10g", "the number of a hole, 1 to 4"),
-        ("35g@120 --holes 4 --taken 1:10g,1:3g", "listed twice"),
+        ("35g@120 --holes 4 --taken 1:10g,1:3g", "1 stands twice"),
         ("35g@120 --holes 2 --taken 1:3g,2:3g", "nothing can be mounted"),
         ("35g@120 --holes 0,10 --taken 1:3g --max-mass 1g", "no admissible weight at all"),
-        ("35g@120 --drill 8mm --radius 0mm", "a length must be above 0"),
+        ("35g@120 --drill 8mm --radius 0mm", "expected a value above 0"),
         ("35g@120 --drill 8mm", "--drill needs --radius"),
-        ("35g@120 --drill 8 --radius 100mm", "expected one of the units"),
+        ("35g@120 --drill 8 --radius 100mm", "--drill '8': a number with its unit (m, mm, um, mil, in)"),
         ("35g@120 --drill 8mm --radius 100mm --depth 1mm", "use a larger drill or depth"),
         ("35g@120 --drill 8mm --radius 100mm --density 0", "density must be positive"),
         ("35g@120 --drill 8mm --radius 100mm --tip-angle 200", "tip angle"),
@@ -215,14 +216,14 @@ def test_bad_input_gives_one_message(run, args, words):
 
 def test_wrong_way_of_angles(run):
     outcome = run("35g@120", "--grind", "--radius", "1m", "--angles", "sideways")
-    assert (outcome.code, "--angles must be" in outcome.err) == (2, True)
+    assert (outcome.code, "--angles 'sideways' is not known" in outcome.err) == (2, True)
 
 
 def test_vectors_are_read_exactly():
-    labels, (one,) = vectors_of("1e+1g@90", "against rotation")
+    labels, (one,) = vectors("1e+1g@90", "against rotation")
     assert one == -0.01j
     assert labels.weight_unit == "g"
-    _, several = vectors_of("2g@0 + 3g@-90°", "with rotation")
+    _, several = vectors("2g@0 + 3g@-90°", "with rotation")
     assert several == [0.002, -0.003j]
 
 
@@ -247,16 +248,16 @@ def test_what_the_picture_shows_makes_what_is_wanted(monkeypatch, unit):
 
     monkeypatch.setattr(discs, "disc", disc)
     size = 35 if unit == "g" else 3500
-    labels, (target,) = vectors_of(f"{size}{unit}@120", "with rotation")
-    wanted = answers.Wanted(target, labels, 0.1)
+    _, (target,) = vectors(f"{size}{unit}@120", "with rotation")
     two = "20g,30g" if unit == "g" else "2000g_mm,3000g_mm"
-    made = {
-        "two": answers.at_two_angles(wanted, two),
-        "drilled": answers.drilled(wanted, "8mm", False, "12mm", 7800.0, 118.0, None),
-        "ground": answers.ground(wanted),
-        "one": answers.as_one(wanted, None, 0.0),
+    options = {
+        "two": SplitOptions(two=two),
+        "drilled": SplitOptions(drill="8mm", depth="12mm", density=7800.0, radius="100mm"),
+        "ground": SplitOptions(grind=True, radius="100mm"),
+        "one": SplitOptions(step="1mg" if unit == "g" else "1mg_mm"),
     }
-    figures = {name: answer.figure() for name, answer in made.items()}
+    made = {name: work(f"{size}{unit}@120", chosen) for name, chosen in options.items()}
+    figures = {name: found.figure() for name, found in made.items()}
     assert [plane for plane, _ in drawn] == ["solution 1", "solution 2", "weight", "weight", "weight"]
     assert [options["remove"] for _, options in drawn] == [False, False, True, True, False]
     for _, options in drawn:
@@ -286,8 +287,9 @@ def test_no_weight_is_rounded_by_more_than_the_largest_possible_error(step, angl
     worst = 0.0
     for size in np.linspace(20.0, 24.0, 9):
         for angle in np.linspace(0.0, 30.0, 13):
-            labels, (target,) = vectors_of(f"{size:.10g}g@{angle:.10g}", "with rotation")
-            document = answers.as_one(answers.Wanted(target, labels, None), step, angle_step).document
+            _, (target,) = vectors(f"{size:.10g}g@{angle:.10g}", "with rotation")
+            options = SplitOptions(step=step, angle_step=angle_step)
+            document = work(f"{size:.10g}g@{angle:.10g}", options).document
             error = vector([document["weight"]]) - 1e3 * target
             assert document["error"]["mass"] == pytest.approx(abs(error), abs=1e-9)
             assert document["relative_error"] == pytest.approx(abs(error) / size, abs=1e-9)

@@ -147,7 +147,7 @@ def test_files(cli, tmp_path):
         ((), "without a job, give --rotor-mass (or --bearing-load) and --speed and --radius"),
         (
             ("--rotor-mass", "500kg", "--speed", "3000rpm", "--radius", "0mm"),
-            "radius must be a finite number above 0",
+            "--radius '0mm': expected a value above 0, such as 200mm",
         ),
         (
             ("--rotor-mass", "500", "--speed", "3000rpm", "--radius", "1mm"),
@@ -156,7 +156,10 @@ def test_files(cli, tmp_path):
         ((*FORCE, "--bearing-load", "1N"), "choose one"),
         ((*FORCE, "--fraction", "0"), "fraction of the load must be"),
         ((*FORCE, "--reading-phase", "120"), "needs both the phase"),
-        ((*FORCE, "--reading-phase", "500", "--lag", "at"), "--reading-phase 500: an angle from -360 to 360"),
+        (
+            (*FORCE, "--reading-phase", "500", "--lag", "at"),
+            "--reading-phase: '500.0' is no angle from -360 to 360",
+        ),
         ((*FORCE, "--reading-phase", "1", "--lag", "high"), "--lag 'high': below, at or above, or degrees"),
         ((*FORCE, *ANGLE, "--critical", "1rpm"), "choose one"),
         (
@@ -166,15 +169,15 @@ def test_files(cli, tmp_path):
         ((*FORCE, "--measures", "noise"), "--measures 'noise' is not known"),
         ((*FORCE, "--unit", "stone"), "one of the units kg, g, mg, oz"),
         ((*FORCE, "--plane", "left"), "--plane needs a job"),
-        ((*FORCE, "--plot", "x.png"), "--plot needs an angle"),
+        ((*FORCE, "--plot", "x.png"), "no angle to draw"),
         ((*FORCE, "--phase", "late"), "phase must be 'lead' or 'lag'"),
         ((TURBO, "--speed", "3000rpm"), "--speed is for a trial weight without a job"),
         ((TURBO, "--plane", "top"), "no plane 'top'; the planes are 'left', 'middle', 'right'"),
         ((TURBO, "--mass", "5g"), "--mass '5g': a number with its unit"),
         ((TURBO, "--share", "0"), "share of the largest reading must be"),
-        ((BK, "--radius", "0mm"), "--radius '0mm': a radius above 0"),
+        ((BK, "--radius", "0mm"), "--radius '0mm': expected a value above 0"),
         ((TURBO, "--radius", "200mm"), "--radius is for weights as masses"),
-        ((TURBO, "--rotor-mass", "0kg"), "the load must be above 0"),
+        ((TURBO, "--rotor-mass", "0kg"), "mass of the rotor must be a finite number above 0"),
     ],
 )
 def test_bad_input_is_one_message(cli, args, words):

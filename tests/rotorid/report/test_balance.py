@@ -190,9 +190,7 @@ def test_a_job_as_its_files_have_it():
 
 
 def test_errors_of_coefficients_follow_from_the_readings():
-    _, sheet, _, job = sheet_of(
-        DATA / "bk_two_plane" / "job.toml", amplitude_error_percent=3.0, phase_error_deg=0.5
-    )
+    _, sheet, _, job = sheet_of(DATA / "bk_two_plane" / "job.toml", amplitude_error=3.0, phase_error=0.5)
     Y, T, steps = job.trials.mean[:, 0], job.trials.weights, job.trials.steps[:, 0, :, 0]
     for i, row in enumerate(sheet.document["sheet"]["influence"]["rows"]):
         c, p = divmod(i, 2)

@@ -9,7 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_c
 
 from balancing import correct, estimate_influence
 from rotorid.tables import read_job
-from rotorid.tables.job.job_limits import with_limits
+from rotorid.workflows.quantities import limited
 
 HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 AGAINST = 'angles = "against rotation"\n'
@@ -155,11 +155,11 @@ def test_slow_roll_and_key_phasor(job, folder):
 def test_a_largest_weight_of_the_command_line_holds_for_the_holes(job):
     read = job(EQUAL + "max_mass_g = 6")
     assert read.holes["1"].max_weight == 6e-3
-    assert with_limits(read, "8g", []).holes["1"].max_weight == 8e-3
-    assert with_limits(read, None, ["2"]).holes["1"].max_weight == 6e-3
+    assert limited(read, "8g", []).holes["1"].max_weight == 8e-3
+    assert limited(read, None, ["2"]).holes["1"].max_weight == 6e-3
     steps = job("holes = 4\nstep_g = 5")
     with pytest.raises(ValueError, match=r"--max-mass '2g': plane '1': nothing can be mounted"):
-        with_limits(steps, "2g", [])
+        limited(steps, "2g", [])
 
 
 BAD = [

@@ -9,7 +9,8 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
 from rotorid.tables import job_from_files, read_job
-from rotorid.tables.job.job_limits import arc, with_limits
+from rotorid.tables.job.job_limits import arc
+from rotorid.workflows.quantities import limited
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]
@@ -279,22 +280,22 @@ def test_all_problems_at_once(job):
 
 def test_limits_of_the_command_line(job):
     read = job()
-    both = with_limits(read, "5g", ["B=3"])
+    both = limited(read, "5g", ["B=3"])
     np.testing.assert_allclose(both.limits.max_weight, [0.005, np.inf])  # plane 2 is left out
     np.testing.assert_allclose(both.limits.residual[:, 1], 1.5e-6)
     np.testing.assert_array_equal(both.limits.residual[:, 0], read.limits.residual[:, 0])
     assert both.limits.forbidden == read.limits.forbidden
-    one = with_limits(read, " 2 = 7 ", [])  # the unit of the job
+    one = limited(read, " 2 = 7 ", [])  # the unit of the job
     np.testing.assert_allclose(one.limits.max_weight, [0.02, 0.007])
     plain = job(HEAD)
-    assert with_limits(plain, None, []) is plain
-    each = with_limits(plain, "1=0.01lb,2=3000mg", ["20", "A=10um"])
+    assert limited(plain, None, []) is plain
+    each = limited(plain, "1=0.01lb,2=3000mg", ["20", "A=10um"])
     np.testing.assert_allclose(each.limits.max_weight, [0.0045359237, 0.003])
     np.testing.assert_allclose(each.limits.residual, [[10e-6, 10e-6], [10e-6, 10e-6]])
-    np.testing.assert_allclose(with_limits(read, "1=3000g_mm", []).limits.max_weight[0], 0.02)
-    np.testing.assert_allclose(with_limits(read, "1=3000g·mm", []).limits.max_weight[0], 0.02)
+    np.testing.assert_allclose(limited(read, "1=3000g_mm", []).limits.max_weight[0], 0.02)
+    np.testing.assert_allclose(limited(read, "1=3000g·mm", []).limits.max_weight[0], 0.02)
     tables = [p for p in plain.files if p.suffix == ".csv"]
-    assert with_limits(job_from_files(tables), "5", []).limits.max_weight.tolist() == [0.005, 0.005]
+    assert limited(job_from_files(tables), "5", []).limits.max_weight.tolist() == [0.005, 0.005]
 
 
 @pytest.mark.parametrize(
@@ -306,9 +307,9 @@ def test_limits_of_the_command_line(job):
         ("nan", [], "expected a finite number"),
         ("5stone", [], "expected a unit of weight"),
         ("3=5g", [], "there is no plane '3'; there are '1' and '2'"),
-        ("=5g", [], "write 5g or left=5g,right=3g"),
-        ("1=", [], "write 5g or left=5g,right=3g"),
-        ("1=5g,1=3g", [], "each plane once"),
+        ("=5g", [], "use 5g or left=5g,right=3g"),
+        ("1=", [], "--max-mass '': expected a number, such as 5g"),
+        ("1=5g,1=3g", [], "--max-mass '1=5g,1=3g': 1 stands twice"),
         ("5,5g", [], "a decimal sign is a point"),
         ("3000g_mm", [], "the weights of the job are in g, to which g_mm converts only with a radius_mm"),
         (None, ["a=3"], "there is no sensor 'a' (did you mean 'A'?); there are 'A' and 'B'"),
@@ -320,5 +321,5 @@ def test_limits_of_the_command_line(job):
 )
 def test_bad_limits_of_the_command_line(job, mass, limits, words):
     with pytest.raises(ValueError) as caught:
-        with_limits(job(HEAD), mass, limits)
+        limited(job(HEAD), mass, limits)
     assert words in str(caught.value)

@@ -224,12 +224,13 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
 
 
 def test_limits_of_the_command_line_come_back(folder, tmp_path):
-    from rotorid.tables.job.job_limits import with_limits
+    from rotorid.workflows.quantities import largest_amplitudes, largest_weights, limited
 
     path = write_job(folder, PARTS["limits"])
     for max_mass, limit in (("2.2g", ["0.3mil_pp"]), ("1=0.07oz,2=3", ["A=7.7", "B=0.012"])):
-        job = with_limits(read_job(path), max_mass, limit)
-        source = JobSource((path,), max_mass=max_mass, limits=tuple(limit))
+        job = limited(read_job(path), max_mass, limit)
+        most = {"max_weights": largest_weights(job, max_mass), "limits": largest_amplitudes(job, limit)}
+        source = JobSource((path,), **most)
         back = there_and_back(job, source, tmp_path / "sheet.xlsx")
         assert differences(read_job(path), back), "the limits of the file are replaced"
 

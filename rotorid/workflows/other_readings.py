@@ -1,12 +1,10 @@
-"""What `rotorid balance` asks the runs about conventions, and what it would say under other ones."""
+"""What the runs of a job say about its conventions, and what it would be under other ones."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from rotorid.base.text import listing
 
@@ -16,28 +14,20 @@ if TYPE_CHECKING:
     from rotorid.tables import Job
 
 
-def ask_runs(job: Job, mounted: Correction | None = None) -> ConventionTest:
-    """What trial runs, and check runs of which is known what was mounted, say about conventions."""
-    from balancing.coefficients.convention_test import convention_test
-    from balancing.correction.refine import together
-
-    if job.check is None or not (mounted or job.check_mounted):
-        return convention_test(job.trials)
-    return convention_test(
-        together(job.trials, job.check, corrections=None if job.check_mounted else mounted)
-    )
-
-
 def with_contradiction(job: Job) -> Job:
     """The job with the warning, before all others, where its runs contradict its conventions."""
     from balancing.correction.other_readings import contradiction
 
-    words = contradiction(ask_runs(job), job.trials.labels)
+    words = contradiction(_ask(job), job.trials.labels)
     return replace(job, trials=replace(job.trials, warnings=words + job.trials.warnings))
 
 
 def with_other_readings(
-    result: Correction, test: ConventionTest, again: Callable[[str, str], Correction] | None
+    result: Correction,
+    job: Job,
+    again: Callable[[str, str], Correction] | None,
+    *,
+    refined: bool = False,
 ) -> Correction:
     """The correction with what the runs say about its conventions, and what other ones give.
 
@@ -45,13 +35,20 @@ def with_other_readings(
     ----------
     result
         As the job is read.
-    test
-        What its runs say.
+    job
+        Its runs are asked.
     again
         Solves the same job with this phase and these angles; None where that cannot be done.
+    refined
+        Whether the check runs took part: what was mounted in them as proposed, before it was refined, was
+        proposed by these conventions and by no others.
     """
     from balancing.correction.other_readings import OtherReading, contradiction
 
+    if refined and not job.check_mounted:
+        again, test = None, _ask(job)
+    else:
+        test = _ask(job, result)
     labels = result.labels
     first = contradiction(test, labels)
     warnings = first + tuple(w for w in result.warnings if w not in first)
@@ -76,8 +73,22 @@ def with_other_readings(
     return replace(result, warnings=warnings, convention_test=test, others=tuple(others))
 
 
+def _ask(job: Job, mounted: Correction | None = None) -> ConventionTest:
+    """What trial runs, and check runs of which is known what was mounted, say about conventions."""
+    from balancing.coefficients.convention_test import convention_test
+    from balancing.correction.refine import together
+
+    if job.check is None or not (mounted or job.check_mounted):
+        return convention_test(job.trials)
+    return convention_test(
+        together(job.trials, job.check, corrections=None if job.check_mounted else mounted)
+    )
+
+
 def _alike(a: Correction, b: Correction) -> bool:
     """Whether both say the same numbers, as they are printed."""
+    import numpy as np
+
     one, two = (
         m * np.exp(1j * np.radians(angle)) for m, angle in (c.labels.weight(c.weights) for c in (a, b))
     )

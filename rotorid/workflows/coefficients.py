@@ -2,31 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from rotorid.base.arrays import FloatArray
-from rotorid.cli.commands.balance import MODEL_ERROR
-
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from balancing import Influence, Trials
-    from balancing.correction.subsets import Subsets
     from rotorid.tables import Job
 
-
-@dataclass(frozen=True)
-class Chosen:
-    """Coefficients, the runs that give the vibration (None: those of the coefficients), and planes to use."""
-
-    influence: Influence
-    baseline: Trials | None
-    used: tuple[str, ...]
+KINDS = ("measured", "computed", "combined")
+MODEL_ERROR = 20.0
+"""Percent by which a computed coefficient may be wrong (one standard deviation) if nobody says."""
 
 
-def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bool = False) -> Chosen:
-    """Coefficients of a job; `refined` by its check runs.
+def choose(
+    job: Job, kind: str | None = None, model_error: float | None = None, *, refined: bool = False
+) -> tuple[Influence, Trials | None]:
+    """Coefficients of a job, and the runs that give its vibration; None: those of the coefficients.
+
+    Parameters
+    ----------
+    job
+        Its runs, stored coefficients or rotor.
+    kind
+        One of `KINDS`; None: measured where there are trial weights or stored coefficients.
+    model_error
+        Standard deviation of computed coefficients, percent.
+    refined
+        By the check runs of the job.
 
     Raises
     ------
@@ -46,21 +49,23 @@ def choose(job: Job, kind: str | None, model_error: float | None, *, refined: bo
             "--model-error is for computed coefficients: add --coefficients computed or combined"
         )
     if refined:
-        return _refined(job, kind)
+        return _refined(job, kind), None
     if kind == "computed":
-        influence = computed(job, model_error or 0.0)
-        return _chosen(job, influence, job.trials)
-    if job.influence is not None:
-        measured, baseline = job.influence, job.trials
-    else:
-        measured, baseline = estimate_influence(job.trials), None
+        return computed(job, model_error or 0.0), job.trials
+    baseline = None if job.influence is None else job.trials
+    measured = job.influence or estimate_influence(job.trials)
     if kind == "combined":
         error = MODEL_ERROR if model_error is None else model_error
         measured = combine(measured, computed(job, error))
-    return _chosen(job, measured, baseline)
+    return measured, baseline
 
 
-def _refined(job: Job, kind: str) -> Chosen:
+def used_planes(job: Job, influence: Influence) -> list[str]:
+    """Planes of these coefficients that the job does not leave out."""
+    return [plane for plane in influence.planes if plane not in job.left_out]
+
+
+def _refined(job: Job, kind: str) -> Influence:
     """From trial runs and check runs together."""
     from balancing import correct, estimate_influence
     from balancing.correction.refine import refine
@@ -70,47 +75,7 @@ def _refined(job: Job, kind: str) -> Chosen:
     if kind != "measured" or job.influence is not None:
         raise ValueError("check runs refine coefficients from trial runs, not stored or computed ones")
     mounted = None if job.check_mounted else correct(estimate_influence(job.trials))
-    return _chosen(job, refine(job.trials, job.check, corrections=mounted), None)
-
-
-def _chosen(job: Job, influence: Influence, baseline: Trials | None) -> Chosen:
-    return Chosen(influence, baseline, tuple(p for p in influence.planes if p not in job.left_out))
-
-
-def compare_planes(
-    chosen: Chosen,
-    planes: Sequence[str],
-    speeds: Sequence[float] | None,
-    k: int,
-    method: str | None,
-    row_weights: FloatArray | None,
-) -> Subsets:
-    """Compare all choices of k of these planes, without limits."""
-    import numpy as np
-
-    from balancing.coefficients.baseline import match_speeds, starting_point
-    from balancing.correction.subsets import best_subsets
-
-    influence = chosen.influence
-    if unknown := [p for p in planes if p not in influence.planes]:
-        raise ValueError(f"there is no plane {unknown[0]!r}; the planes are {', '.join(influence.planes)}")
-    start = starting_point(influence, chosen.baseline)
-    at = range(len(influence.speeds)) if speeds is None else match_speeds(speeds, influence.speeds)
-    columns = [influence.planes.index(p) for p in planes]
-    index = np.concatenate([[0, 1], *([2 + 2 * p, 3 + 2 * p] for p in columns)])
-    covariance = start.covariance
-    if covariance is not None:
-        covariance = covariance[list(at)][..., index[:, None], index].reshape(-1, len(index), len(index))
-    return best_subsets(
-        influence.W[list(at)][..., columns].reshape(-1, len(columns)),
-        start.readings[list(at)].ravel(),
-        planes,
-        k,
-        criterion="max" if method == "minmax" else "rms",
-        row_weights=None if row_weights is None else row_weights[list(at)].ravel(),
-        covariance=covariance,
-        labels=start.labels,
-    )
+    return refine(job.trials, job.check, corrections=mounted)
 
 
 def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None = None) -> Influence:

@@ -1,0 +1,465 @@
+"""`balance`: correction weights of a job, mounted in its holes, checked and judged."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from warnings import catch_warnings
+
+from rotorid.workflows.coefficients import KINDS, choose, used_planes
+from rotorid.workflows.other_readings import with_contradiction, with_other_readings
+from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
+from rotorid.workflows.verdict import judge
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from balancing import (
+        CheckComparison,
+        Correction,
+        History,
+        Influence,
+        Mounted,
+        Subsets,
+        Tolerance,
+        TradeOff,
+        Trials,
+        Verdict,
+    )
+    from rotorid.tables import Job
+    from rotorid.tables.job.source import JobSource
+    from rotorid.workflows.quantities import Amount, Amplitudes, Positions, Weights
+
+    JobGiven = Job | Path | str | Sequence[Path | str]
+    """A job, its file, or a runs table and a weights table."""
+    Known = tuple[Influence, Trials | None]
+    """Coefficients, and the runs that give the vibration."""
+
+
+@dataclass(frozen=True)
+class BalanceOptions:
+    """Options of `balance`.
+
+    Attributes
+    ----------
+    method
+        weighted (by the errors of the readings; the default), least-squares, or minmax (the smallest largest
+        amplitude).
+    influence
+        Stored influence coefficients.
+    coefficients
+        measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
+        there are trial weights.
+    model_error
+        Standard deviation of computed coefficients; combined: 20 if not given.
+    amplitude_error, phase_error, run_error, phase, angles
+        In place of what the job says, errors in percent and degrees.
+    planes
+        Use these planes only.
+    speeds
+        Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.
+    max_mass
+        Largest weight of every plane, 5g; or left=5g,right=3g.
+    limit
+        Largest amplitude of a sensor; VALUE alone: of all. May be repeated.
+    ridge
+        Small weights where planes act alike: 0.01 … 0.1, or auto.
+    truncate
+        Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
+    split
+        Choose pieces in the holes of the job, all planes together (a picture of discs).
+    split_seconds
+        For the proof that no choice is better.
+    refine
+        Add the job's check runs to its trial runs: coefficients and trim from all of them.
+    history
+        All runs and check runs of the job in one table, too.
+    best_planes
+        Use the best K planes, after comparing all choices.
+    trade_off
+        Residual against total weight, too (a second picture).
+    grade
+        Judge the planes by ISO 21940-11: G0.4 to G4000.
+    rotor_mass
+        For --grade, such as 500kg.
+    service_speed
+        For --grade, such as 3000rpm.
+    positions
+        For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.
+    bearings
+        For --positions, 0mm,700mm.
+    centre
+        For --positions: of the centre of mass.
+    """
+
+    method: str | None = None
+    influence: Path | str | None = None
+    coefficients: str | None = None
+    model_error: float | None = None
+    amplitude_error: float | None = None
+    phase_error: float | None = None
+    run_error: float | None = None
+    phase: str | None = None
+    angles: str | None = None
+    planes: Names | None = None
+    speeds: Speeds | None = None
+    max_mass: Weights | None = None
+    limit: Amplitudes = ()
+    ridge: str | float | None = None
+    truncate: float | None = None
+    split: bool = False
+    split_seconds: float = 5.0
+    refine: bool = False
+    history: bool = False
+    best_planes: int | None = None
+    trade_off: bool = False
+    grade: str | None = None
+    rotor_mass: Amount | None = None
+    service_speed: Amount | None = None
+    positions: Positions | None = None
+    bearings: str | tuple[float, float] | None = None
+    centre: Amount | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Balance(Outcome):
+    """A correction, and what was asked for beside it.
+
+    Attributes
+    ----------
+    result, influence
+        The correction and the coefficients that it is made of.
+    job, source
+        As it was read, and from what; None: it was given as it is.
+    mounted, check, verdict, subsets, curve, history
+        Pieces in holes, check runs beside their prediction, what limits and tolerances say, choices of
+        planes, residual against total weight, all runs; None where there is nothing.
+    """
+
+    result: Correction
+    influence: Influence
+    job: Job
+    source: JobSource | None
+    mounted: Mounted | None
+    check: CheckComparison | None
+    verdict: Verdict | None
+    subsets: Subsets | None
+    curve: TradeOff | None
+    history: History | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        parts = {
+            "mounting": self.mounted,
+            "check": self.check,
+            "verdict": self.verdict,
+            "best_planes": self.subsets,
+            "trade_off": self.curve,
+            "history": self.history,
+        }
+        known = {key: part.to_dict() for key, part in parts.items() if part is not None}
+        return {**self.result.to_dict(), **known}
+
+    def summary(self) -> str:
+        """For the terminal."""
+        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve, self.history)
+        blocks = [part.summary() for part in parts if part is not None]
+        if self.result.limits is not None and (self.subsets or self.curve):
+            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
+        return "\n\n".join(blocks)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The weights, or what goes into each hole."""
+        return self.result.to_frame() if self.mounted is None else self.mounted.to_frame()
+
+    def figure(self) -> Figure:
+        """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
+        from balancing.plots import discs, polar, tolerances, trade_off_curve
+
+        if self.mounted is not None:
+            return discs.mounted_discs(self.mounted)
+        if self.verdict is not None and any(row.kind == "plane" for row in self.verdict.rows):
+            return tolerances.overview(self.result, self.verdict)
+        return polar.overview(self.result) if self.curve is None else trade_off_curve.overview(self.curve)
+
+    def sheet(self) -> bytes:
+        """The balancing sheet: one HTML file."""
+        from rotorid.report.balance import balance_report
+
+        return balance_report(
+            self.to_dict(),
+            self.result,
+            self.influence,
+            self.job,
+            self.provenance,
+            mounted=self.mounted,
+            verdict=self.verdict,
+        )
+
+    def workbook(self, path: Path | str) -> bytes:
+        """The job with its results, for a file at this path; `read_job` reads the job back from it.
+
+        Raises
+        ------
+        ValueError
+            For a job that was not read from files here.
+        """
+        from rotorid.tables.job.workbook_writing import job_workbook_bytes
+
+        if self.source is None:
+            raise ValueError("a workbook is made of the files of a job: give these, not what was read")
+        return job_workbook_bytes(self.job, self.source, Path(path), self, self.provenance)
+
+    def influence_table(self, path: Path | str) -> bytes:
+        """The coefficients for a file at this path, .csv or .xlsx."""
+        from rotorid.tables.runs.influence_table import influence_bytes
+
+        return influence_bytes(Path(path), self.influence)
+
+
+@workflow
+def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
+    """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
+
+    Parameters
+    ----------
+    job
+        A job file (`.toml`, `.xlsx`), or a runs table with a weights table or stored coefficients; or a job
+        that has been read already: what it would be under other conventions cannot be told then.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a job or an option that cannot be; UndeterminedError, InputError.
+    """
+    from balancing import compare_check
+    from rotorid.tables.job.source import JobSource
+
+    options = options or BalanceOptions()
+    _check(options)
+    source = _source(job, options)
+    files = source if isinstance(source, JobSource) else None
+    read = with_contradiction(_read(source, options))
+    known = _choose(read, options)
+    influence = known[0]
+    planes, subsets = _planes(read, known, options)
+    result = _correct(read, known, planes, options)
+    again = None if files is None else partial(_again, files, planes, options)
+    result = with_other_readings(result, read, again, refined=options.refine)
+    mounted = _mount(result, read, known, options) if options.split else None
+    checked = None if options.refine else read.check
+    verdict = judge(result, influence, read, _tolerance(result.planes, options), mounted)
+    return Balance(
+        result=result,
+        influence=influence,
+        job=read,
+        source=None if files is None else _with_limits(files, read, options),
+        mounted=mounted,
+        check=None if checked is None else compare_check(result, checked, *known),
+        verdict=verdict,
+        subsets=subsets,
+        curve=_trade_off(result, influence, read) if options.trade_off else None,
+        history=_history(result, influence, read) if options.history else None,
+        provenance=provenance(read.files, options),
+    )
+
+
+def _check(options: BalanceOptions) -> None:
+    """Refuse options that are not known or do not go together, before anything is read."""
+    from balancing.solvers.methods import METHODS
+
+    if options.method is not None:
+        one_of(options.method, "--method", METHODS)
+    if options.coefficients is not None:
+        one_of(options.coefficients, "--coefficients", KINDS)
+    if options.ridge is not None and options.truncate is not None:
+        raise ValueError("--ridge and --truncate are two ways to the same end: choose one")
+    if options.split and (options.ridge is not None or options.truncate is not None):
+        raise ValueError(
+            "--split takes the planes as they are, and would undo --ridge and --truncate: use fewer planes "
+            "(--planes, --best-planes) instead"
+        )
+
+
+def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
+    """A job that has been read, or what is to be read."""
+    from rotorid.tables.job.source import JobSource
+
+    stored = None if options.influence is None else Path(options.influence)
+    errors = options.amplitude_error, options.phase_error, options.run_error
+    said = (options.phase, options.angles, *errors)
+    files = [job] if isinstance(job, Path | str) else job
+    if isinstance(files, Sequence):
+        return JobSource(tuple(Path(file) for file in files), stored, *said)
+    if any(value is not None for value in (stored, *said)):
+        raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
+    return files
+
+
+def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
+    from rotorid.tables import job_from_files, read_job
+    from rotorid.tables.job.source import JobSource
+    from rotorid.workflows.quantities import limited
+
+    if isinstance(source, JobSource):
+        files, said = source.files, asdict(source.overrides)
+        single = len(files) == 1 and source.influence is None
+        if single and files[0].suffix.lower() in (".toml", ".xlsx"):
+            source = read_job(files[0], **said)
+        else:
+            source = job_from_files(files, influence=source.influence, **said)
+    return limited(source, options.max_mass, options.limit)
+
+
+def _choose(job: Job, options: BalanceOptions) -> Known:
+    return choose(job, options.coefficients, options.model_error, refined=options.refine)
+
+
+def _planes(job: Job, known: Known, options: BalanceOptions) -> tuple[Sequence[str], Subsets | None]:
+    """Those to use, and the choices among which they are the best."""
+    from balancing.correction.subsets import compare_planes
+
+    planes = names(options.planes) or used_planes(job, known[0])
+    if options.best_planes is None:
+        return planes, None
+    subsets = compare_planes(
+        *known,
+        planes,
+        options.best_planes,
+        speeds=_speeds(job, options),
+        criterion="max" if options.method == "minmax" else "rms",
+        row_weights=job.row_weights,
+    )
+    return subsets.planes[0], subsets
+
+
+def _speeds(job: Job, options: BalanceOptions) -> list[float] | None:
+    return None if options.speeds is None else speeds(options.speeds, job.trials.labels.speed_unit)
+
+
+def _correct(job: Job, known: Known, planes: Sequence[str], options: BalanceOptions) -> Correction:
+    from balancing import correct
+
+    influence, baseline = known
+    return correct(
+        influence,
+        baseline,
+        planes,
+        _speeds(job, options),
+        method=options.method,
+        limits=job.limits_of(influence.planes),
+        row_weights=job.row_weights,
+        strength=_strength(options.ridge),
+        keep=options.truncate,
+        remove=sorted(job.remove),
+    )
+
+
+def _strength(given: str | float | None) -> str | float | None:
+    if given is None or given == "auto":
+        return given
+    value = number(given) if isinstance(given, str) else given
+    if not 0 < value < math.inf:
+        raise ValueError(f"--ridge {given!r}: a strength above 0, such as 0.03, or auto")
+    return value
+
+
+def _again(
+    source: JobSource, planes: Sequence[str], options: BalanceOptions, phase: str, angles: str
+) -> Correction:
+    """The same files under other conventions."""
+    with catch_warnings(action="ignore"):  # said when the job was read
+        job = _read(replace(source, phase=phase, angles=angles), options)
+    return _correct(job, _choose(job, options), planes, options)
+
+
+def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
+    from balancing.mounting.mounted import mount
+
+    return mount(
+        result,
+        *known,
+        job.holes,
+        row_weights=job.row_weights,
+        time_limit=options.split_seconds,
+        on_top=options.refine,
+    )
+
+
+def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
+    """Tolerance of one or two planes; None where no grade is given."""
+    from balancing.iso21940 import tolerance
+    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+
+    grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
+    along = (options.positions, options.bearings, options.centre)
+    if all(value is None for value in (grade, weight, speed, *along)):
+        return None
+    if grade is None or weight is None or speed is None:
+        raise ValueError("a tolerance needs --grade, --rotor-mass and --service-speed together")
+    if len(planes) > 2:
+        raise ValueError(
+            "a balance quality grade is one of rigid rotors: it is shared by one or two planes, not by "
+            f"{len(planes)}; choose two with --planes, or judge by limits of the readings"
+        )
+    at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
+    if set(at) != set(planes):
+        raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
+    return tolerance(
+        mass(weight, "--rotor-mass"),
+        speed_with_unit(speed, "--service-speed"),
+        grade,
+        planes=at,
+        bearings=None if options.bearings is None else two_positions(options.bearings),
+        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
+    )
+
+
+def _trade_off(result: Correction, influence: Influence, job: Job) -> TradeOff:
+    """Residual against total weight, in the planes and at the speeds used."""
+    from balancing.coefficients.baseline import match_speeds
+    from balancing.correction.choice import plane_indices
+    from balancing.correction.trade_off import trade_off
+
+    at = match_speeds(result.speeds, influence.speeds)
+    part = influence.part(at, None, plane_indices(influence, result.planes))
+    return trade_off(
+        part.W.reshape(-1, len(part.planes)),
+        result.before.ravel(),
+        part.planes,
+        criterion="max" if result.method == "minmax" else "rms",
+        row_weights=None if job.row_weights is None else job.row_weights[at].ravel(),
+        labels=result.labels,
+    )
+
+
+def _history(result: Correction, influence: Influence, job: Job) -> History:
+    """Run by run, what was mounted and what vibrated."""
+    from balancing.correction.history import history
+
+    checks = () if job.check is None else (job.check,)
+    return history(
+        job.trials,
+        *checks,
+        corrections=None if job.check is None or job.check_mounted else result,
+        limits=job.limits_of(influence.planes),
+    )
+
+
+def _with_limits(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
+    """What the job was read from, with the limits put in place of its own."""
+    from rotorid.workflows.quantities import largest_amplitudes, largest_weights
+
+    return replace(
+        source,
+        max_weights=largest_weights(job, options.max_mass),
+        limits=largest_amplitudes(job, options.limit),
+    )

@@ -1,0 +1,78 @@
+"""`tolerance`: permissible residual unbalance of a rigid rotor (ISO 21940-11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotorid.workflows.outcome import Found, provenance, workflow
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from balancing.iso21940 import Tolerance
+    from rotorid.workflows.quantities import Amount, Positions
+
+
+@dataclass(frozen=True)
+class ToleranceOptions:
+    """Options of `tolerance`.
+
+    Attributes
+    ----------
+    mass
+        Of the rotor, such as 500kg.
+    speed
+        Highest service speed, such as 3000rpm.
+    grade
+        Balance quality grade, G0.4 to G4000.
+    planes
+        One or two correction planes, with positions along the shaft or without: left=100mm,right=600mm.
+    bearings
+        Positions of both bearings, 0mm,700mm; default: the planes are the tolerance planes.
+    centre
+        Of the centre of mass, such as 350mm.
+    """
+
+    mass: Amount
+    speed: Amount
+    grade: str | float
+    planes: Positions | None = None
+    bearings: str | tuple[float, float] | None = None
+    centre: Amount | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PermissibleUnbalance(Found):
+    """The tolerance of a rotor and of its planes."""
+
+    found: Tolerance
+
+    def figure(self) -> Figure:
+        """Tolerance circles."""
+        from balancing.plots.tolerances import polar_figure, tolerance_circles
+
+        return polar_figure(lambda ax: tolerance_circles(self.found, ax))
+
+
+@workflow
+def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
+    """Compute the permissible residual unbalance of a rigid rotor, and the share of each plane.
+
+    Raises
+    ------
+    ValueError
+        For an option that cannot be.
+    """
+    from balancing.iso21940 import tolerance as permissible
+    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+
+    found = permissible(
+        mass(options.mass, "--mass"),
+        speed_with_unit(options.speed, "--speed"),
+        options.grade,
+        planes=None if options.planes is None else positions(options.planes),
+        bearings=None if options.bearings is None else two_positions(options.bearings),
+        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
+    )
+    return PermissibleUnbalance(found=found, provenance=provenance((), options))

@@ -1,0 +1,275 @@
+"""`trial-weight`: the first trial weight of a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, radians
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from rotorid.workflows.outcome import Outcome, changed, log, provenance, workflow
+from rotorid.workflows.parameters import Names, degrees, names, number, one_of, option_name
+from rotorid.workflows.sources import job_source
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from balancing.trial_angle import Lag, Quantity
+    from balancing.trial_result import TrialWeight
+    from rotorid.tables import Job
+    from rotorid.workflows.quantities import Amount
+
+MEASURES = ("displacement", "velocity", "acceleration")
+_WITH_JOB = ("plane", "mass", "share")
+_ANGLE = ("reading_phase", "lag", "critical", "damping", "sensor_angle", "key_phasor", "measures")
+_WITHOUT_JOB = (*_ANGLE, "speed", "fraction", "unit")
+
+
+@dataclass(frozen=True)
+class TrialWeightOptions:
+    """Options of `trial_weight`: angles in degrees, `fraction` and `share` in percent.
+
+    Attributes
+    ----------
+    rotor_mass
+        Of the rotor, such as 500kg.
+    bearing_load
+        Carried at the plane, such as 2500N.
+    carried_by
+        Planes that share the mass of the rotor.
+    speed
+        Such as 3000rpm.
+    radius
+        Where the weight goes, 200mm.
+    fraction
+        Force of the weight, of the load (without a job).
+    share
+        Change, of the largest reading (with a job).
+    plane
+        Planes of the job; default: all of them.
+    mass
+        Try this weight, with a job: what would it do?
+    max_mass
+        Largest weight of the plane, 30g.
+    reading_phase
+        Of the largest initial reading, no job.
+    lag
+        Speed against the critical one, or the lag.
+    critical
+        Critical speed, in place of --lag: 2400rpm.
+    damping
+        Damping ratio at the critical speed.
+    sensor_angle
+        Where the sensor is (without a job).
+    key_phasor
+        Where the key phasor is (without a job).
+    measures
+        displacement, velocity, acceleration (without a job).
+    phase, angles
+        What a positive phase means, and how angles count.
+    unit
+        Of the result without a job: g, oz, kg, mg or lb.
+    """
+
+    rotor_mass: Amount | None = None
+    bearing_load: Amount | None = None
+    carried_by: int = 1
+    speed: Amount | None = None
+    radius: Amount | None = None
+    fraction: float = 10.0
+    share: float = 40.0
+    plane: Names | None = None
+    mass: Amount | None = None
+    max_mass: Amount | None = None
+    reading_phase: float | None = None
+    lag: str | float | None = None
+    critical: Amount | None = None
+    damping: float = 0.05
+    sensor_angle: float = 0.0
+    key_phasor: float = 0.0
+    measures: str = MEASURES[0]
+    phase: str | None = None
+    angles: str | None = None
+    unit: str = "g"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialWeights(Outcome):
+    """A trial weight for each plane."""
+
+    weights: tuple[TrialWeight, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return {
+            "trial_weights": [weight.to_dict() for weight in self.weights],
+            "conventions": self.weights[0].labels.conventions(),
+        }
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return "\n\n".join(weight.summary() for weight in self.weights)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per plane, speed and sensor."""
+        import pandas as pd
+
+        return pd.concat([weight.to_frame() for weight in self.weights], ignore_index=True)
+
+    def figure(self) -> Figure:
+        """A polar picture of each plane."""
+        from balancing.plots.tolerances import trial_figure
+
+        return trial_figure(self.weights)
+
+
+@workflow
+def trial_weight(
+    job: Job | Path | str | None = None, options: TrialWeightOptions | None = None
+) -> TrialWeights:
+    """Propose a first trial weight: amount from load or sensitivity, angle opposite to the heavy spot.
+
+    Parameters
+    ----------
+    job
+        A job, or its file, with coefficients, a rotor or trial runs; None: from the load alone.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a job or an option that cannot be, or that means nothing with or without a job.
+    """
+    from balancing.trial_weight import plane_load
+    from rotorid.tables.reader.units import FORCE
+    from rotorid.workflows.quantities import mass, quantity
+
+    options = options or TrialWeightOptions()
+    rotor, load = options.rotor_mass, options.bearing_load
+    carried = plane_load(
+        None if rotor is None else mass(rotor, "--rotor-mass"),
+        None if load is None else quantity(load, "--bearing-load", FORCE, "2500N"),
+        options.carried_by,
+    )
+    files: Sequence[Path] = ()
+    if job is None:
+        _refuse(options, _WITH_JOB, "needs a job with coefficients")
+        found = [_from_force(options, carried)]
+    else:
+        why = "is for a trial weight without a job, which has phases, speeds and coefficients"
+        _refuse(options, _WITHOUT_JOB, why)
+        read = job_source(job, options.phase, options.angles)
+        found, files = _from_job(read, options, carried), read.files
+    first = found[0]
+    for name, value in {"force_N": first.force, "load_N": first.load}.items():
+        if value is not None:
+            log.info("%s = %.6g", name, value)
+    return TrialWeights(weights=tuple(found), provenance=provenance(files, options))
+
+
+def _refuse(options: TrialWeightOptions, needless: Sequence[str], why: str) -> None:
+    for name in changed(options):
+        if name in needless:
+            raise ValueError(f"{option_name(name)} {why}")
+
+
+def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
+    """Without a job: amount from the load, angle from the phase and the lag."""
+    from balancing.data.conventions import Labels
+    from balancing.trial_weight import trial_from_force
+    from rotorid.tables.reader import units
+    from rotorid.tables.runs.conventions import Conventions, as_angles, as_phase
+    from rotorid.workflows.quantities import mass, size, speed_with_unit
+
+    missing = [name for name in ("speed", "radius") if getattr(options, name) is None]
+    if load is None:
+        missing.insert(0, "rotor-mass (or --bearing-load)")
+    if options.speed is None or options.radius is None or missing:
+        raise ValueError(f"without a job, give --{' and --'.join(missing)}")
+    known = Conventions(as_phase(options.phase or "lead"), as_angles(options.angles or "with rotation"))
+    shown = units.one_of(units.MASS)(options.unit)
+    speed, phase, most = speed_with_unit(options.speed, "--speed"), options.reading_phase, options.max_mass
+    return trial_from_force(
+        "1",
+        speed,
+        size(options.radius, "--radius", "200mm"),
+        bearing_load=load,
+        fraction=options.fraction / 100,
+        limit=inf if most is None else mass(most, "--max-mass", "30g"),
+        phase=None if phase is None else known.phase_sign * radians(degrees(phase, "--reading-phase")),
+        lag=_lag(options, speed),
+        sensor_angle=known.angle_sign * radians(degrees(options.sensor_angle, "--sensor-angle")),
+        key_phasor=known.angle_sign * radians(degrees(options.key_phasor, "--key-phasor")),
+        quantity=cast("Quantity", one_of(options.measures, "--measures", MEASURES)),
+        labels=Labels(
+            weight_unit=shown.name, weight_scale=shown.scale, phase=known.phase, angles=known.angles
+        ),
+    )
+
+
+def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list[TrialWeight]:
+    """With a job: amount and angle from its coefficients, one weight for each plane asked for."""
+    from balancing.coefficients.baseline import starting_point
+    from balancing.trial_weight import trial_from_coefficients
+    from rotorid.tables.reader.units import MASS, UNBALANCE
+    from rotorid.workflows.coefficients import choose, used_planes
+    from rotorid.workflows.quantities import limited, quantity, size
+
+    job = limited(job, options.max_mass, ())
+    influence, baseline = choose(job)
+    start = starting_point(influence, baseline)
+    unbalances = start.labels.unbalances
+    own = None if options.radius is None else size(options.radius, "--radius", "200mm")
+    if own is not None and unbalances:
+        raise ValueError(
+            "--radius is for weights as masses; those of this job are unbalances, mass times radius"
+        )
+    amount, known = None, (UNBALANCE, "300g_mm") if unbalances else (MASS, "30g")
+    if options.mass is not None:
+        amount = quantity(options.mass, "--mass", *known)
+    found = []
+    for name in names(options.plane) or used_planes(job, influence):
+        limit, radius = inf, None if unbalances else (job.radii.get(name) or own)
+        if job.limits is not None and name in job.planes:
+            limit = float(job.limits.max_weight[job.planes.index(name)])
+        found.append(
+            trial_from_coefficients(
+                influence,
+                start.readings,
+                name,
+                share=options.share / 100,
+                amount=amount,
+                limit=limit,
+                radius=radius,
+                trial_radius=own or job.trial_radii.get(name) if radius is not None else None,
+                load=load,
+                errors=start.model.errors,
+                labels=start.labels,
+            )
+        )
+    return found
+
+
+def _lag(options: TrialWeightOptions, speed: float) -> Lag | None:
+    from balancing.trial_angle import expected_lag
+    from rotorid.workflows.quantities import speed_with_unit
+
+    lag, critical = options.lag, options.critical
+    if lag is not None and critical is not None:
+        raise ValueError("--lag and --critical are two ways to the same end: choose one")
+    if critical is not None:
+        at = speed_with_unit(critical, "--critical")
+        if not at > 0:
+            raise ValueError(f"--critical {critical!r}: a critical speed above 0 is needed")
+        return expected_lag(ratio=speed / at, damping=options.damping)
+    if lag is None:
+        return None
+    if lag in ("below", "at", "above"):
+        return expected_lag(str(lag))
+    angle = number(str(lag))
+    if not 0 <= angle <= 360:
+        raise ValueError(f"--lag {lag!r}: below, at or above, or degrees from 0 to 360, are needed")
+    return expected_lag(degrees=angle)

@@ -1,0 +1,149 @@
+"""`rotorid.workflows.balance`: the command line's document, from text and from values in SI."""
+
+import dataclasses
+import math
+
+import pytest
+from documents import same
+
+from rotorid.samples import sample_data
+from rotorid.tables import job_from_files, read_job
+from rotorid.workflows import Balance, BalanceOptions, balance
+
+TURBO = sample_data() / "turbo_job"
+TABLES = [TURBO / "runs.csv", TURBO / "weights.csv"]
+RPM = math.pi / 30
+UM_PP = 0.5e-6
+
+
+@pytest.mark.parametrize(
+    ("files", "words", "options"),
+    [
+        pytest.param([TURBO / "job.toml"], "", {}, id="job"),
+        pytest.param(
+            [TURBO / "holes.toml"],
+            "--split --split-seconds 3 --method least-squares --history",
+            {"split": True, "split_seconds": 3.0, "method": "least-squares", "history": True},
+            id="split",
+        ),
+        pytest.param(
+            TABLES,
+            "--angles|against rotation|--amplitude-error 2 --speeds 1220rpm --planes left,right",
+            {
+                "angles": "against rotation",
+                "amplitude_error": 2.0,
+                "speeds": [1220 * RPM],
+                "planes": ["left", "right"],
+            },
+            id="tables",
+        ),
+        pytest.param(
+            [TURBO / "job.toml"],
+            "--max-mass left=200g_mm --limit|probe 1=30|--method least-squares",
+            {"max_mass": {"left": 2e-4}, "limit": {"probe 1": 30 * UM_PP}, "method": "least-squares"},
+            id="limits",
+        ),
+        pytest.param(
+            [TURBO / "job.toml"],
+            "--best-planes 2 --trade-off --ridge 0.03 --method least-squares",
+            {"best_planes": 2, "trade_off": True, "ridge": 0.03, "method": "least-squares"},
+            id="planes",
+        ),
+        pytest.param(
+            [TURBO / "checked.toml"],
+            "--planes left,right --grade G2.5 --rotor-mass 500kg --service-speed 3000rpm "
+            "--positions left=100mm,right=600mm --bearings 0mm,700mm --centre 320mm",
+            {
+                "planes": ["left", "right"],
+                "grade": "G2.5",
+                "rotor_mass": 500.0,
+                "service_speed": 3000 * RPM,
+                "positions": {"left": 0.1, "right": 0.6},
+                "bearings": (0.0, 0.7),
+                "centre": 0.32,
+            },
+            id="grade",
+        ),
+    ],
+)
+def test_the_document_is_what_the_command_prints(cli, files, words, options):
+    split = [
+        part for k, piece in enumerate(words.split("|")) for part in ([piece] if k % 2 else piece.split())
+    ]
+    printed = cli("balance", *files, *split, "--json")
+    assert printed.code == 0, printed.err
+    found = balance(files if len(files) > 1 else str(files[0]), BalanceOptions(**options))
+    assert isinstance(found, Balance)
+    same(found.document, printed.json)
+    own, its = printed.json["provenance"], found.document["provenance"]
+    assert [entry["sha256"] for entry in own["inputs"]] == [entry["sha256"] for entry in its["inputs"]]
+    assert own["options"].keys() == its["options"].keys() == options.keys()
+
+
+def test_what_is_not_asked_for_is_not_recorded(cli):
+    assert cli("balance", TURBO / "job.toml", "--json").json["provenance"]["options"] == {}
+
+
+def test_a_job_that_was_read(tmp_path):
+    job = read_job(TURBO / "job.toml")
+    found = balance(job)
+    same(found.document, balance(TURBO / "job.toml").document)
+    with pytest.raises(ValueError, match="stated where it is read"):
+        balance(job, BalanceOptions(phase="lag"))
+    assumed = balance(job_from_files(TABLES)).document  # what it would be otherwise cannot be told
+    assert assumed["conventions"]["assumed"] == ["phase"]
+    assert assumed["other_readings"] == []
+    assert balance(TABLES).document["other_readings"] != []
+    with pytest.raises(ValueError, match="files of a job"):
+        found.workbook(tmp_path / "sheet.xlsx")
+
+
+def test_what_else_it_gives_can_be_read_back(tmp_path):
+    found = balance(TURBO / "job.toml", BalanceOptions(max_mass="200g_mm"))
+    book, stored = tmp_path / "sheet.xlsx", tmp_path / "influence.csv"
+    book.write_bytes(found.workbook(book))
+    stored.write_bytes(found.influence_table(stored))
+    weights = found.document["corrections"]
+    again = balance(book).document["corrections"]
+    assert [row["mass"] for row in again] == pytest.approx([row["mass"] for row in weights], rel=1e-6)
+    known = balance(TABLES, BalanceOptions(influence=stored, max_mass="200g_mm")).document
+    assert [row["mass"] for row in known["corrections"]] == pytest.approx(
+        [row["mass"] for row in weights], rel=0.05
+    )
+    limited = balance(TURBO / "job.toml", BalanceOptions(limit=["probe 1=30", "probe 2=40"]))
+    assert "limit: probe 1=30, probe 2=40" in limited.sheet().decode()
+
+
+def test_pictures_of_what_was_asked_for():
+    def titles(**options):
+        return [
+            ax.get_title() for ax in balance(TURBO / "holes.toml", BalanceOptions(**options)).figure().axes
+        ]
+
+    grade = {"grade": "G2.5", "rotor_mass": 500.0, "service_speed": 3000 * RPM, "planes": "left,right"}
+    assert titles(split=True) == ["left: add", "middle: add", "right: add"]
+    assert titles(**grade)[1].startswith("Residual unbalance and tolerance")
+    assert titles(trade_off=True) != titles()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"method": "best"},
+        {"coefficients": "guessed"},
+        {"ridge": 0.1, "truncate": 2},
+        {"ridge": -1.0},
+        {"ridge": math.inf},
+        {"split": True, "truncate": 2},
+        {"grade": "G2.5"},
+        {"centre": 0.0},
+    ],
+)
+def test_options_that_cannot_be(options):
+    with pytest.raises(ValueError, match="--"):
+        balance(TURBO / "job.toml", BalanceOptions(**options))
+
+
+def test_every_option_has_its_words():
+    words = BalanceOptions.__doc__
+    assert [f.name for f in dataclasses.fields(BalanceOptions) if f.name not in words] == []
