@@ -26,4 +26,7 @@ def test_each_option_is_a_parameter_of_the_command(name, kind):
     for field in dataclasses.fields(kind):
         assert field.name in parameters, field.name
         default = parameters[field.name].default
-        assert default == field.default or (default is None and field.default == ()), field.name
+        if default is inspect.Parameter.empty:
+            assert field.default is dataclasses.MISSING, field.name
+        else:
+            assert default == field.default or (default is None and field.default == ()), field.name
