@@ -95,7 +95,7 @@ def provenance(files: Iterable[Path], options: Any) -> dict[str, Any]:  # noqa: 
         "options": {
             field.name: _plain(getattr(options, field.name))
             for field in dataclasses.fields(options)
-            if field.default is dataclasses.MISSING or getattr(options, field.name) != field.default
+            if _plain(getattr(options, field.name)) != _plain(field.default)
         },
     }
 
