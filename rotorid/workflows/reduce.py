@@ -6,28 +6,28 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rotorid.workflows.outcome import Outcome, log, provenance, workflow
-from rotorid.workflows.parameters import Band, Nodes, Speeds, band, nodes, one_of, one_speed, rising_speeds
+from rotorid.base.text import counted
+from rotorid.workflows.outcome import log, provenance, workflow
+from rotorid.workflows.parameters import (
+    Band,
+    Nodes,
+    Speeds,
+    band,
+    nodes,
+    numbers,
+    one_of,
+    one_speed,
+    rising_speeds,
+)
 from rotorid.workflows.sources import rotor_source
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
-    import fem
     from fem import Rotor
-    from rotorid.reduction import (
-        Methods,
-        Placement,
-        Reduction,
-        ResponseCost,
-        Shift,
-        SmallRotor,
-        StabilityCost,
-        TradeOff,
-    )
+    from rotorid.reduction import Placement, Reduction
+    from rotorid.tables.data.modes_table import MeasuredModes
+    from rotorid.workflows.reduced_rotor import ReducedRotor
 
 Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
@@ -113,147 +113,6 @@ class ReduceOptions:
     force: Nodes | None = None
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class ReducedRotor(Outcome):
-    """A reduction, what was asked for beside it, and the small model where it was needed.
-
-    Attributes
-    ----------
-    result
-        The masses.
-    placement, trade_off, methods, response, stability, shift
-        What was asked for beside them.
-    small
-        The model in both planes, with what turns, couples and damps.
-    damping
-        Its modal damping ratios.
-    speed
-        Of the small model, rad/s.
-    both_planes, forces
-        Of the model file.
-    """
-
-    result: Reduction
-    placement: Placement | None = None
-    trade_off: TradeOff | None = None
-    methods: Methods | None = None
-    response: ResponseCost | None = None
-    stability: StabilityCost | None = None
-    shift: Shift | None = None
-    small: SmallRotor | None = None
-    damping: Sequence[float] = ()
-    speed: float = 0.0
-    both_planes: bool = False
-    forces: Sequence[int | str] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        parts = {
-            "what_if": self.shift,
-            "placement": self.placement,
-            "trade_off": self.trade_off,
-            "methods": self.methods,
-            "response": self.response,
-            "stability": self.stability,
-            "small_model": self.small,
-        }
-        beside = {key: part.to_dict() for key, part in parts.items() if part is not None}
-        return self.result.to_dict() | beside
-
-    def summary(self) -> str:
-        """For the terminal."""
-        parts = (
-            self.result,
-            self.shift,
-            self.placement,
-            self.trade_off,
-            self.methods,
-            self.response,
-            self.stability,
-            self.small,
-        )
-        return "\n\n".join(part.summary() for part in parts if part is not None)
-
-    def to_frame(self) -> pd.DataFrame:
-        """The ranking where it was asked for, else masses and modes."""
-        return self.result.to_frame() if self.placement is None else self.placement.to_frame()
-
-    def figure(self, view: View | None = None) -> Figure:
-        """The picture asked for; by default that of what was asked for last.
-
-        Raises
-        ------
-        ValueError
-            For a view of what was not computed.
-        """
-        from matplotlib.figure import Figure
-
-        from rotorid.plots import plot
-
-        parts = {
-            "stability": self.stability,
-            "response": self.response,
-            "methods": self.methods,
-            "placement": self.placement,
-            "shapes": self.result,
-        }
-        last = next(name for name, part in parts.items() if part is not None)
-        name: str = view or last
-        if parts[one_of(name, "view", [*parts])] is None:
-            option = {"placement": "--rank"}.get(name, f"--{name}")
-            raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
-        figure = Figure(figsize=(9.5, 6.5 if heights else 5.5), layout="constrained")
-        axes = [*figure.subplots(2, sharex=True, height_ratios=heights)] if heights else figure.add_subplot()
-        plot(parts[name], axes)
-        return figure
-
-    def sheet(self) -> bytes:
-        """To print: one HTML file."""
-        from rotorid.report.reduction import reduce_report
-
-        return reduce_report(
-            self.to_dict(),
-            self.result,
-            provenance=self.provenance,
-            placement=self.placement,
-            methods=self.methods,
-            response=self.response,
-            stability=self.stability,
-        )
-
-    def with_small(self) -> ReducedRotor:
-        """The same with the small model.
-
-        Raises
-        ------
-        ValueError
-            Without a rotor.
-        """
-        return self if self.small else dataclasses.replace(self, small=self.result.small(self.damping))
-
-    def model_bytes(self, name: str = "") -> bytes:
-        """The small model as a file for `fit` and `identify`; `name` of the rotor for its comment."""
-        from rotorid.tables.models.reduced_model import reduced_model_bytes
-
-        return reduced_model_bytes(
-            self.result,
-            self.small,
-            self.speed,
-            both_planes=self.both_planes,
-            forces=self.forces,
-            name=name,
-        )
-
-    def state_space_bytes(self, ending: str = ".json") -> bytes:
-        """A, B, C, D in both planes at the speed, in the format of a file with this ending."""
-        from rotorid.tables.models.state_space_file import state_space_bytes
-
-        small = self.with_small().small
-        assert small is not None
-        return state_space_bytes(small.state_space(self.speed), ending)
-
-
 @workflow
 def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
     """Find equivalent masses at chosen nodes (formula 50), how good they are, and the small model.
@@ -273,13 +132,14 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     ValueError
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
-    from rotorid.workflows.reduce_inputs import from_tables, shares
+    from rotorid.workflows.reduce_inputs import shares
+    from rotorid.workflows.reduced_rotor import ReducedRotor
 
     options = options or ReduceOptions()
     how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
     _check_used(options, rotor is not None)
     if rotor is None:
-        result, files = from_tables(options, how)
+        result, files = _of_tables(options, how)
         forces = nodes(options.force or (), "--force")
         found = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
     else:
@@ -324,6 +184,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
     from rotorid.workflows import reduce_inputs as given
+    from rotorid.workflows.reduced_rotor import ReducedRotor
 
     machine, files = rotor_source(rotor)
     at = None if options.speed is None else one_speed(options.speed, "--speed")
@@ -341,7 +202,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
             normalise=options.normalise,
             rows=options.rows,
         )
-    places = given.places(machine, options, placement, data, at)
+    places = _places(machine, options, placement, data, at)
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
         files = (*files, Path(options.measured))
@@ -369,25 +230,97 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     return _beside(found, machine, options, at)
 
 
-def _beside(found: ReducedRotor, rotor: fem.Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
+def _places(
+    rotor: Rotor,
+    options: ReduceOptions,
+    placement: Placement | None,
+    data: MeasuredModes | None,
+    speed: float | None,
+) -> list[int]:
+    """Nodes of the masses: as given, by the rule asked for, or those of the measured shapes."""
+    if options.nodes is not None and options.place is not None:
+        raise ValueError("--nodes and --place are two ways to the same end: choose one")
+    if options.nodes is not None:
+        return [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
+    masses = options.masses or 3
+    if options.place == "book":
+        from rotorid.reduction import book_nodes
+
+        return list(book_nodes(rotor, masses, speed=speed))
+    if placement is not None:
+        which = {
+            "mac": placement.best_by_mac,
+            "compromise": placement.compromise,
+            "best": placement.best_by_frequency,
+        }[one_of(options.place or "compromise", "--place", get_args(Place))]
+        if which is None:
+            raise ValueError(
+                f"no choice of {counted(masses, 'node')} gives positive masses with "
+                f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
+            )
+        return [int(node) for node in placement.nodes[which]]
+    if data is not None:
+        return [rotor.node(node) for node in data.nodes]
+    raise ValueError(
+        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
+    )
+
+
+def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reduction, tuple[Path, ...]]:
+    """A reduction without a rotor: its compliance and its modes from tables."""
+    from rotorid.reduction import reduce_measured
+    from rotorid.tables.data.modes_table import read_compliance, read_modes
+    from rotorid.workflows import reduce_inputs as given
+
+    if options.compliance is None or options.measured is None:
+        raise ValueError("give a rotor, or --compliance and --measured, which take its place")
+    data = read_modes(options.measured)
+    wanted = list(data.nodes)
+    if options.nodes is not None:
+        labels = [str(node) for node in nodes(options.nodes, "--nodes")]
+        named = {str(node): node for node in data.nodes}
+        wanted = [named.get(label, label) for label in labels]
+    data = given.at(data, None, wanted, options.measured)
+    known, alpha = read_compliance(options.compliance, wanted)
+    order = [known.index(node) for node in wanted]
+    used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
+    springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
+    lost = [name for name in springs if name not in map(str, wanted)]
+    if lost:
+        raise ValueError(
+            f"--seals: no mass stands at {lost[0]!r}; masses stand at {', '.join(map(str, wanted))}"
+        )
+    result = reduce_measured(
+        alpha[order][:, order],
+        data.frequencies,
+        data.shapes,
+        used,
+        nodes=wanted,
+        seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
+        errors=given.errors(options.errors, data, used, len(wanted)),
+        **how,
+    )
+    return result, (Path(options.compliance), Path(options.measured))
+
+
+def _beside(found: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
     """With other masses, other methods, response and stability as asked for."""
     from rotorid.reduction import compare_methods, compare_response, compare_stability, trade_off
 
     places = [int(node) for node in found.result.nodes]
     how: dict[str, Any] = {"normalise": options.normalise, "speed": at}
+    beside: dict[str, Any] = {}
     if options.trade_off:
-        found = dataclasses.replace(found, trade_off=trade_off(rotor, places, **how))
+        beside["trade_off"] = trade_off(rotor, places, **how)
     if options.methods:
-        methods = compare_methods(rotor, places, modes=found.result.modes, rows=options.rows, **how)
-        found = dataclasses.replace(found, methods=methods)
-    if found.damping or options.response is not None or options.stability is not None:
-        found = found.with_small()
-    if found.small is not None and options.response is not None:
-        automatic = str(options.response) == "auto"
-        speeds = None if automatic else rising_speeds(options.response, "--response")
-        found = dataclasses.replace(found, response=compare_response(found.small, speeds))
+        beside["methods"] = compare_methods(rotor, places, modes=found.result.modes, rows=options.rows, **how)
     stable = band(options.stability, "--stability")
-    if found.small is not None and stable is not None:
-        low, high = stable
-        found = dataclasses.replace(found, stability=compare_stability(found.small, high, lowest=low))
-    return found
+    if found.damping or options.response is not None or stable is not None:
+        beside["small"] = small = found.result.small(found.damping)
+        if options.response is not None:
+            automatic = str(options.response) == "auto"
+            speeds = None if automatic else rising_speeds(options.response, "--response")
+            beside["response"] = compare_response(small, speeds)
+        if stable is not None:
+            beside["stability"] = compare_stability(small, stable[1], lowest=stable[0])
+    return dataclasses.replace(found, **beside)

@@ -1,4 +1,4 @@
-"""What `reduce` takes: places of the masses, measured modes, errors, shares."""
+"""What `reduce` takes: measured modes at the masses, errors, shares."""
 
 from __future__ import annotations
 
@@ -12,52 +12,14 @@ import numpy as np
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
-from rotorid.workflows.parameters import nodes, number, numbers, one_of
+from rotorid.workflows.parameters import number, numbers
 
 if TYPE_CHECKING:
     import fem
-    from rotorid.reduction import InputErrors, Placement, Reduction
+    from rotorid.reduction import InputErrors
     from rotorid.tables.data.modes_table import MeasuredModes
-    from rotorid.workflows.reduce import ReduceOptions
 
 ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
-PLACES = ("best", "compromise", "mac", "book")
-
-
-def places(
-    rotor: fem.Rotor,
-    options: ReduceOptions,
-    placement: Placement | None,
-    data: MeasuredModes | None,
-    speed: float | None,
-) -> list[int]:
-    """Nodes of the masses: as given, by the rule asked for, or those of the measured shapes."""
-    if options.nodes is not None and options.place is not None:
-        raise ValueError("--nodes and --place are two ways to the same end: choose one")
-    if options.nodes is not None:
-        return [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
-    masses = options.masses or 3
-    if options.place == "book":
-        from rotorid.reduction import book_nodes
-
-        return list(book_nodes(rotor, masses, speed=speed))
-    if placement is not None:
-        which = {
-            "mac": placement.best_by_mac,
-            "compromise": placement.compromise,
-            "best": placement.best_by_frequency,
-        }[one_of(options.place or "compromise", "--place", PLACES)]
-        if which is None:
-            raise ValueError(
-                f"no choice of {counted(masses, 'node')} gives positive masses with "
-                f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
-            )
-        return [int(node) for node in placement.nodes[which]]
-    if data is not None:
-        return [rotor.node(node) for node in data.nodes]
-    raise ValueError(
-        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
-    )
 
 
 def at(data: MeasuredModes, rotor: fem.Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:
@@ -139,39 +101,3 @@ def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
             f"--damping {given!r}: percent of critical damping of the first modes, from 0 to below 100, 1,0.5"
         )
     return [value / 100 for value in values]
-
-
-def from_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reduction, tuple[Path, ...]]:
-    """A reduction without a rotor: its compliance and its modes from tables."""
-    from rotorid.reduction import reduce_measured
-    from rotorid.tables.data.modes_table import read_compliance, read_modes
-
-    if options.compliance is None or options.measured is None:
-        raise ValueError("give a rotor, or --compliance and --measured, which take its place")
-    data = read_modes(options.measured)
-    wanted = list(data.nodes)
-    if options.nodes is not None:
-        labels = [str(node) for node in nodes(options.nodes, "--nodes")]
-        named = {str(node): node for node in data.nodes}
-        wanted = [named.get(label, label) for label in labels]
-    data = at(data, None, wanted, options.measured)
-    known, alpha = read_compliance(options.compliance, wanted)
-    order = [known.index(node) for node in wanted]
-    used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
-    springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
-    lost = [name for name in springs if name not in map(str, wanted)]
-    if lost:
-        raise ValueError(
-            f"--seals: no mass stands at {lost[0]!r}; masses stand at {', '.join(map(str, wanted))}"
-        )
-    result = reduce_measured(
-        alpha[np.ix_(order, order)],
-        data.frequencies,
-        data.shapes,
-        used,
-        nodes=wanted,
-        seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
-        errors=errors(options.errors, data, used, len(wanted)),
-        **how,
-    )
-    return result, (Path(options.compliance), Path(options.measured))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.reduce import Normalise, Place, ReducedRotor, ReduceOptions, Rows, View
+from rotorid.workflows.reduce import Normalise, Place, ReduceOptions, Rows, View
 from rotorid.workflows.reduce import reduce as work
+
+if TYPE_CHECKING:
+    from rotorid.workflows.reduced_rotor import ReducedRotor
 
 
 def reduce(
