@@ -6,7 +6,7 @@ from fem.plots.critical_map import draw_speed_map
 from fem.plots.drawing import draw_rotor
 from fem.plots.mode_shapes import draw_modes
 from fem.plots.orbit_paths import draw_orbits
-from fem.plots.readings import bode_figure, draw_readings, orbits_figure, polar_figure
+from fem.plots.readings import bode_figure, orbits_figure, polar_figure
 from fem.plots.static_line import draw_deflection
 from rotorid.base.style import COLORS, new_axes
 
@@ -22,7 +22,6 @@ __all__ = [
     "draw_modes",
     "draw_orbits",
     "draw_polar",
-    "draw_readings",
     "draw_response",
     "draw_rotor",
     "draw_speed_map",

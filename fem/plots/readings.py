@@ -46,20 +46,9 @@ def draw_readings(
     operating: tuple[float, float] | None = None,
     factors: bool = True,
 ) -> None:
-    """Draw amplitude and phase of sensors, as `draw_bode`.
+    """Draw amplitude and phase of sensors, marked where that with the largest reading has its peaks.
 
-    Parameters
-    ----------
-    response, sensors
-        What is read where.
-    peaks
-        Of each sensor, or none; those of the sensor with the largest reading are marked.
-    axes
-        For the amplitude and for the phase.
-    operating
-        Range of operating speeds, rad/s, shaded.
-    factors
-        Write amplification factors at the peaks.
+    `factors`: amplification factors are written at the marks.
     """
     Z = response.readings(sensors)
     marks = []

@@ -95,7 +95,7 @@ def bode_picture(
     """Amplitude and phase over speed, marked where the sensor with the largest reading has its peaks."""
 
     def draw(figure: Figure) -> None:
-        from fem.plots import draw_readings
+        from fem.plots.readings import draw_readings
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
         draw_readings(response, places, peaks, (above, below), operating=operating, factors=False)

@@ -72,20 +72,16 @@ class ReduceOptions:
         Rank all places of the masses.
     candidates
         Nodes that `rank` and `place` choose from.
-    trade_off
-        Other masses at these nodes: frequencies against shapes.
-    methods
-        Guyan, IRS and SEREP beside.
+    trade_off, methods
+        Other masses at these nodes, frequencies against shapes; Guyan, IRS and SEREP.
     response
         Speeds of a response beside the full rotor's, "100:700:50" or rad/s, or "auto".
     stability
         Speeds of stability beside the full rotor's, "0:9000rpm" or rad/s.
     damping
         Modal damping of the small model: "1,0.5" in percent of critical of the first modes, or ratios.
-    both_planes
-        Planes x and y in the model file, also where nothing couples them.
-    force
-        Nodes of measured forces, inputs of the model file.
+    both_planes, force
+        Of the model file: planes x and y also where nothing couples them; nodes of measured forces.
     """
 
     nodes: Nodes | None = None

@@ -65,14 +65,10 @@ class RotorResponse(Outcome):
 
     Attributes
     ----------
-    response
-        At the speeds asked for.
-    finer
-        With speeds between them, around the peaks.
-    sensors
-        Where it is read.
-    peaks
-        Of each sensor; empty where too few speeds were asked for.
+    response, finer
+        At the speeds asked for; with speeds between them, around the peaks.
+    sensors, peaks
+        Where it is read, and the peaks there; none where too few speeds were asked for.
     operating
         Operating range, rad/s.
     orbits_at
