@@ -22,14 +22,10 @@ def reduce(
         typer.Argument(
             metavar="[ROTOR]",
             help="Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.",
-            show_default=False,
         ),
     ] = None,
     nodes: Annotated[
-        str | None,
-        typer.Option(
-            "--nodes", help="Where the masses stand: nodes or stations, 7,12,18.", show_default=False
-        ),
+        str | None, typer.Option("--nodes", help="Where the masses stand: nodes or stations, 7,12,18.")
     ] = None,
     place: Annotated[
         Place | None,
@@ -37,20 +33,13 @@ def reduce(
             "--place",
             help="Instead of --nodes, of all places: best by frequency, best by MAC, a compromise, or the "
             "book's rule (extrema of the first two modes).",
-            show_default=False,
         ),
     ] = None,
     masses: Annotated[
-        int | None,
-        typer.Option(
-            "--masses", min=1, help="How many masses --place and --rank set; default 3.", show_default=False
-        ),
+        int | None, typer.Option("--masses", min=1, help="How many masses --place and --rank set; default 3.")
     ] = None,
     modes: Annotated[
-        int | None,
-        typer.Option(
-            "--modes", min=1, help="How many modes the regression uses; default 2.", show_default=False
-        ),
+        int | None, typer.Option("--modes", min=1, help="How many modes the regression uses; default 2.")
     ] = None,
     normalise: Annotated[
         Normalise,
@@ -78,7 +67,6 @@ def reduce(
             "--measured",
             metavar="FILE",
             help="Measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.",
-            show_default=False,
         ),
     ] = None,
     compliance: Annotated[
@@ -87,7 +75,6 @@ def reduce(
             "--compliance",
             metavar="FILE",
             help="Without a rotor: table node, force_node, compliance_m_per_N, with --measured.",
-            show_default=False,
         ),
     ] = None,
     seals: Annotated[
@@ -96,7 +83,6 @@ def reduce(
             "--seals",
             metavar="LIST",
             help="With --compliance: springs to the ground that it does not hold, N/m, 12=2e6.",
-            show_default=False,
         ),
     ] = None,
     errors: Annotated[
@@ -105,16 +91,12 @@ def reduce(
             "--errors",
             metavar="LIST",
             help="Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.",
-            show_default=False,
         ),
     ] = None,
     what_if: Annotated[
         str | None,
         typer.Option(
-            "--what-if",
-            metavar="LIST",
-            help="What changes of inputs do, in percent: alpha12=1.3,U31=-0.3.",
-            show_default=False,
+            "--what-if", metavar="LIST", help="What changes of inputs do, in percent: alpha12=1.3,U31=-0.3."
         ),
     ] = None,
     speed: Annotated[
@@ -124,18 +106,12 @@ def reduce(
             metavar="SPEED",
             help="Of tables of bearings and seals, and of --model and --state-space, such as 3000rpm; "
             "default: the lowest of the tables.",
-            show_default=False,
         ),
     ] = None,
     rank: Annotated[bool, typer.Option("--rank", help="Rank all places of the masses.")] = False,
     candidates: Annotated[
         str | None,
-        typer.Option(
-            "--candidates",
-            metavar="LIST",
-            help="Nodes that --rank and --place choose from.",
-            show_default=False,
-        ),
+        typer.Option("--candidates", metavar="LIST", help="Nodes that --rank and --place choose from."),
     ] = None,
     trade_off: Annotated[
         bool, typer.Option("--trade-off", help="Other masses at these nodes: frequencies against shapes.")
@@ -147,17 +123,11 @@ def reduce(
             "--response",
             metavar="A:B:STEP",
             help="Unbalance response beside the full rotor's, rad/s or with a unit; or auto.",
-            show_default=False,
         ),
     ] = None,
     stability: Annotated[
         str | None,
-        typer.Option(
-            "--stability",
-            metavar="A:B",
-            help="Stability beside the full rotor's, 0:9000rpm.",
-            show_default=False,
-        ),
+        typer.Option("--stability", metavar="A:B", help="Stability beside the full rotor's, 0:9000rpm."),
     ] = None,
     damping: Annotated[
         str | None,
@@ -165,7 +135,6 @@ def reduce(
             "--damping",
             metavar="LIST",
             help="Modal damping of the small model, percent of critical of the first modes: 1,0.5.",
-            show_default=False,
         ),
     ] = None,
     both_planes: Annotated[
@@ -175,10 +144,7 @@ def reduce(
     force: Annotated[
         str | None,
         typer.Option(
-            "--force",
-            metavar="LIST",
-            help="Nodes of measured forces, inputs f_x12 of --model, 12 or 7,12.",
-            show_default=False,
+            "--force", metavar="LIST", help="Nodes of measured forces, inputs f_x12 of --model, 12 or 7,12."
         ),
     ] = None,
     model: Annotated[
@@ -188,21 +154,15 @@ def reduce(
             metavar="FILE.toml",
             help="Write the small model for `rotorid fit` and `identify`, a damper to be estimated at each "
             "mass.",
-            show_default=False,
         ),
     ] = None,
     state_space: Annotated[
         Path | None,
         typer.Option(
-            "--state-space",
-            metavar="FILE",
-            help="Write A, B, C, D in both planes: .json, .npz or .mat.",
-            show_default=False,
+            "--state-space", metavar="FILE", help="Write A, B, C, D in both planes: .json, .npz or .mat."
         ),
     ] = None,
-    view: Annotated[
-        View | None, typer.Option("--view", help="What --plot draws.", show_default=False)
-    ] = None,
+    view: Annotated[View | None, typer.Option("--view", help="What --plot draws.")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

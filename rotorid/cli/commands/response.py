@@ -41,19 +41,13 @@ def response(
             metavar="LIST",
             help="Nodes or stations with angles from x in degrees, 2:45,22:45; default: all stations, or "
             "else all supports, in x.",
-            show_default=False,
         ),
     ] = None,
     operating: OperatingOption = None,
     view: Annotated[View, typer.Option("--view", help="What --plot draws.")] = "bode",
     at: Annotated[
         str | None,
-        typer.Option(
-            "--at",
-            metavar="SPEED",
-            help="Speed of the orbits; default: at the largest reading.",
-            show_default=False,
-        ),
+        typer.Option("--at", metavar="SPEED", help="Speed of the orbits; default: at the largest reading."),
     ] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
