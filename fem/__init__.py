@@ -17,6 +17,7 @@ from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, M
 from fem.model.sensors import Sensor
 from fem.modes import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
+from fem.peak_search import resolve_peaks
 from fem.peaks import Peak, Peaks, find_peaks, required_margin
 from fem.plots import draw_rotor
 from fem.response import influence, response_peaks, unbalance_response
@@ -67,6 +68,7 @@ __all__ = [
     "probe",
     "refined",
     "required_margin",
+    "resolve_peaks",
     "response_peaks",
     "speed_map",
     "stability_threshold",

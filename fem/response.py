@@ -21,11 +21,13 @@ from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "phase_degrees"]
 __all__ += ["response_peaks", "unbalance_response"]
+Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
+"""`{node or station: m r e^{iφ}}`, kg·m."""
 
 
 def unbalance_response(
     rotor: Rotor,
-    unbalance: Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex],
+    unbalance: Unbalance,
     speeds: ArrayLike,
     *,
     nodes: Sequence[int] | None = None,
@@ -86,6 +88,34 @@ def unbalance_response(
         return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve=solve)
 
     return judged(solve(speeds))
+
+
+def response_from_rest(
+    rotor: Rotor, unbalance: Unbalance, speeds: ArrayLike, nodes: Sequence[int]
+) -> Response:
+    """`unbalance_response`, also of a free rotor at rest: without rotation there is no force.
+
+    Parameters
+    ----------
+    rotor, unbalance, nodes
+        As there.
+    speeds
+        rad/s, ascending.
+    """
+    omega = _checked_speeds(speeds)
+    known = all(not support.speeds or support.speeds[0] == 0 for support in rotor.supports)
+    if omega[0] > 0 or omega.size < 2 or not known:
+        return unbalance_response(rotor, unbalance, omega, nodes=nodes)
+    moving = unbalance_response(rotor, unbalance, omega[1:], nodes=nodes)
+    rest = np.zeros((1, len(nodes)), dtype=complex)
+    return replace(
+        moving,
+        speeds=omega,
+        amplitudes=np.concatenate((rest, moving.amplitudes)),
+        backward=np.concatenate((rest, moving.backward)),
+        largest=np.insert(moving.largest, 0, 0.0),
+        largest_node=np.insert(moving.largest_node, 0, 1),
+    )
 
 
 def response_peaks(

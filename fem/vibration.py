@@ -110,6 +110,10 @@ class Response:
         i, turn = self.column(sensor.node), np.exp(1j * sensor.radians)
         return np.asarray(self.amplitudes[:, i] * turn.conj() + self.backward[:, i] * turn)
 
+    def readings(self, sensors: Sequence[SensorLike]) -> ComplexArray:
+        """`at` for each sensor, shape (S, C)."""
+        return np.stack([self.at(sensor) for sensor in sensors], axis=1)
+
     def bearing_forces(self) -> BearingForces:
         """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
         X, Y = self.x, self.y

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.model.sensors import label
+from fem.plots.drawing import draw_rotor
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.style import (
@@ -26,8 +27,10 @@ from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
+    from fem.model.rotor import Rotor
     from fem.vibration import InfluenceCoefficients, Response
 
 
@@ -56,6 +59,17 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
     # 1 m per kg·m is 1 µm per g·mm.
     curves = np.abs(influence.W).reshape(S, -1)
     return _over_speed(ax, influence.speeds, curves, named, "influence, µm per g·mm", influence.windows)
+
+
+def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
+    """The size of each influence coefficient over speed, below the rotor with its planes and sensors."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 8.5), layout="constrained")
+    above, below = figure.subplots(2, height_ratios=(2, 3))
+    draw_rotor(rotor, above, planes=influence.planes, sensors=influence.sensors)
+    draw_influence(influence, below)
+    return figure
 
 
 def draw_bode(

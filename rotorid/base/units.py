@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
+    from rotorid.base.arrays import FloatArray
 
 RPM = 60 / math.tau  # of 1 rad/s
 
@@ -29,4 +30,6 @@ def speed_text(speed: float) -> str:
 
 def phase_deg(z: ArrayLike) -> FloatArray:
     """Phases of complex numbers, degrees from 0 to 360."""
+    import numpy as np
+
     return np.asarray(np.mod(np.degrees(np.angle(np.asarray(z))), 360.0))

@@ -150,13 +150,6 @@ def note(document: Mapping[str, Any]) -> None:
             log.info("%s = %s", name, value)
 
 
-def note_rotor(rotor: Any, **more: object) -> None:  # noqa: ANN401 - until every command has its workflow
-    """As `rotorid.workflows.outcome.log_rotor`."""
-    from rotorid.workflows.outcome import log_rotor
-
-    log_rotor(rotor, **more)
-
-
 def _numbers(document: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
     for key, value in document.items():
         name = f"{prefix}{key}"

@@ -6,9 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rotorid.base.units import RPM
 from rotorid.plots import plot
 from rotorid.report.page import inline_svg
 
@@ -92,32 +89,18 @@ def map_picture(chart: SpeedMap, operating: tuple[float, float] | None) -> Drawi
 def bode_picture(
     response: Response,
     places: Sequence[SensorLike],
-    labels: Sequence[str],
     peaks: Sequence[Peaks],
     operating: tuple[float, float] | None,
 ) -> Drawing:
     """Amplitude and phase over speed, marked where the sensor with the largest reading has its peaks."""
-    Z = np.stack([response.at(place) for place in places], axis=1)
-    marks = []
-    if peaks:
-        loudest = int(np.argmax(np.abs(Z[response.steady]).max(axis=0, initial=0.0)))
-        marks = [(peak.speed, f"{peak.speed * RPM:.0f} rpm") for peak in peaks[loudest].peaks]
 
     def draw(figure: Figure) -> None:
-        from fem.plots import draw_bode
+        from fem.plots.readings import draw_readings
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        draw_bode(
-            response.speeds,
-            Z,
-            labels,
-            (above, below),
-            peaks=marks,
-            operating=operating,
-            windows=response.windows,
-        )
-        columns = 3 if len(labels) > 4 else 2
+        draw_readings(response, places, peaks, (above, below), operating=operating, factors=False)
         handles, named = above.get_legend_handles_labels()
+        columns = 3 if len(named) > 4 else 2
         _legend(above, handles, named, (0.5, 1.16), columns)
 
     caption = "Amplitude and phase over speed; a positive phase leads. Dotted: peaks of the largest reading."

@@ -124,7 +124,7 @@ def response_report(
         Part(
             "Vibration",
             tables=(_largest(document, show), *_peaks(document, show, operating)),
-            drawings=(bode_picture(response, places, list(map(str, document["sensors"])), peaks, operating),),
+            drawings=(bode_picture(response, places, peaks, operating),),
         ),
         *_forces(document, show, rotor),
         Part("Readings", tables=_readings(document, show)),

@@ -130,6 +130,18 @@ def pairs(
     return found
 
 
+def numbers(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
+    """`pairs` of names with finite numbers."""
+
+    def read(name: str, text: str) -> float:
+        value = number(text)
+        if math.isnan(value):
+            raise ValueError(f"{what} {given!r}: {name}={text} is no NAME=NUMBER; use {example}")
+        return value
+
+    return pairs(given, what, read, example)
+
+
 def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
     """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
     if given is None or not isinstance(given, str):

@@ -168,18 +168,18 @@ def test_table_text_and_orbits_of_a_response_are_those_of_the_model(cli, files, 
 
 
 def test_what_the_pictures_of_a_response_are_drawn_from(cli, files, model, tmp_path, monkeypatch):
-    import fem.plots
+    import fem.plots.readings
 
     given = {}
 
     def watch(name):
-        original = getattr(fem.plots, name)
+        original = getattr(fem.plots.readings, name)
 
         def draw(*args, **options):
             given[name] = args, options
             return original(*args, **options)
 
-        monkeypatch.setattr(fem.plots, name, draw)
+        monkeypatch.setattr(fem.plots.readings, name, draw)
 
     for name in ("draw_bode", "draw_polar", "draw_orbits"):
         watch(name)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from fem.critical import critical_speeds
+from fem.model.sensors import SensorLike
+from fem.peaks import Edition, Peaks
+from fem.response import judged, response_peaks
+from fem.vibration import Response
 from rotorid.base.arrays import BoolArray, FloatArray
 
-if TYPE_CHECKING:
-    from fem import Peaks, Response, Rotor
-    from fem.model.sensors import SensorLike
-
-
+UNDAMPED = "practically undamped peaks: what is largest beside them depends on the speeds asked for"
 _INSIDE = 2  # speeds within the half-power band on either side of a summit: five with the summit
 _FINEST = 2e-7  # relative step; finer ones would show rounding
 _ROUNDS = 14
@@ -24,50 +25,50 @@ _CRITICALS = 32
 _OVER_SPEED = ("speeds", "amplitudes", "backward", "largest", "largest_node")
 
 
-def response_from_rest(
-    model: Rotor, unbalance: Mapping[int, complex], speeds: Sequence[float] | FloatArray, nodes: list[int]
-) -> Response:
-    """`fem.unbalance_response`, also of a free rotor at rest: without rotation there is no force.
+def resolve_peaks(
+    response: Response,
+    sensors: Sequence[SensorLike],
+    *,
+    operating: tuple[float, float] | None = None,
+    edition: Edition = "2005",
+) -> tuple[Response, list[Peaks]]:
+    """Find the peaks of readings whatever the steps between the speeds of the response are.
 
     Parameters
     ----------
-    model, unbalance, nodes
-        As there.
-    speeds
-        rad/s, ascending.
+    response
+        At ascending speeds.
+    sensors
+        Where it is read.
+    operating, edition
+        As in `find_peaks`.
+
+    Returns
+    -------
+    The response with speeds added around its peaks, judged for stability, and the peaks of each sensor; the
+    same response and no peaks where fewer than three speeds above 0 are known.
+
+    Raises
+    ------
+    ValueError
+        As `response_peaks`.
     """
-    import fem
-
-    omega = np.asarray(speeds, dtype=float)
-    known = all(not support.speeds or support.speeds[0] == 0 for support in model.supports)
-    if omega[0] > 0 or omega.size < 2 or not known:
-        return fem.unbalance_response(model, unbalance, omega, nodes=nodes)
-    moving = fem.unbalance_response(model, unbalance, omega[1:], nodes=nodes)
-    rest = np.zeros((1, len(nodes)), dtype=complex)
-    return dataclasses.replace(
-        moving,
-        speeds=omega,
-        amplitudes=np.concatenate((rest, moving.amplitudes)),
-        backward=np.concatenate((rest, moving.backward)),
-        largest=np.insert(moving.largest, 0, 0.0),
-        largest_node=np.insert(moving.largest_node, 0, 1),
-    )
+    if np.count_nonzero(response.speeds) < 3:  # rest is no part of a peak
+        return response, []
+    finer = judged(_refine(response, sensors))
+    peaks = [response_peaks(finer, place, operating=operating, edition=edition) for place in sensors]
+    finer = _settle(finer, peaks, response.speeds)
+    if any(peak.undamped for found in peaks for peak in found.peaks):
+        finer = dataclasses.replace(finer, warnings=(*finer.warnings, UNDAMPED))
+    return finer, peaks
 
 
-def refine(result: Response, places: Iterable[SensorLike]) -> Response:
+def _refine(result: Response, places: Sequence[SensorLike]) -> Response:
     """The response with at least five speeds in the half-power band of each peak of each reading.
 
     Speeds near the undamped critical speeds come first, as a sharp peak between two steps may not show at
     all. Bounded: what is not resolved with steps of 2e-7 of the speed counts as undamped.
-
-    Parameters
-    ----------
-    result
-        At three speeds or more; its speeds stay among those returned.
-    places
-        Where it is read.
     """
-    places = list(places)
     omega = result.speeds
     near = np.add.outer(_criticals(result), np.zeros(_AROUND.size)) * (1 + _AROUND)
     extra = near[(near > omega[0]) & (near < omega[-1])]
@@ -84,7 +85,7 @@ def refine(result: Response, places: Iterable[SensorLike]) -> Response:
     return result
 
 
-def settle(result: Response, peaks: Iterable[Peaks], asked: FloatArray) -> Response:
+def _settle(result: Response, peaks: Sequence[Peaks], asked: FloatArray) -> Response:
     """With the speeds of the peaks, but without those added beside undamped peaks.
 
     There the amplitude has no limit and no meaning.
@@ -103,13 +104,11 @@ def settle(result: Response, peaks: Iterable[Peaks], asked: FloatArray) -> Respo
 
 def _criticals(result: Response) -> FloatArray:
     """Undamped critical speeds up to the highest speed; none where they cannot be found."""
-    import fem
-
     # Over tables all are found at once, whatever n.
     n, found = 4 if result.rotor.constant else _CRITICALS, np.zeros(0)
     while n <= _CRITICALS:
         try:
-            found = fem.critical_speeds(result.rotor, n).frequencies
+            found = critical_speeds(result.rotor, n).frequencies
         except ValueError:
             break  # fewer modes than that, or none inside the tables
         if found.size < n or found[-1] > result.speeds[-1]:

@@ -1,21 +1,21 @@
-"""What `rotorid reduce` prints, writes and draws beside the masses."""
+"""What `reduce` gives: the masses, what was asked for beside them, and the small model as files."""
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from rotorid.base.text import counted
-from rotorid.plots import plot
+from rotorid.workflows.outcome import Outcome
+from rotorid.workflows.parameters import one_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import pandas as pd
     from matplotlib.figure import Figure
 
@@ -30,14 +30,25 @@ if TYPE_CHECKING:
         StabilityCost,
         TradeOff,
     )
-    from rotorid.reduction.equivalent.masses import Normalisation
 
 NAMED = ("states", "inputs", "outputs")
 
 
-@dataclass
-class Report:
-    """A reduction and what was asked for beside it."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReducedRotor(Outcome):
+    """A reduction, what was asked for beside it, and the small model where it was needed.
+
+    Attributes
+    ----------
+    result
+        The masses.
+    placement, trade_off, methods, response, stability, shift
+        What was asked for beside them.
+    small
+        The model in both planes, with what turns, couples and damps; `damping`: its modal damping ratios.
+    speed, both_planes, forces
+        Of the files of the small model: rad/s, whether both planes are written, nodes of forces.
+    """
 
     result: Reduction
     placement: Placement | None = None
@@ -47,59 +58,13 @@ class Report:
     stability: StabilityCost | None = None
     shift: Shift | None = None
     small: SmallRotor | None = None
+    damping: Sequence[float] = ()
     speed: float = 0.0
     both_planes: bool = False
-    forces: Sequence[int] = ()
-
-    def add_trade_off(self, normalise: Normalisation, speed: float | None) -> None:
-        """Other masses at these nodes: regressions over more or fewer modes, and exact frequencies."""
-        from rotorid.reduction import trade_off
-
-        self.trade_off = trade_off(self._rotor, self._nodes, normalise=normalise, speed=speed)
-
-    def add_methods(self, how: Mapping[str, Any], speed: float | None) -> None:
-        """Guyan, IRS and SEREP at the same nodes."""
-        from rotorid.reduction import compare_methods
-
-        self.methods = compare_methods(self._rotor, self._nodes, modes=self.result.modes, speed=speed, **how)
-
-    def add_small(self, modal_damping: Sequence[float], speed: float | None) -> None:
-        """The model in both planes, with what turns, couples and damps."""
-        self.small = self.result.small(modal_damping)
-        tables = [support.speeds[0] for support in self._rotor.supports if support.speeds]
-        self.speed = max(tables, default=0.0) if speed is None else speed
-
-    def add_response(self, speeds: Sequence[float] | None) -> None:
-        """Response to unbalance beside the full rotor's."""
-        from rotorid.reduction import compare_response
-
-        self.response = compare_response(self._model, speeds)
-
-    def add_stability(self, lowest: float, highest: float) -> None:
-        """Eigenvalues over speed beside the full rotor's."""
-        from rotorid.reduction import compare_stability
-
-        self.stability = compare_stability(self._model, highest, lowest=lowest)
-
-    @property
-    def _rotor(self) -> fem.Rotor:
-        if self.result.rotor is None:
-            raise ValueError("this needs a rotor: give ROTOR instead of --compliance")
-        return self.result.rotor
-
-    @property
-    def _nodes(self) -> list[int]:
-        return [int(node) for node in self.result.nodes]
-
-    @property
-    def _model(self) -> SmallRotor:
-        if self.small is None:
-            self.add_small((), None)
-        assert self.small is not None
-        return self.small
+    forces: Sequence[int | str] = ()
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
+        """As JSON types, without the provenance."""
         parts = {
             "what_if": self.shift,
             "placement": self.placement,
@@ -107,14 +72,13 @@ class Report:
             "methods": self.methods,
             "response": self.response,
             "stability": self.stability,
+            "small_model": self.small,
         }
-        return {
-            **self.result.to_dict(),
-            **{key: part.to_dict() for key, part in parts.items() if part is not None},
-            **({} if self.small is None else {"small_model": self.small.to_dict()}),
+        return self.result.to_dict() | {
+            key: part.to_dict() for key, part in parts.items() if part is not None
         }
 
-    def text(self) -> str:
+    def summary(self) -> str:
         """For the terminal."""
         parts = (
             self.result,
@@ -124,22 +88,25 @@ class Report:
             self.methods,
             self.response,
             self.stability,
+            self.small,
         )
-        blocks = [part.summary() for part in parts if part is not None]
-        if self.small is not None:
-            blocks.append(self.small.summary())
-        return "\n\n".join(blocks)
+        return "\n\n".join(part.summary() for part in parts if part is not None)
 
-    def frame(self) -> pd.DataFrame:
+    def to_frame(self) -> pd.DataFrame:
         """The ranking where it was asked for, else masses and modes."""
         return self.result.to_frame() if self.placement is None else self.placement.to_frame()
 
-    def figure(self, view: str | None) -> Figure:
-        """The picture asked for; by default that of what was asked for last."""
+    def figure(self, view: str | None = None) -> Figure:
+        """Shapes, methods, placement, response or stability; by default what was asked for last.
+
+        Raises
+        ------
+        ValueError
+            For a view of what was not computed.
+        """
         from matplotlib.figure import Figure
 
-        from rotorid.reduction.dynamics.running_plots import plot_running
-        from rotorid.reduction.plots import plot_methods
+        from rotorid.plots import plot
 
         parts = {
             "stability": self.stability,
@@ -149,35 +116,35 @@ class Report:
             "shapes": self.result,
         }
         name = view or next(name for name, part in parts.items() if part is not None)
-        if parts[name] is None:
+        if parts[one_of(name, "view", [*parts])] is None:
             option = {"placement": "--rank"}.get(name, f"--{name}")
             raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        figure = Figure(figsize=(9.5, 6.5 if name in ("methods", "response") else 5.5), layout="constrained")
-        if self.methods is not None and name == "methods":
-            plot_methods(self.methods, list(figure.subplots(2, sharex=True)))
-        elif self.response is not None and name == "response":
-            plot_running(self.response, list(figure.subplots(2, sharex=True, height_ratios=(3, 2))))
-        else:
-            part = {"stability": self.stability, "placement": self.placement}.get(name) or self.result
-            plot(part, figure.add_subplot())
+        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
+        figure = Figure(figsize=(9.5, 6.5 if heights else 5.5), layout="constrained")
+        axes = [*figure.subplots(2, sharex=True, height_ratios=heights)] if heights else figure.add_subplot()
+        plot(parts[name], axes)
         return figure
 
-    def sheet(self, document: dict[str, Any], record: dict[str, Any]) -> bytes:
-        """HTML to print, from the document and the provenance."""
+    def sheet(self) -> bytes:
+        """To print: one HTML file."""
         from rotorid.report.reduction import reduce_report
 
         return reduce_report(
-            document,
+            self.to_dict(),
             self.result,
-            provenance=record,
+            provenance=self.provenance,
             placement=self.placement,
             methods=self.methods,
             response=self.response,
             stability=self.stability,
         )
 
-    def model_bytes(self, name: str) -> bytes:
-        """The small model as a file for `rotorid fit` and `identify`.
+    def with_small(self) -> ReducedRotor:
+        """The same with the small model, which needs a rotor."""
+        return self if self.small else dataclasses.replace(self, small=self.result.small(self.damping))
+
+    def model_bytes(self, name: str = "") -> bytes:
+        """The small model as a file for `fit` and `identify`; `name` of the rotor for its comment.
 
         Dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
         """
@@ -218,17 +185,16 @@ class Report:
             outputs=None if set(masses) == set(motion.coordinates) else masses,
         )
 
-    def state_space_bytes(self, path: Path) -> bytes:
-        """A, B, C, D in both planes at the speed, in the format that the name of the file asks for."""
-        if self.small is None:
-            raise ValueError("a state space needs a rotor")
-        model = self.small.state_space(self.speed)
-        document = model.to_dict()
-        if path.suffix.lower() == ".json":
+    def state_space_bytes(self, ending: str = ".json") -> bytes:
+        """A, B, C, D in both planes at the speed, as a file that ends in .json, .npz or .mat."""
+        small = self.with_small().small
+        assert small is not None
+        document = small.state_space(self.speed).to_dict()
+        if ending == ".json":
             return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
         arrays = {key: np.array(value) for key, value in document.items()}
         stream = io.BytesIO()
-        if path.suffix.lower() == ".mat":
+        if ending == ".mat":
             from scipy.io import savemat
 
             named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}

@@ -1,0 +1,94 @@
+"""`influence`: vibration at sensors of a rotor model per unit unbalance at planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.text import counted
+from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.parameters import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.workflows.sources import rotor_source
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import InfluenceCoefficients, Rotor
+
+
+@dataclass(frozen=True)
+class InfluenceOptions:
+    """Options of `influence`.
+
+    Attributes
+    ----------
+    planes
+        Correction planes: "7,12,18", or nodes and stations.
+    sensors
+        "2:45,22:45", or nodes and stations with angles from x in degrees.
+    speeds
+        "1000:6000:50rpm", or rad/s.
+    """
+
+    planes: Nodes
+    sensors: str | Sequence[Sensor]
+    speeds: Speeds
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RotorInfluence(Outcome):
+    """Influence coefficients, and the rotor that they are of."""
+
+    coefficients: InfluenceCoefficients
+    rotor: Rotor
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return self.coefficients.to_dict()
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return self.coefficients.summary()
+
+    def to_frame(self) -> pd.DataFrame:
+        """The file of stored coefficients that `balance` reads."""
+        from rotorid.tables import influence_frame
+
+        return influence_frame(self.coefficients)
+
+    def figure(self) -> Figure:
+        """The coefficients over speed, below the rotor with its planes and sensors."""
+        from fem.plots import influence_figure
+
+        return influence_figure(self.coefficients, self.rotor)
+
+
+@workflow
+def influence(rotor: Rotor | Path | str, options: InfluenceOptions) -> RotorInfluence:
+    """Compute the vibration at sensors per unit unbalance at planes, over speeds.
+
+    Parameters
+    ----------
+    rotor
+        A rotor, a rotor table or a rotor file.
+    options
+        Planes, sensors and speeds.
+
+    Raises
+    ------
+    ValueError
+        For a rotor or an option that cannot be.
+    """
+    import fem
+
+    model, files = rotor_source(rotor)
+    planes, places = nodes(options.planes, "--planes"), sensors(options.sensors)
+    speeds = rising_speeds(options.speeds)
+    with phase(f"influence coefficients at {counted(len(speeds), 'speed')}"):
+        found = fem.influence(model, planes, places, speeds)
+    log_rotor(model, speeds=len(speeds))
+    return RotorInfluence(coefficients=found, rotor=model, provenance=provenance(files, options))

@@ -1,0 +1,322 @@
+"""`reduce`: a rotor as a few masses, how good they are, and the small model to go on with."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from rotorid.base.text import counted
+from rotorid.workflows.outcome import log, provenance, workflow
+from rotorid.workflows.parameters import (
+    Band,
+    Nodes,
+    Speeds,
+    band,
+    nodes,
+    numbers,
+    one_of,
+    one_speed,
+    rising_speeds,
+)
+from rotorid.workflows.sources import rotor_source
+
+if TYPE_CHECKING:
+    from fem import Rotor
+    from rotorid.reduction import Placement, Reduction
+    from rotorid.tables.data.modes_table import MeasuredModes
+    from rotorid.workflows.reduced_rotor import ReducedRotor
+
+Place = Literal["best", "compromise", "mac", "book"]
+"""Which of all places of the masses is taken."""
+Normalise = Literal["first", "largest", "length"]
+"""How shapes are scaled."""
+Rows = Literal["equal", "relative"]
+"""How rows of the regression are weighted."""
+View = Literal["shapes", "methods", "placement", "response", "stability"]
+"""What a picture shows."""
+
+
+@dataclass(frozen=True)
+class ReduceOptions:
+    """Options of `reduce`.
+
+    Attributes
+    ----------
+    nodes
+        Where the masses stand: "7,12,18", or nodes and stations.
+    place
+        Instead, of all places: the best by frequency, by MAC, a compromise, or the book's rule.
+    masses
+        How many masses `place` and `rank` set; None: 3.
+    modes
+        How many modes the regression uses; None: 2.
+    normalise, rows, nonnegative, supports_apart
+        As in `rotorid.reduce`.
+    measured
+        Table of measured modes, used instead of computed ones.
+    compliance
+        Without a rotor: table of compliance, with `measured`.
+    seals
+        With `compliance`: springs to the ground that it does not hold, "12=2e6" or `{12: 2e6}`, N/m.
+    errors
+        Standard deviations of the inputs: "compliance=1.3" in percent, or shares, `{"compliance": 0.013}`.
+    what_if
+        Changes of inputs: "alpha12=1.3" in percent, or shares.
+    speed
+        Of tables of bearings and seals and of the small model, "3000rpm" or rad/s; None: the lowest of the
+        tables.
+    rank
+        Rank all places of the masses.
+    candidates
+        Nodes that `rank` and `place` choose from.
+    trade_off, methods
+        Other masses at these nodes, frequencies against shapes; Guyan, IRS and SEREP.
+    response
+        Speeds of a response beside the full rotor's, "100:700:50" or rad/s, or "auto".
+    stability
+        Speeds of stability beside the full rotor's, "0:9000rpm" or rad/s.
+    damping
+        Modal damping of the small model: "1,0.5" in percent of critical of the first modes, or ratios.
+    both_planes, force
+        Of the model file: planes x and y also where nothing couples them; nodes of measured forces.
+    """
+
+    nodes: Nodes | None = None
+    place: Place | None = None
+    masses: int | None = None
+    modes: int | None = None
+    normalise: Normalise = "first"
+    rows: Rows = "equal"
+    nonnegative: bool = False
+    supports_apart: bool = False
+    measured: Path | str | None = None
+    compliance: Path | str | None = None
+    seals: str | Mapping[str, float] | None = None
+    errors: str | Mapping[str, float] | None = None
+    what_if: str | Mapping[str, float] | None = None
+    speed: str | float | None = None
+    rank: bool = False
+    candidates: Nodes | None = None
+    trade_off: bool = False
+    methods: bool = False
+    response: Speeds | None = None
+    stability: Band | None = None
+    damping: str | Sequence[float] | None = None
+    both_planes: bool = False
+    force: Nodes | None = None
+
+
+@workflow
+def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | None = None) -> ReducedRotor:
+    """Find equivalent masses at chosen nodes (formula 50), how good they are, and the small model.
+
+    The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
+    small model.
+
+    Parameters
+    ----------
+    rotor
+        A rotor, a rotor table or a rotor file; None: compliance and modes are given by tables.
+    options
+        Those that differ from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a rotor or an option that cannot be, and for options that would have no effect.
+    """
+    from rotorid.workflows.reduce_inputs import shares
+    from rotorid.workflows.reduced_rotor import ReducedRotor
+
+    options = options or ReduceOptions()
+    how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
+    _check_used(options, rotor is not None)
+    if rotor is None:
+        result, files = _of_tables(options, how)
+        forces = nodes(options.force or (), "--force")
+        found = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
+    else:
+        found = _of_rotor(rotor, options, how)
+    solved = found.result.masses
+    log.info("rank = %s", solved.rank)
+    log.info("degrees_of_freedom = %s", solved.dof)
+    log.info("singular_values = %s", ", ".join(f"{value:.6g}" for value in solved.singular_values))
+    if options.what_if is None:
+        return found
+    changes = shares(options.what_if, "--what-if", "alpha12=1.3")
+    return dataclasses.replace(found, shift=found.result.what_if(changes))
+
+
+def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
+    """Refuse options that would have no effect."""
+    computed = ("rank", "place", "methods", "trade_off", "response", "stability")
+    of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed")
+    asked = {name: getattr(options, name) for name in of_rotor}
+    given = [name for name, value in asked.items() if value is not None and value is not False]
+    if not has_rotor and given:
+        raise ValueError(f"{_option(given[0])} needs a rotor: give ROTOR instead of --compliance")
+    if has_rotor and (options.compliance is not None or options.seals is not None):
+        raise ValueError("--compliance and --seals take the place of a rotor: give them, or ROTOR, not both")
+    for name in ("masses", "candidates"):
+        if getattr(options, name) is not None and not options.rank and options.place is None:
+            raise ValueError(f"--{name} does nothing without --rank or --place")
+    if options.measured is not None and given and given[0] in computed:
+        raise ValueError(
+            f"{_option(given[0])} compares with the computed rotor, not with the measured modes: "
+            f"leave out {_option(given[0])} or --measured"
+        )
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
+    """The masses of a rotor, and what is asked for beside them."""
+    from rotorid.reduction import rank_nodes
+    from rotorid.reduction import reduce as reduce_rotor
+    from rotorid.tables.data.modes_table import read_modes
+    from rotorid.workflows import reduce_inputs as given
+    from rotorid.workflows.reduced_rotor import ReducedRotor
+
+    machine, files = rotor_source(rotor)
+    at = None if options.speed is None else one_speed(options.speed, "--speed")
+    data = None if options.measured is None else read_modes(options.measured, machine)
+    placement = None
+    if options.rank or options.place is not None:
+        masses = options.masses or 3
+        candidates = None if options.candidates is None else nodes(options.candidates, "--candidates")
+        placement = rank_nodes(
+            machine,
+            masses,
+            options.modes or min(2, masses),
+            candidates=candidates,
+            speed=at,
+            normalise=options.normalise,
+            rows=options.rows,
+        )
+    places = _places(machine, options, placement, data, at)
+    used = min(2, len(places)) if options.modes is None else options.modes
+    if data is not None and options.measured is not None:
+        files = (*files, Path(options.measured))
+        data = given.at(data, machine, places, options.measured)
+    result = reduce_rotor(
+        machine,
+        places,
+        used,
+        speed=at,
+        supports_apart=options.supports_apart,
+        measured=None if data is None else (data.frequencies, data.shapes),
+        errors=given.errors(options.errors, data, used, len(places)),
+        **how,
+    )
+    tables = [support.speeds[0] for support in machine.supports if support.speeds]
+    found = ReducedRotor(
+        result=result,
+        placement=placement if options.rank else None,
+        damping=given.damping_ratios(options.damping),
+        speed=max(tables, default=0.0) if at is None else at,
+        both_planes=options.both_planes,
+        forces=[machine.node(node) for node in nodes(options.force or (), "--force")],
+        provenance=provenance(files, options),
+    )
+    return _beside(found, machine, options, at)
+
+
+def _places(
+    rotor: Rotor,
+    options: ReduceOptions,
+    placement: Placement | None,
+    data: MeasuredModes | None,
+    speed: float | None,
+) -> list[int]:
+    """Nodes of the masses: as given, by the rule asked for, or those of the measured shapes."""
+    if options.nodes is not None and options.place is not None:
+        raise ValueError("--nodes and --place are two ways to the same end: choose one")
+    if options.nodes is not None:
+        return [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
+    masses = options.masses or 3
+    if options.place == "book":
+        from rotorid.reduction import book_nodes
+
+        return list(book_nodes(rotor, masses, speed=speed))
+    if placement is not None:
+        which = {
+            "mac": placement.best_by_mac,
+            "compromise": placement.compromise,
+            "best": placement.best_by_frequency,
+        }[one_of(options.place or "compromise", "--place", get_args(Place))]
+        if which is None:
+            raise ValueError(
+                f"no choice of {counted(masses, 'node')} gives positive masses with "
+                f"{counted(placement.modes, 'mode')}: use other --modes or --masses"
+            )
+        return [int(node) for node in placement.nodes[which]]
+    if data is not None:
+        return [rotor.node(node) for node in data.nodes]
+    raise ValueError(
+        "say where the masses stand: --nodes 7,12,18, or --place best, compromise, mac or book, or --rank"
+    )
+
+
+def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reduction, tuple[Path, ...]]:
+    """A reduction without a rotor: its compliance and its modes from tables."""
+    from rotorid.reduction import reduce_measured
+    from rotorid.tables.data.modes_table import read_compliance, read_modes
+    from rotorid.workflows import reduce_inputs as given
+
+    if options.compliance is None or options.measured is None:
+        raise ValueError("give a rotor, or --compliance and --measured, which take its place")
+    data = read_modes(options.measured)
+    wanted = list(data.nodes)
+    if options.nodes is not None:
+        labels = [str(node) for node in nodes(options.nodes, "--nodes")]
+        named = {str(node): node for node in data.nodes}
+        wanted = [named.get(label, label) for label in labels]
+    data = given.at(data, None, wanted, options.measured)
+    known, alpha = read_compliance(options.compliance, wanted)
+    order = [known.index(node) for node in wanted]
+    used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
+    springs = {str(node): k for node, k in numbers(options.seals or {}, "--seals", "12=2e6").items()}
+    lost = [name for name in springs if name not in map(str, wanted)]
+    if lost:
+        raise ValueError(
+            f"--seals: no mass stands at {lost[0]!r}; masses stand at {', '.join(map(str, wanted))}"
+        )
+    result = reduce_measured(
+        alpha[order][:, order],
+        data.frequencies,
+        data.shapes,
+        used,
+        nodes=wanted,
+        seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
+        errors=given.errors(options.errors, data, used, len(wanted)),
+        **how,
+    )
+    return result, (Path(options.compliance), Path(options.measured))
+
+
+def _beside(found: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float | None) -> ReducedRotor:
+    """With other masses, other methods, response and stability as asked for."""
+    from rotorid.reduction import compare_methods, compare_response, compare_stability, trade_off
+
+    places = [int(node) for node in found.result.nodes]
+    how: dict[str, Any] = {"normalise": options.normalise, "speed": at}
+    beside: dict[str, Any] = {}
+    if options.trade_off:
+        beside["trade_off"] = trade_off(rotor, places, **how)
+    if options.methods:
+        beside["methods"] = compare_methods(rotor, places, modes=found.result.modes, rows=options.rows, **how)
+    stable = band(options.stability, "--stability")
+    if found.damping or options.response is not None or stable is not None:
+        beside["small"] = small = found.result.small(found.damping)
+        if options.response is not None:
+            automatic = str(options.response) == "auto"
+            speeds = None if automatic else rising_speeds(options.response, "--response")
+            beside["response"] = compare_response(small, speeds)
+        if stable is not None:
+            beside["stability"] = compare_stability(small, stable[1], lowest=stable[0])
+    return dataclasses.replace(found, **beside)

@@ -1,0 +1,293 @@
+"""`response`: vibration of a rotor model under a given unbalance, bearing forces and peaks."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from rotorid.base.text import counted
+from rotorid.base.units import RPM
+from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.parameters import (
+    Band,
+    Sensor,
+    Speeds,
+    band,
+    one_of,
+    one_speed,
+    rising_speeds,
+    sensors,
+)
+from rotorid.workflows.sources import rotor_source
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Peaks, Response, Rotor
+    from fem.model.sensors import SensorLike
+    from fem.response import Unbalance
+    from rotorid.base.arrays import FloatArray
+
+View = Literal["bode", "polar", "orbits"]
+"""What a picture shows."""
+
+
+@dataclass(frozen=True)
+class ResponseOptions:
+    """Options of `response`.
+
+    Attributes
+    ----------
+    speeds
+        "500:15000:20rpm", or rad/s.
+    sensors
+        "2:45,22:45", or nodes and stations with angles from x in degrees; None: all stations, or else all
+        supports, in x.
+    operating
+        Operating speeds, "5300:6500rpm" or rad/s.
+    at
+        Speed of the orbits that are drawn, "5800rpm" or rad/s; None: where the largest reading is.
+    """
+
+    speeds: Speeds
+    sensors: str | Sequence[Sensor] | None = None
+    operating: Band | None = None
+    at: str | float | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RotorResponse(Outcome):
+    """Vibration at the speeds asked for, and the peaks between them.
+
+    Attributes
+    ----------
+    response, finer
+        At the speeds asked for; with speeds between them, around the peaks.
+    sensors, peaks
+        Where it is read, and the peaks there; none where too few speeds were asked for.
+    operating
+        Operating range, rad/s.
+    orbits_at
+        Which speed of `finer` the orbits are drawn at; None: that of the largest reading.
+    """
+
+    response: Response
+    finer: Response
+    sensors: Sequence[SensorLike]
+    peaks: Sequence[Peaks]
+    operating: tuple[float, float] | None
+    orbits_at: int | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance: what is largest, and the peaks, with the speeds between."""
+        document = self.response.to_dict(self.sensors)
+        warnings = document.pop("warnings")
+        at_support = [self._largest(force) for force in self.finer.bearing_forces().largest.T]
+        return {
+            **document,
+            "orbits": self._orbits(),
+            "largest": [
+                {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
+                for name, size, speed in self._largest_readings()
+            ],
+            "bearing_forces": {
+                **self.response.bearing_forces().to_dict(),
+                "largest_N": [size for size, _ in at_support],
+                "largest_at_rad_s": [speed for _, speed in at_support],
+            },
+            "peaks": [
+                {"sensor": name, **peak}
+                for name, found in zip(self.labels, self.peaks, strict=False)
+                for peak in found.to_dict()["peaks"]
+            ],
+            "warnings": warnings,
+        }
+
+    def summary(self) -> str:
+        """For the terminal: how many speeds were asked for, and what is largest with those between."""
+        lines = [
+            *self.response.summary().splitlines()[:1],
+            *self.finer.summary().splitlines()[1:],
+            "",
+            f"{'sensor':>20} {'largest, µm':>14} {'at rpm':>11}",
+        ]
+        for name, size, speed in self._largest_readings():
+            if size is None or speed is None:
+                lines.append(f"{name:>20} {'none':>14} {'-':>11}")
+            else:
+                lines.append(f"{name:>20} {1e6 * size:14.4g} {speed * RPM:11.1f}")
+        if self.response.rotor.supports:
+            lines += ["", self.finer.bearing_forces().summary()]
+        for name, found in zip(self.labels, self.peaks, strict=False):
+            lines += ["", f"peaks at {name}", found.summary("µm", 1e6)]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and sensor."""
+        import numpy as np
+        import pandas as pd
+
+        from fem.response import phase_degrees
+
+        Z = self.response.readings(self.sensors)
+        S, C = Z.shape
+        return pd.DataFrame(
+            {
+                "speed_rad_s": np.repeat(self.response.speeds, C),
+                "sensor": self.labels * S,
+                "amplitude_m": np.abs(Z).ravel(),
+                "phase_deg": phase_degrees(Z).ravel(),
+            }
+        )
+
+    def figure(self, view: View = "bode") -> Figure:
+        """Amplitude and phase over speed, polar curves, or orbits.
+
+        Raises
+        ------
+        ValueError
+            For another view, and for orbits where there is no steady response.
+        """
+        from fem.plots import bode_figure, orbits_figure, polar_figure
+
+        one_of(view, "view", get_args(View))
+        if view == "bode":
+            return bode_figure(self.finer, self.sensors, self.peaks, operating=self.operating)
+        if view == "polar":
+            return polar_figure(self.finer, self.sensors)
+        return orbits_figure(self.finer, self.sensors, self._speed_of_orbits())
+
+    def sheet(self) -> bytes:
+        """To print: one HTML file."""
+        from rotorid.report.rotor import response_report
+
+        return response_report(
+            self.to_dict(),
+            self.finer,
+            self.sensors,
+            self.peaks,
+            provenance=self.provenance,
+            operating=self.operating,
+        )
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the sensors."""
+        from fem.model.sensors import label
+
+        return [str(label(place)) for place in self.sensors]
+
+    def _largest_readings(self) -> list[tuple[str, float | None, float | None]]:
+        """Each sensor, its largest reading, m, and the speed of it, rad/s."""
+        sizes = abs(self.finer.readings(self.sensors)).T
+        return [(name, *self._largest(size)) for name, size in zip(self.labels, sizes, strict=True)]
+
+    def _largest(self, size: FloatArray) -> tuple[float | None, float | None]:
+        """The largest of a size over speed where a steady response exists, and its speed, rad/s."""
+        from fem.vibration import largest_at
+
+        k = largest_at(size, self.finer.steady)
+        return (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k]))
+
+    def _speed_of_orbits(self) -> int:
+        from fem.vibration import largest_at
+
+        sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
+        k = largest_at(sizes, self.finer.steady) if self.orbits_at is None else self.orbits_at
+        if k is None:
+            raise ValueError("there is no steady response at any of these speeds, so no orbit to draw")
+        return k
+
+    def _orbits(self) -> dict[str, Any]:
+        """Ellipses of the sensors' nodes, one list over speed for each sensor."""
+        import numpy as np
+
+        import fem
+        from fem.model.sensors import as_sensor
+
+        result = self.response
+        nodes = [result.rotor.node(as_sensor(place, result.rotor).node) for place in self.sensors]
+        index = [result.column(node) for node in nodes]
+        ellipses = fem.orbits(result.x[:, index], result.y[:, index])
+        names = {1: "forward", -1: "backward", 0: "straight"}
+        return {
+            "nodes": nodes,
+            "major_axis_m": ellipses.major.T.tolist(),
+            "minor_axis_m": ellipses.minor.T.tolist(),
+            "inclination_deg": np.degrees(ellipses.inclination).T.tolist(),
+            "direction": [[names[int(way)] for way in row] for row in ellipses.direction.T],
+        }
+
+
+@workflow
+def response(
+    rotor: Rotor | Path | str, unbalance: Unbalance | Path | str, options: ResponseOptions
+) -> RotorResponse:
+    """Compute the vibration under unbalance: readings, orbits, bearing forces, and the peaks after API 684.
+
+    Parameters
+    ----------
+    rotor
+        A rotor, a rotor table or a rotor file.
+    unbalance
+        A table of unbalance, or `{node or station: m r e^{iφ}}` in kg·m.
+    options
+        The speeds, and what differs from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a rotor, an unbalance or an option that cannot be.
+    """
+    from fem import resolve_peaks
+    from fem.model.sensors import as_sensor
+    from fem.response import response_from_rest
+    from rotorid.tables import read_unbalance
+
+    model, files = rotor_source(rotor)
+    operating = band(options.operating)
+    places = _places(model, options.sensors)
+    nodes = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
+    nodes |= dict.fromkeys(support.node for support in model.supports)
+    speeds = rising_speeds(options.speeds)
+    if isinstance(unbalance, Path | str):
+        files = (*files, Path(unbalance))
+        unbalance = read_unbalance(unbalance, model)
+    with phase(f"response at {counted(len(speeds), 'speed')}"):
+        found = response_from_rest(model, unbalance, speeds, [*nodes])
+    with phase("peaks"):
+        finer, peaks = resolve_peaks(found, places, operating=operating)
+    log_rotor(model, speeds=len(speeds))
+    return RotorResponse(
+        response=dataclasses.replace(found, windows=finer.windows, warnings=finer.warnings),
+        finer=finer,
+        sensors=places,
+        peaks=peaks,
+        operating=operating,
+        orbits_at=None if options.at is None else _nearest(finer, options.at),
+        provenance=provenance(files, options),
+    )
+
+
+def _places(rotor: Rotor, given: str | Sequence[Sensor] | None) -> Sequence[SensorLike]:
+    """Where to read the vibration."""
+    if given is not None:
+        return sensors(given)
+    nodes = dict.fromkeys(support.node for support in rotor.supports)
+    return [*rotor.stations] or [*nodes] or [*range(1, rotor.n_nodes + 1)]
+
+
+def _nearest(response: Response, at: str | float) -> int:
+    """The speed nearest to one asked for, which must lie among them."""
+    wanted = one_speed(at, "--at")
+    low, high = response.speeds[0], response.speeds[-1]
+    if not low * (1 - 1e-9) <= wanted <= high * (1 + 1e-9):
+        raise ValueError(f"--at {at}: the response was asked for from {low:.6g} to {high:.6g} rad/s only")
+    k = int(abs(response.speeds - wanted).argmin())
+    if not response.steady[k]:
+        raise ValueError(f"--at {at}: there is no steady response, so no orbit to draw; take another speed")
+    return k
