@@ -13,7 +13,7 @@ PACKAGES = ("fem", "balancing", "rotorid")
 MOST, LEAST = 24, 4
 """Modules of a folder: more is a corridor, fewer (with a package's own page) is a module."""
 
-COMPLEX_FUNCTIONS = 25
+COMPLEX_FUNCTIONS = 23
 """Breaches of the limits of complexity, statements and arguments that stand in the code: they may only go."""
 
 
@@ -100,7 +100,5 @@ def test_the_list_of_complex_functions_only_gets_shorter():
     assert len(found) == COMPLEX_FUNCTIONS, found
 
 
-def test_no_circle_is_added():
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    circles = text[text.index('name = "No circles"') :]
-    assert len(re.findall(r'" *[\w.]+ -> [\w.]+"', circles)) == 2
+def test_no_circle_is_allowed():
+    assert "ignore_imports" not in (ROOT / "pyproject.toml").read_text(encoding="utf-8")

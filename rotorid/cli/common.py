@@ -1,23 +1,14 @@
-"""What the commands share: options, output, provenance."""
+"""Options that several commands have, each declared once."""
 
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
-
-from rotorid.cli.output import check_inputs, figure_bytes, json_text
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def options_of(kind: type) -> Callable[..., object]:
@@ -101,74 +92,3 @@ RunErrorOption = Annotated[
         show_default=False,
     ),
 ]
-
-
-def provenance(files: Sequence[Path], options: Mapping[str, object]) -> dict[str, Any]:
-    """Program version, input files with their hashes, date and options of a result."""
-    from rotorid import __version__
-    from rotorid.tables.reader.input_file import file_content
-
-    return {
-        "program": "rotorid",
-        "version": __version__,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
-        "options": {
-            k: str(v) if isinstance(v, Path) else v
-            for k, v in options.items()
-            if v is not None and v is not False
-        },
-    }
-
-
-def emit(
-    document: Mapping[str, Any],
-    text: Callable[[], str],
-    *,
-    as_json: bool,
-    files: Sequence[Path],
-    options: Mapping[str, object],
-    figure: tuple[Path | None, Callable[[], Figure]] | None = None,
-    table: tuple[Path | None, Callable[[], pd.DataFrame]] | None = None,
-    more: Sequence[tuple[Path | None, Callable[[], bytes]]] = (),
-    report: tuple[Path | None, Callable[[dict[str, Any], dict[str, Any]], bytes]] | None = None,
-) -> None:
-    """Print a result as text or JSON; write its picture, table, sheet and `more`, all of them or none.
-
-    The sheet is made from the document and the provenance.
-    """
-    from rotorid.cli.verbose import note
-    from rotorid.tables.reader.problems import printable
-    from rotorid.tables.reader.writing import table_bytes, write_files
-
-    note(document)
-    check_inputs([t[0] for t in (figure, table, *more, report) if t and t[0]], files)
-    record = provenance(files, options)
-    written: dict[Path, bytes] = {}
-    if figure and figure[0]:
-        written[figure[0]] = figure_bytes(figure[1](), figure[0])
-    if table and table[0]:
-        written[table[0]] = table_bytes(table[0], table[1]())
-    written |= {path: build() for path, build in more if path is not None}
-    if report and report[0]:
-        written[report[0]] = report[1](dict(document), record)
-    write_files(written)
-    if as_json:
-        typer.echo(json_text({**document, "provenance": record}))
-        return
-    typer.echo(text())
-    for path in written:
-        typer.echo(f"written: {printable(str(path))}")
-
-
-def picture(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Callable[[], Figure]:
-    """Make a function that draws on a new figure, which needs no screen."""
-
-    def build() -> Figure:
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(width, height), layout="constrained")
-        draw(figure.add_subplot())
-        return figure
-
-    return build

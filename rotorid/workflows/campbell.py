@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
-from rotorid.workflows.operating import separation, separation_text
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Band, Speeds, band, rising_speeds
 from rotorid.workflows.sources import rotor_source
@@ -52,6 +51,8 @@ class CampbellDiagram(Outcome):
 
     def summary(self) -> str:
         """For the terminal."""
+        from fem.separation import separation_text
+
         beside = self._separation()
         return "\n".join([self.whirl.summary(), *([] if beside is None else [separation_text(beside)])])
 
@@ -69,6 +70,7 @@ class CampbellDiagram(Outcome):
     def _separation(self) -> dict[str, Any] | None:
         """Of the critical speeds that show a peak."""
         from fem.campbell import HEAVY
+        from fem.separation import separation
 
         if self.operating is None:
             return None

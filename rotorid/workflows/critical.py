@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.operating import separation, separation_text
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Band, band
 from rotorid.workflows.sources import rotor_source
@@ -60,6 +59,8 @@ class CriticalSpeeds(Outcome):
 
     def summary(self) -> str:
         """For the terminal."""
+        from fem.separation import separation_text
+
         blocks = [self.modes.summary()]
         if self.operating is not None:
             blocks.append(separation_text(self._separation(self.operating)))
@@ -98,6 +99,8 @@ class CriticalSpeeds(Outcome):
         )
 
     def _separation(self, operating: tuple[float, float]) -> dict[str, Any]:
+        from fem.separation import separation
+
         return separation(self.modes.frequencies.tolist(), operating)
 
 

@@ -1,4 +1,4 @@
-"""Critical speeds beside the operating range."""
+"""Separation of critical speeds from the operating range (API 684)."""
 
 from __future__ import annotations
 
