@@ -3,6 +3,61 @@
 Nothing here prints; the command line, reports, `validate`, the demo, a notebook and a worksheet call it.
 """
 
-from rotorid.workflows.balance import Balance as Balance
-from rotorid.workflows.balance import BalanceOptions as BalanceOptions
-from rotorid.workflows.balance import balance as balance
+from rotorid.workflows.balance import Balance, BalanceOptions, balance
+from rotorid.workflows.campbell import CampbellDiagram, CampbellOptions, campbell
+from rotorid.workflows.critical import CriticalOptions, CriticalSpeeds, critical
+from rotorid.workflows.demo import Demo, DemoOptions, demo
+from rotorid.workflows.fit import FitOptions, RecordFit, fit
+from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
+from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
+from rotorid.workflows.outcome import Outcome
+from rotorid.workflows.reduce import ReduceOptions, reduce
+from rotorid.workflows.reduced_rotor import ReducedRotor
+from rotorid.workflows.response import ResponseOptions, RotorResponse, response
+from rotorid.workflows.split import SplitOptions, SplitWeight, split
+from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
+from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
+from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, unbalance
+
+__all__ = [
+    "Balance",
+    "BalanceOptions",
+    "CampbellDiagram",
+    "CampbellOptions",
+    "Coefficients",
+    "CriticalOptions",
+    "CriticalSpeeds",
+    "Demo",
+    "DemoOptions",
+    "FitOptions",
+    "IdentifyOptions",
+    "InfluenceOptions",
+    "Outcome",
+    "PermissibleUnbalance",
+    "RecordFit",
+    "ReduceOptions",
+    "ReducedRotor",
+    "ResponseOptions",
+    "RotorInfluence",
+    "RotorResponse",
+    "SplitOptions",
+    "SplitWeight",
+    "ToleranceOptions",
+    "TrialWeightOptions",
+    "TrialWeights",
+    "UnbalanceAtStations",
+    "UnbalanceOptions",
+    "balance",
+    "campbell",
+    "critical",
+    "demo",
+    "fit",
+    "identify",
+    "influence",
+    "reduce",
+    "response",
+    "split",
+    "tolerance",
+    "trial_weight",
+    "unbalance",
+]

@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 import io
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from rotorid.base.text import counted
 from rotorid.workflows.outcome import Outcome
@@ -158,7 +157,7 @@ class ReducedRotor(Outcome):
         masses = [f"{axis}{node}" for axis in "xy" for node in self.result.nodes]
         masses = [name for name in masses if name in motion.coordinates]
         critical = {
-            x: 2 * np.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
+            x: 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
         }
         inputs = [f"f_x{node}" for node in self.forces]
         if lost := [name for name in inputs if name.removeprefix("f_") not in masses]:
@@ -187,6 +186,8 @@ class ReducedRotor(Outcome):
 
     def state_space_bytes(self, ending: str = ".json") -> bytes:
         """A, B, C, D in both planes at the speed, as a file that ends in .json, .npz or .mat."""
+        import numpy as np
+
         small = self.with_small().small
         assert small is not None
         document = small.state_space(self.speed).to_dict()
@@ -206,6 +207,8 @@ class ReducedRotor(Outcome):
 
     def _motion(self) -> fem.Motion:
         """One plane where nothing couples them; without massless unknowns where no damping acts on them."""
+        import numpy as np
+
         if self.small is None:
             return self.result.equations_of_motion
         motion = self.small.motion(self.speed)

@@ -29,6 +29,7 @@ PACKAGES = (
     "rotorid.timedomain",
     "rotorid.reduction",
     "rotorid.tables",
+    "rotorid.workflows",
 )
 EXTERNAL = re.compile(
     r"<(?:script|img|iframe|source|video|audio|object|embed)[^>]+(?:src|data)=\"(?:https?:)?//"
