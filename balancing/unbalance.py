@@ -25,7 +25,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,11 +46,12 @@ from balancing.solvers.error_propagation import (
 )
 from balancing.unbalance_result import Unbalance
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
 from rotorid.regression import RCOND, stretch
 
-Method = Literal["minimum-norm", "ridge", "modal"]
-
+_Gain = tuple[ComplexArray, int, float, float | None]
+"""G (n, N), rank, condition number of what is determined, and λ relative to the largest s."""
 LEVEL = 0.99
 _REASONS = "unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons"
 _PASSES = 4
@@ -63,7 +63,7 @@ def estimate_unbalance(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     *,
-    method: Method = "minimum-norm",
+    method: str = "minimum-norm",
     names: Sequence[str] | None = None,
     covariance: ArrayLike | None = None,
     common: ComplexArray | None = None,
@@ -81,7 +81,7 @@ def estimate_unbalance(  # noqa: PLR0913
     Y
         Complex readings, shape (N,).
     method
-        "minimum-norm" (which is least squares where the readings determine all stations), "ridge", "modal".
+        One of `METHODS`.
     names
         Of the stations; default 1 … Q.
     covariance
@@ -115,11 +115,12 @@ def estimate_unbalance(  # noqa: PLR0913
     stations = check_names(names or [str(q) for q in range(1, Q + 1)], "stations")
     if len(stations) != Q:
         raise ValueError(f"{Q} names of stations are needed; got {len(stations)}")
+    gain = find(METHODS, method, "method").function
     _check_options(method, ridge, shapes, masses)
     if not A.any():
         raise UndeterminedError("no station has an effect on any reading: check the coefficients")
     channels = _channels(covariance, N, Q)
-    basis = _basis(shapes, masses, Q) if method == "modal" else np.eye(Q)
+    basis = np.eye(Q) if shapes is None else _basis(shapes, masses, Q)
     variance: FloatArray | None = None
     sigma: FloatArray | None = None
     U, G, rank, condition, used = np.zeros(Q, dtype=complex), np.zeros((Q, N), dtype=complex), 0, 1.0, ridge
@@ -127,7 +128,7 @@ def estimate_unbalance(  # noqa: PLR0913
         if channels is not None:
             variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
             sigma = _sigma(variance)
-        G, rank, condition, used = _gain((A @ basis).astype(complex), y, sigma, method, ridge)
+        G, rank, condition, used = gain((A @ basis).astype(complex), y, sigma, ridge)
         G = basis @ G
         U = G @ y
     residual = y - A @ U
@@ -142,7 +143,7 @@ def estimate_unbalance(  # noqa: PLR0913
         )
         white = _whitening(own, shared)
         left = white(residual[:, None])[:, :1]
-        if method != "ridge":  # the least that unbalance at the stations leaves
+        if used is None:  # the least that unbalance at the stations leaves
             fitted = white((A @ basis).astype(complex))
             left -= fitted @ np.linalg.lstsq(fitted, left, rcond=RCOND)[0]
         chi_square = float(np.sum(left**2))
@@ -156,7 +157,7 @@ def estimate_unbalance(  # noqa: PLR0913
         covariance=out,
         chi_square=chi_square,
         condition_number=condition,
-        ridge=used if method == "ridge" else None,
+        ridge=used,
         modal=None if shapes is None else np.asarray(np.array(shapes, dtype=complex).T @ U),
         labels=labels or Labels(weight_unit="kg_m"),
     )
@@ -167,7 +168,7 @@ def unbalance_of_run(
     influence: Influence,
     baseline: Trials | ArrayLike | None = None,
     *,
-    method: Method = "minimum-norm",
+    method: str = "minimum-norm",
     ridge: float | None = None,
     shapes: ArrayLike | None = None,
     masses: ArrayLike | None = None,
@@ -210,8 +211,6 @@ def unbalance_of_run(
 def _check_options(
     method: str, ridge: float | None, shapes: ArrayLike | None, masses: ArrayLike | None
 ) -> None:
-    if method not in ("minimum-norm", "ridge", "modal"):
-        raise ValueError(f'method must be "minimum-norm", "ridge" or "modal", not {method!r}')
     if method != "ridge" and ridge is not None:
         raise ValueError(f'ridge is an option of the method "ridge", not of {method!r}')
     if ridge is not None and not (np.isfinite(ridge) and ridge > 0):
@@ -283,35 +282,68 @@ def _basis(shapes: ArrayLike | None, masses: ArrayLike | None, Q: int) -> FloatA
     return np.asarray(np.sqrt(m)[:, None] * np.linalg.pinv(root).T)
 
 
-def _gain(
-    A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, method: str, ridge: float | None
-) -> tuple[ComplexArray, int, float, float | None]:
-    """Gain (n, N), rank, condition number of what is determined, and λ relative to the largest s."""
-    weight = 1.0 / sigma if sigma is not None else np.ones(len(A))
+def _minimum_norm(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
+    weight = _row_weights(sigma, len(A))
+    left, s, right = _decomposed(weight[:, None] * A)
+    return _gain(left, s, right) * weight, len(s), float(s[0] / s[-1]), None
+
+
+def _ridge(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
+    weight = _row_weights(sigma, len(A))
+    left, s, right = _decomposed(weight[:, None] * A)
+    if ridge is None:
+        b = weight * y
+        beta = np.abs(left.conj().T @ b) ** 2
+        rest = max(float(np.sum(np.abs(b) ** 2) - beta.sum()), 0.0)
+        choose = _by_gcv if sigma is None else _by_discrepancy
+        ridge = choose(s, beta, rest, len(y))
+    f = s**2 / (s**2 + (ridge * s[0]) ** 2)
+    return _gain(left, s, right, f) * weight, len(s), float(s[0] / s[-1]), ridge
+
+
+def _modal(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
+    weight = _row_weights(sigma, len(A))
     # the columns of modes may be of any scale; the norm of stations has a meaning
-    scale = np.ones(A.shape[1])
-    if method == "modal":
-        norms = np.linalg.norm(weight[:, None] * A, axis=0)
-        scale = np.where(norms > 0, norms, 1.0)
-    left, s, right = np.linalg.svd(weight[:, None] * A / scale, full_matrices=False)
-    rank = int(np.count_nonzero(s > RCOND * s[0]))
-    if method == "modal" and rank < A.shape[1]:
+    norms = np.linalg.norm(weight[:, None] * A, axis=0)
+    scale = np.where(norms > 0, norms, 1.0)
+    left, s, right = _decomposed(weight[:, None] * A / scale)
+    if len(s) < A.shape[1]:
         raise UndeterminedError(
             f"{counted(len(A), 'reading')} cannot tell {A.shape[1]} modes apart: "
             "choose fewer modes, or add sensors or speeds"
         )
-    left, s, right = left[:, :rank], s[:rank], right[:rank]
-    f = np.ones(rank)
-    if method == "ridge":
-        b = weight * y
-        beta = np.abs(left.conj().T @ b) ** 2
-        rest = max(float(np.sum(np.abs(b) ** 2) - beta.sum()), 0.0)
-        if ridge is None:
-            known = sigma is not None
-            ridge = _by_discrepancy(s, beta, rest, len(y)) if known else _by_gcv(s, beta, rest, len(y))
-        f = s**2 / (s**2 + (ridge * s[0]) ** 2)
-    G = (right.conj().T * (f / s)) @ left.conj().T * weight / scale[:, None]
-    return G, rank, float(s[0] / s[-1]), ridge
+    return _gain(left, s, right) * weight / scale[:, None], len(s), float(s[0] / s[-1]), None
+
+
+METHODS: tuple[
+    Method[Callable[[ComplexArray, ComplexArray, FloatArray | None, float | None], _Gain]], ...
+] = (
+    Method(
+        "minimum-norm",
+        "least squares where the readings suffice, else the smallest unbalance that explains them",
+        _minimum_norm,
+    ),
+    Method("ridge", "small unbalances where the readings tell little", _ridge),
+    Method("modal", "what excites the first modes, as the smallest unbalance that does", _modal),
+)
+"""Gain from the columns A (N, n), readings, their deviations and λ."""
+
+
+def _row_weights(sigma: FloatArray | None, n: int) -> FloatArray:
+    return np.ones(n) if sigma is None else np.asarray(1.0 / sigma)
+
+
+def _decomposed(A: ComplexArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
+    """U, σ and Vᴴ of what is determined."""
+    left, s, right = np.linalg.svd(A, full_matrices=False)
+    rank = int(np.count_nonzero(s > RCOND * s[0]))
+    return left[:, :rank], s[:rank], right[:rank]
+
+
+def _gain(
+    left: ComplexArray, s: FloatArray, right: ComplexArray, f: FloatArray | float = 1.0
+) -> ComplexArray:
+    return np.asarray((right.conj().T * (f / s)) @ left.conj().T)
 
 
 def _remains(

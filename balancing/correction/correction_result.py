@@ -17,8 +17,10 @@ from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
+from balancing.solvers.methods import METHODS, VARIANTS
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import finite
+from rotorid.base.registry import Method, find
 from rotorid.base.text import capital, counted, figures, table, wrap
 from rotorid.base.units import rpm
 from rotorid.regression import coverage_factor
@@ -34,13 +36,6 @@ SMALL = 5e-4
 DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 
-_METHODS = {
-    "least-squares": "Least squares: the sum of squared {}amplitudes is the smallest possible.",
-    "weighted": "Weighted: every reading counts by its error, that of the coefficients included.",
-    "minmax": "Min–max: the largest {}amplitude is the smallest possible.",
-    "ridge": "Ridge: small weights where planes act alike.",
-    "truncated": "Truncated: combinations of planes that hardly act stay without weights.",
-}
 _SOURCES = {
     "stated": "as stated in the job",
     "repeats": "from repeated readings",
@@ -80,7 +75,7 @@ class Correction:
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
-        "least-squares", "weighted", "minmax", "ridge" or "truncated".
+        Of `balancing.solvers.methods`: one of `METHODS` or `VARIANTS`.
     mounted
         Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
     labels
@@ -481,7 +476,10 @@ def _between_runs(c: Correction) -> str:
 
 def method_words(c: Correction) -> str:
     """What the method makes small."""
-    return _METHODS[c.method].format("" if c.row_weights is None else "weighted ")
+    every: tuple[Method[Any], ...] = (*METHODS, *VARIANTS)
+    method = find(every, c.method, "method")
+    about = method.about if c.row_weights is None else method.about.replace("amplitude", "weighted amplitude")
+    return f"{capital(method.title or method.name)}: {about}."
 
 
 def _mounted(c: Correction) -> dict[str, Any]:

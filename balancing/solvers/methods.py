@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from balancing.solvers.effective_variance import FLOOR, Effective, effective_var
 from balancing.solvers.error_propagation import common_covariance, correction_jacobian
 from balancing.solvers.regularised import ridge, truncated
 from balancing.solvers.sampling import sampled_covariance
-from balancing.solvers.solve import Method, Solution, solve
+from balancing.solvers.solve import Criterion, Solution, solve
 from balancing.solvers.weighted_limits import (
     RIVAL,
     SETTLED_DRAWN,
@@ -30,11 +32,10 @@ from balancing.solvers.weighted_limits import (
     limited_problem,
 )
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.suggestions import did_you_mean
+from rotorid.base.registry import Method, find
 
 NO_EFFECT = 1e-6
 """Share of the largest singular value below which a combination of planes has no effect."""
-METHODS = ("least-squares", "weighted", "minmax")
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,8 +122,7 @@ def fit_weights(
     stack
         Equations, errors, limits.
     method
-        "least-squares", "weighted" (readings count by the inverse of their errors, those of the coefficients
-        included) or "minmax".
+        One of `METHODS`.
     strength
         Ridge: how strongly large weights are avoided, relative; "auto".
     keep
@@ -136,17 +136,19 @@ def fit_weights(
     UndeterminedError
         Where the readings do not tell the planes apart and neither ridge nor truncation is asked for.
     """
-    if method not in METHODS:
-        hint = did_you_mean(method, METHODS)
-        raise ValueError(f"there is no method {method!r}{hint}; methods are {', '.join(METHODS)}")
-    if strength is not None or keep is not None:
-        return _regularised(stack, method, strength, keep)
-    if method == "weighted":
-        return _weighted(stack)
-    return _plain(stack, "minmax" if method == "minmax" else "least-squares")
+    fit = find(METHODS, method, "method").function
+    asked = [(v, how) for v, how in zip(VARIANTS, (strength, keep), strict=True) if how is not None]
+    if not asked:
+        return fit(stack)
+    if len(asked) > 1:
+        raise ValueError("ridge and truncation are two ways to the same end: choose one")
+    if method != "least-squares" or (stack.limits is not None and stack.limits.any):
+        raise ValueError("ridge and truncation go with least squares without limits only")
+    ((variant, how),) = asked
+    return variant.function(stack, how)
 
 
-def _plain(stack: Stack, method: Method) -> Fitted:
+def _plain(method: Criterion, stack: Stack) -> Fitted:
     found = _solve(stack, method, stack.W, stack.Y, stack.row_weights)
     bound = found.gap is not None  # limits that do not bind leave the closed form
     covariance: FloatArray | None = None
@@ -171,7 +173,7 @@ def _plain(stack: Stack, method: Method) -> Fitted:
 
 
 def _solve(
-    stack: Stack, method: Method, W: ComplexArray, Y: ComplexArray, row_weights: FloatArray | None
+    stack: Stack, method: Criterion, W: ComplexArray, Y: ComplexArray, row_weights: FloatArray | None
 ) -> Solution:
     return solve(
         W,
@@ -212,7 +214,7 @@ def _weighted(stack: Stack) -> Fitted:
                 "--phase-error or repeated readings), or weights of sensors or speeds"
             )
         note = "the errors of the readings are unknown: they count by the weights of sensors and speeds alone"
-        plain = _plain(stack, "least-squares")
+        plain = _plain("least-squares", stack)
         return replace(plain, warnings=(note,))
     free = effective_variance(
         stack.W, stack.Y, stack.channels, row_weights=stack.row_weights, explained=stack.explained
@@ -296,29 +298,24 @@ def _sampled(
         return None, (str(error),)
 
 
-def _regularised(stack: Stack, method: str, strength: float | str | None, keep: float | None) -> Fitted:
-    if strength is not None and keep is not None:
-        raise ValueError("ridge and truncation are two ways to the same end: choose one")
-    if method != "least-squares" or (stack.limits is not None and stack.limits.any):
-        raise ValueError("ridge and truncation go with least squares without limits only")
-    if strength is not None:
-        total = stack.channels
-        if total is not None and stack.common is not None:
-            total = total + marginal(stack.common).reshape(total.shape)
-        found = ridge(
-            stack.W,
-            stack.Y,
-            strength,
-            stack.row_weights,
-            channels=stack.channels,
-            total=total,
-            planes=stack.planes,
-        )
-    else:
-        assert keep is not None
-        found = truncated(
-            stack.W, stack.Y, keep, stack.row_weights, channels=stack.channels, planes=stack.planes
-        )
+def _ridge(stack: Stack, strength: float | str) -> Fitted:
+    total = stack.channels
+    if total is not None and stack.common is not None:
+        total = total + marginal(stack.common).reshape(total.shape)
+    found = ridge(
+        stack.W,
+        stack.Y,
+        strength,
+        stack.row_weights,
+        channels=stack.channels,
+        total=total,
+        planes=stack.planes,
+    )
+    return Fitted(found.weights, found.covariance, warnings=(found.words,))
+
+
+def _truncated(stack: Stack, keep: float) -> Fitted:
+    found = truncated(stack.W, stack.Y, keep, stack.row_weights, channels=stack.channels, planes=stack.planes)
     words = [found.words]
     if found.kept:
         share = float(found.singular_values[found.kept - 1] / found.singular_values[0])
@@ -333,3 +330,21 @@ def _regularised(stack: Stack, method: str, strength: float | str | None, keep: 
                 "first: no instrument measures that; keep fewer"
             )
     return Fitted(found.weights, found.covariance, warnings=tuple(words))
+
+
+METHODS: tuple[Method[Callable[[Stack], Fitted]], ...] = (
+    Method("weighted", "every reading counts by its error, that of the coefficients included", _weighted),
+    Method(
+        "least-squares",
+        "the sum of squared amplitudes is the smallest possible",
+        partial(_plain, "least-squares"),
+        "least squares",
+    ),
+    Method("minmax", "the largest amplitude is the smallest possible", partial(_plain, "minmax"), "min–max"),
+)
+"""The first is the usual one where errors are known, the second where they are not."""
+VARIANTS: tuple[Method[Callable[[Stack, Any], Fitted]], ...] = (
+    Method("ridge", "small weights where planes act alike", _ridge),
+    Method("truncated", "combinations of planes that hardly act stay without weights", _truncated),
+)
+"""Of least squares without limits; what they take is the strength, and what to keep."""

@@ -18,7 +18,7 @@ from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
 from rotorid.base.arrays import BoolArray, ComplexArray
 from rotorid.regression import RCOND
 
-Method = Literal["least-squares", "minmax"]
+Criterion = Literal["least-squares", "minmax"]
 
 _ROUNDING = 1e-12
 
@@ -45,7 +45,7 @@ class Solution:
 
     weights: ComplexArray
     residual: ComplexArray
-    method: Method
+    method: Criterion
     objective: float
     gap: float | None
     active_weights: BoolArray
@@ -56,7 +56,7 @@ def solve(  # noqa: PLR0913
     W: ArrayLike,
     Y: ArrayLike,
     *,
-    method: Method = "least-squares",
+    method: Criterion = "least-squares",
     row_weights: ArrayLike | None = None,
     limits: Limits | None = None,
     names: Sequence[str] | None = None,

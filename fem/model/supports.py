@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,11 +12,17 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import attachment, number
+from rotorid.base.registry import Method, find
 
 ROUNDED = 5e-6  # relative error of a speed that was written with six digits: it does not end a table
 Matrix2 = tuple[tuple[float, float], tuple[float, float]]
 Coefficient = float | Matrix2  # isotropic, or ((xx, xy), (yx, yy))
 Pair = float | tuple[float, float]  # in both directions, or in x and in y
+KINDS = (
+    Method("bearing", "pushes back and brakes: its own stiffness and damping are not negative", 0.0),
+    Method("seal", "may push outwards or drive, and is left out of maps over bearing stiffness", -math.inf),
+)
+"""Kinds of supports, with the lowest diagonal entry of their stiffness and damping."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +89,7 @@ class Support:
     pedestal
         What the bearing stands on, None for the ground.
     kind
-        "bearing" or "seal"; only drawings make a difference.
-        Diagonal entries may be negative for a seal only.
+        One of `KINDS`, which say what diagonal entries may be.
     tilting_stiffness
         N·m/rad, isotropic, of a spring that holds the slope, as a long bearing does; a very large one
         clamps the shaft.
@@ -100,20 +106,17 @@ class Support:
     name: str = ""
     speeds: tuple[float, ...] = ()
     pedestal: Pedestal | None = None
-    kind: Literal["bearing", "seal"] = "bearing"
+    kind: str = KINDS[0].name
     tilting_stiffness: float = 0.0
 
     def __post_init__(self) -> None:
         what = attachment(self)
-        if self.kind not in ("bearing", "seal"):
-            raise ValueError(f'{what}: kind must be "bearing" or "seal", not {self.kind!r}')
+        signed = find(KINDS, self.kind, f"{what}: kind").function < 0
         if self.pedestal is not None and not isinstance(self.pedestal, Pedestal):
             raise ValueError(f"{what}: pedestal must be a Pedestal, not {self.pedestal!r}")
         object.__setattr__(self, "speeds", _speeds(self.speeds, what))
         for name in ("stiffness", "damping"):
-            value = _coefficients(
-                getattr(self, name), len(self.speeds), f"{what}: {name}", self.kind == "seal"
-            )
+            value = _coefficients(getattr(self, name), len(self.speeds), f"{what}: {name}", signed)
             object.__setattr__(self, name, value)
         tilting = number(self.tilting_stiffness, f"{what}: tilting_stiffness")
         object.__setattr__(self, "tilting_stiffness", tilting)

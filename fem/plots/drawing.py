@@ -10,6 +10,7 @@ import numpy as np
 
 from fem.model.rotor import Disc, Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
+from fem.model.supports import KINDS
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import COLORS, legend_above, new_axes
 
@@ -74,8 +75,8 @@ def draw_rotor(
     _discs(rotor, discs, ax, scale)
     _shaft(rotor, ax, scale)
     _masses(rotor, ax)
-    for kind in ("bearing", "seal"):
-        _supports(rotor, [s for s in rotor.supports if s.kind == kind], kind, ax, scale)
+    for each in KINDS:
+        _supports(rotor, [s for s in rotor.supports if s.kind == each.name], each.name, ax, scale)
     span = float(rotor.positions[-1])
     halves = [(rotor.positions[d.node - 1], max(_solid(d)[1], 0.004 * span) / 2) for d in discs]
     left, right = min([0.0, *(x - w for x, w in halves)]), max([span, *(x + w for x, w in halves)])

@@ -13,11 +13,24 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True)
 class Method(Generic[_T]):
-    """One of a kind; a kind is a tuple of them, the usual one first."""
+    """One of a kind; a kind is a tuple of them, the usual one first.
+
+    Attributes
+    ----------
+    name
+        As one types it.
+    about
+        What it does, without a full stop.
+    function
+        What does it.
+    title
+        As texts call it, where that is not the name.
+    """
 
     name: str
     about: str
     function: _T
+    title: str = ""
 
 
 def names(methods: Sequence[Method[Any]]) -> tuple[str, ...]:

@@ -20,8 +20,8 @@ P. Avitabile, R. Riemer, Proc. 7th IMAC (1989) 29.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ import fem
 from fem.matrices.bands import assemble, ignored_inertia, multiply
 from fem.matrices.pencil import Pencil, whole_rotor
 from fem.solvers.eigen import Spectrum, lowest_modes
+from rotorid.base import registry
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.text import counted
@@ -51,6 +52,15 @@ NEARLY = 1e-2
 _MASSLESS = 1e-12
 
 
+@dataclass(frozen=True)
+class _Regression:
+    """How formula (50) is used."""
+
+    modes: int = 1
+    normalise: Normalisation = "first"
+    rows: RowWeights = "equal"
+
+
 @dataclass(frozen=True, eq=False)
 class _Condensed:
     """What the methods share: the plane at rest, and its static shapes on masters that are held.
@@ -70,6 +80,7 @@ class _Condensed:
     compliance: FloatArray
     factor: FloatArray
     T: FloatArray
+    regression: _Regression = _Regression()
 
 
 def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
@@ -98,7 +109,7 @@ def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None =
     >>> model.M.round(2), model.relative_error.round(4)
     (array([[7.5]]), array([0.0075]))
     """
-    return _guyan(_condense(rotor, nodes, speed))
+    return _reduced("guyan", rotor, nodes, speed)
 
 
 def irs(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
@@ -114,7 +125,7 @@ def irs(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = N
     ValueError
         As `guyan`; and where Guyan's mass matrix is singular.
     """
-    return _irs(_condense(rotor, nodes, speed))
+    return _reduced("irs", rotor, nodes, speed)
 
 
 def serep(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
@@ -131,7 +142,12 @@ def serep(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None =
         As `guyan`; and where the modes' shapes at the masters depend on one another, as at a node of all of
         them.
     """
-    return _serep(_condense(rotor, nodes, speed))
+    return _reduced("serep", rotor, nodes, speed)
+
+
+def _reduced(name: str, rotor: fem.Rotor, nodes: Sequence[str | int], speed: float | None) -> Method:
+    method = registry.find(METHODS, name, "method")
+    return method.function(method.title, _condense(rotor, nodes, speed))
 
 
 def compare_methods(
@@ -143,7 +159,7 @@ def compare_methods(
     normalise: Normalisation = "first",
     rows: RowWeights = "equal",
 ) -> Methods:
-    """Reduce a rotor to the same nodes by Guyan, IRS, SEREP and the regression of formula (50).
+    """Reduce a rotor to the same nodes by all `METHODS`.
 
     Parameters
     ----------
@@ -171,14 +187,13 @@ def compare_methods(
         raise ValueError(f"{n} masses can use 1 … {n} modes; got {modes}")
     normalised(np.ones((n, modes)), normalise)  # refuse a wrong choice before anything is computed
     row_factors(rows, np.ones(modes), n)
-    name = f"regression, {counted(modes, 'mode')}"
+    C = replace(C, regression=_Regression(modes, normalise, rows))
     table = []
-    for label, method in (("Guyan", _guyan), ("IRS", _irs), ("SEREP", _serep)):
+    for method in METHODS:
         try:
-            table.append(method(C))
+            table.append(method.function(method.title, C))
         except _NoModelError as failure:
-            table.append(_without(label, n, str(failure)))
-    table.append(_regression(C, name, modes, normalise, rows))
+            table.append(_without(method.title, n, str(failure)))
     ours = ignored_inertia(C.plane)
     warnings = (
         *C.said,
@@ -250,11 +265,11 @@ def _mass(C: _Condensed, T: FloatArray) -> FloatArray:
     return np.asarray((M + M.T) / 2)
 
 
-def _guyan(C: _Condensed) -> Method:
-    return _projected("Guyan", C, C.T)
+def _guyan(name: str, C: _Condensed) -> Method:
+    return _projected(name, C, C.T)
 
 
-def _irs(C: _Condensed) -> Method:
+def _irs(name: str, C: _Condensed) -> Method:
     from scipy.linalg.lapack import dpbtrs
 
     M, K = _mass(C, C.T), _stiffness(C, C.T)
@@ -266,10 +281,10 @@ def _irs(C: _Condensed) -> Method:
         )
     force = multiply(C.pencil.mass, np.asfortranarray(C.T @ np.linalg.solve(M, K)))
     force[C.masters] = 0.0
-    return _projected("IRS", C, C.T + dpbtrs(C.factor, force)[0])
+    return _projected(name, C, C.T + dpbtrs(C.factor, force)[0])
 
 
-def _serep(C: _Condensed) -> Method:
+def _serep(name: str, C: _Condensed) -> Method:
     largest = np.abs(C.spectrum.vectors[C.pencil.waves[0]]).max(axis=0)
     vectors = C.spectrum.vectors / largest
     at_masters = vectors[C.masters]
@@ -287,7 +302,7 @@ def _serep(C: _Condensed) -> Method:
             f"at these nodes the shapes nearly depend on one another (smallest combination {smallest:.1e} of "
             "their largest deflection): small errors of the model change its matrices much"
         )
-    return _projected("SEREP", C, np.linalg.solve(at_masters.T, vectors.T).T, reason)
+    return _projected(name, C, np.linalg.solve(at_masters.T, vectors.T).T, reason)
 
 
 def _projected(name: str, C: _Condensed, T: FloatArray, reason: str = "") -> Method:
@@ -301,12 +316,17 @@ def _projected(name: str, C: _Condensed, T: FloatArray, reason: str = "") -> Met
     return _judged(name, C, M, K, _in_order(C, T), frequencies, shapes, False, reason)
 
 
-def _regression(C: _Condensed, name: str, modes: int, normalise: Normalisation, rows: RowWeights) -> Method:
-    n = len(C.nodes)
+def _regression(name: str, C: _Condensed) -> Method:
+    n, how = len(C.nodes), C.regression
+    name = f"{name}, {counted(how.modes, 'mode')}"
     shapes = C.modes.shapes[np.array(C.nodes) - 1]
     try:
         estimate = equivalent_masses(
-            C.compliance, C.modes.frequencies[:modes], shapes[:, :modes], normalise=normalise, rows=rows
+            C.compliance,
+            C.modes.frequencies[: how.modes],
+            shapes[:, : how.modes],
+            normalise=how.normalise,
+            rows=how.rows,
         )
     except ValueError as failure:
         return _without(name, n, str(failure))
@@ -322,6 +342,14 @@ def _regression(C: _Condensed, name: str, modes: int, normalise: Normalisation, 
         )
     K = np.linalg.inv(C.compliance)
     return _judged(name, C, np.diag(masses), (K + K.T) / 2, None, omega, own, True, reason)
+
+
+METHODS: tuple[registry.Method[Callable[[str, _Condensed], Method]], ...] = (
+    registry.Method("guyan", "the shaft bent as at rest", _guyan, "Guyan"),
+    registry.Method("irs", "Guyan's shapes bent further by their inertia forces", _irs, "IRS"),
+    registry.Method("serep", "the rotor's own first modes, exact for these", _serep, "SEREP"),
+    registry.Method("regression", "masses that stand at the nodes, formula (50)", _regression, "regression"),
+)
 
 
 def _judged(  # noqa: PLR0913

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.text import listing
 from rotorid.base.units import RPM
 from rotorid.report.grids import Grid, Numbers, Part
 from rotorid.report.page import NOTHING
@@ -41,13 +42,15 @@ def trade_off_part(document: Mapping[str, Any], show: Numbers) -> Part:
 
 
 def methods_part(document: Mapping[str, Any], show: Numbers, methods: Methods | None) -> Part:
-    """Guyan, IRS and SEREP beside the masses."""
+    """All methods of reduction at the same nodes."""
     count, rows, said = len(document["nodes"]), [], []
     for m, found in enumerate(document["methods"]["methods"]):
         rows += _by_mode(show, f"methods.methods.{m}", found["method"], count, None)
         said += [f"{found['method']}: {found['reason']}"] if found["reason"] else []
     heads = ("method", "mode", "rad/s", "error, %", "MAC")
-    said.append("Guyan, IRS and SEREP have full mass matrices, which couple the nodes.")
+    models = [found for found in document["methods"]["methods"] if found["mass_matrix_kg"] is not None]
+    full = listing([found["method"] for found in models if not found["diagonal"]], "and")
+    said.append(f"{full} have full mass matrices, which couple the nodes.")
     return Part(
         "Other methods at these nodes",
         tuple(said),

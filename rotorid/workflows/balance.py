@@ -32,6 +32,7 @@ if TYPE_CHECKING:
         Trials,
         Verdict,
     )
+    from rotorid.base.registry import Method
     from rotorid.tables import Job
     from rotorid.tables.job.source import JobSource
     from rotorid.workflows.quantities import Amount, Amplitudes, Positions, Weights
@@ -42,6 +43,13 @@ if TYPE_CHECKING:
     """Coefficients, and the runs that give the vibration."""
 
 
+def choices() -> dict[str, Sequence[Method[Any]]]:
+    """What `method` chooses from."""
+    from balancing.solvers.methods import METHODS
+
+    return {"method": METHODS}
+
+
 @dataclass(frozen=True)
 class BalanceOptions:
     """Options of `balance`.
@@ -49,8 +57,7 @@ class BalanceOptions:
     Attributes
     ----------
     method
-        weighted (by the errors of the readings; the default), least-squares, or minmax (the smallest largest
-        amplitude).
+        How the readings count; default: weighted where their errors are known, else least-squares.
     influence
         Stored influence coefficients.
     coefficients
@@ -274,10 +281,10 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
 
 def _check(options: BalanceOptions) -> None:
     """Refuse options that are not known or do not go together, before anything is read."""
-    from balancing.solvers.methods import METHODS
+    from rotorid.base.registry import find
 
     if options.method is not None:
-        one_of(options.method, "--method", METHODS)
+        find(choices()["method"], options.method, "--method")
     if options.coefficients is not None:
         one_of(options.coefficients, "--coefficients", KINDS)
     if options.ridge is not None and options.truncate is not None:

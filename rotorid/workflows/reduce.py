@@ -25,6 +25,7 @@ from rotorid.workflows.sources import rotor_source
 
 if TYPE_CHECKING:
     from fem import Rotor
+    from rotorid.base.registry import Method
     from rotorid.reduction import Placement, Reduction
     from rotorid.tables.data.modes_table import MeasuredModes
     from rotorid.workflows.reduced_rotor import ReducedRotor
@@ -37,6 +38,13 @@ Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
 View = Literal["shapes", "methods", "placement", "response", "stability"]
 """What a picture shows."""
+
+
+def choices() -> dict[str, Sequence[Method[Any]]]:
+    """What `methods` compares."""
+    from rotorid.reduction.methods import METHODS
+
+    return {"methods": METHODS}
 
 
 @dataclass(frozen=True)
@@ -73,7 +81,7 @@ class ReduceOptions:
     candidates
         Nodes that `rank` and `place` choose from.
     trade_off, methods
-        Other masses at these nodes, frequencies against shapes; Guyan, IRS and SEREP.
+        Other masses at these nodes, frequencies against shapes; all methods of `choices`.
     response
         Speeds of a response beside the full rotor's, "100:700:50" or rad/s, or "auto".
     stability

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.outcome import Found, provenance, workflow
-from rotorid.workflows.parameters import Nodes, nodes, one_of
+from rotorid.workflows.parameters import Nodes, nodes
 from rotorid.workflows.sources import job_source
 
 if TYPE_CHECKING:
-    from balancing.unbalance import Method
     from balancing.unbalance_result import Unbalance
+    from rotorid.base.registry import Method
     from rotorid.tables import Job
 
-METHODS = ("minimum-norm", "ridge", "modal")
+
+def choices() -> dict[str, Sequence[Method[Any]]]:
+    """What `method` chooses from."""
+    from balancing.unbalance import METHODS
+
+    return {"method": METHODS}
 
 
 @dataclass(frozen=True)
@@ -27,7 +33,7 @@ class UnbalanceOptions:
     stations
         Nodes or stations where unbalance may be: 6,9,12.
     method
-        minimum-norm, ridge, modal; minimum-norm is least squares where the readings suffice.
+        How the unbalance follows from the readings.
     modes
         Of the rotor, for modal: 1 … K.
     ridge
@@ -37,7 +43,7 @@ class UnbalanceOptions:
     """
 
     stations: Nodes
-    method: str = METHODS[0]
+    method: str = "minimum-norm"
     modes: int | None = None
     ridge: float | None = None
     model_error: float | None = None
@@ -68,9 +74,10 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     """
     from balancing.coefficients.from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
+    from rotorid.base.registry import find
     from rotorid.workflows.coefficients import computed
 
-    method = one_of(options.method, "--method", METHODS)
+    method = find(choices()["method"], options.method, "--method").name
     if (options.modes is not None) != (method == "modal"):
         raise ValueError("--method modal and --modes K belong together")
     if options.ridge is not None and method != "ridge":
@@ -85,7 +92,7 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     found = unbalance_of_run(
         computed(read, options.model_error or 0.0, places),
         read.trials,
-        method=cast("Method", method),
+        method=method,
         ridge=options.ridge,
         shapes=None if options.modes is None else modal_shapes(read.rotor, places, options.modes),
     )

@@ -7,12 +7,12 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from fem.model.supports import Coefficient, Pair, Pedestal, Support
+from fem.model.supports import KINDS, Coefficient, Pair, Pedestal, Support
 from rotorid.base.arrays import FloatArray
+from rotorid.base.registry import find, names
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, must_be, read_table
@@ -20,7 +20,6 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import one_of
 
-Kind = Literal["bearing", "seal"]
 SCALARS = {"stiffness": "stiffness_N_per_m", "damping": "damping_N_s_per_m"}
 ENTRIES = {
     "stiffness": {name: f"{name}_N_per_m" for name in ("kxx", "kxy", "kyx", "kyy")},
@@ -52,9 +51,9 @@ class _Coefficients:
 
 
 def read_support(
-    section: Section, node: Callable[[Section], int | None], folder: Path, kind: Kind, problems: Problems
+    section: Section, node: Callable[[Section], int | None], folder: Path, kind: str, problems: Problems
 ) -> Support | None:
-    """Read `[[bearing]]` or `[[seal]]`, or None and problems.
+    """Read `[[bearing]]`, `[[seal]]` or another of `KINDS`, or None and problems.
 
     Parameters
     ----------
@@ -65,7 +64,7 @@ def read_support(
     folder
         Where the rotor file lies, which names its tables from there.
     kind
-        Which of the two; `[[bearing]]` may also say `kind = "seal"`.
+        Which of them; `[[bearing]]` may also say `kind = "seal"`.
     problems
         Collects the complaints.
     """
@@ -74,7 +73,7 @@ def read_support(
     name = section.name("name")
     tilting = section.number(TILTING, 0.0, low=0.0)
     if kind == "bearing":
-        kind = "seal" if section.choice("kind", ("bearing", "seal"), "bearing") == "seal" else "bearing"
+        kind = section.choice("kind", names(KINDS), kind)
         pedestal = _pedestal(section)
     else:
         pedestal = None
@@ -111,7 +110,7 @@ def read_support(
 def bearing_tables(data: Mapping[str, object]) -> list[str]:
     """Names of the tables that the bearings and seals of a rotor file refer to."""
     named = []
-    for kind in ("bearing", "seal"):
+    for kind in names(KINDS):
         items = data.get(kind)
         for item in items if isinstance(items, list) else []:
             table = item.get("table") if isinstance(item, dict) else None
@@ -120,10 +119,10 @@ def bearing_tables(data: Mapping[str, object]) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def _coefficients(section: Section, folder: Path, kind: Kind, problems: Problems) -> _Coefficients | None:
+def _coefficients(section: Section, folder: Path, kind: str, problems: Problems) -> _Coefficients | None:
     values: dict[str, float | FloatArray] = {}
     complain: dict[str, Callable[[str], None]] = {}
-    low = -math.inf if kind == "seal" else 0.0  # a seal may push outwards
+    low = find(KINDS, kind, "kind").function
     for quantity, scalar in SCALARS.items():
         _take(section, quantity, (scalar,), low, values, complain)
         for name, full in ENTRIES[quantity].items():

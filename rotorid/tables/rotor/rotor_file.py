@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from fem.model.rotor import Disc, Model, Rotor
+from fem.model.supports import KINDS
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
@@ -64,7 +65,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     material = _material(top.section("material"), str(path))
     model = _model(top.section("model"))
     discs, stations = top.sections("disc"), top.sections("station")
-    bearings, seals = top.sections("bearing"), top.sections("seal")
+    supports = [(kind.name, section) for kind in KINDS for section in top.sections(kind.name)]
     top.finish()
     shaft = read_shaft(path.parent / shaft_name, material, problems) if shaft_name else None
     n_nodes = len(shaft.length) + 1 if shaft else sys.maxsize
@@ -74,10 +75,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
         return _node(section, names, n_nodes)
 
     more_discs = [_disc(section, node, material) for section in discs]
-    more_supports = [
-        *(read_support(section, node, path.parent, "bearing", problems) for section in bearings),
-        *(read_support(section, node, path.parent, "seal", problems) for section in seals),
-    ]
+    more_supports = [read_support(section, node, path.parent, kind, problems) for kind, section in supports]
     problems.stop()
     assert shaft is not None
     whole = dataclasses.replace(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from fem.model.rotor import Disc, Model, Rotor, Support
-from fem.model.supports import Coefficient
+from fem.model.supports import KINDS, Coefficient
+from rotorid.base.registry import names
 from rotorid.base.text import listing
 from rotorid.tables.reader.number import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
@@ -111,8 +112,9 @@ def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     if rotor.discs:
         document["disc"] = [_disc(disc) for disc in rotor.discs]
     kinds = [support.kind for support in rotor.supports]
-    # Bearings are read before seals: where they are mixed, [[bearing]] with `kind` keeps their order.
-    mixed = kinds != sorted(kinds) or any(s.kind == "seal" and s.pedestal for s in rotor.supports)
+    # They are read kind by kind: where they are mixed, [[bearing]] with `kind` keeps their order.
+    mixed = kinds != sorted(kinds, key=names(KINDS).index)
+    mixed = mixed or any(s.kind != KINDS[0].name and s.pedestal for s in rotor.supports)
     for number, support in enumerate(rotor.supports, start=1):
         table = path.with_name(f"{path.stem}_{support.kind}_{number}.csv") if support.speeds else None
         if table is not None:
@@ -129,8 +131,7 @@ def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     for section in (
         material,
         *document.get("disc", ()),
-        *document.get("bearing", ()),
-        *document.get("seal", ()),
+        *(section for kind in names(KINDS) for section in document.get(kind, ())),
     ):
         _check_sizes(section)
     try:

@@ -197,7 +197,7 @@ def test_ridge_answers_where_planes_act_alike():
 def test_what_cannot_be():
     trials, _ = job()
     influence = estimate_influence(trials)
-    with pytest.raises(ValueError, match="no method 'magic'"):
+    with pytest.raises(ValueError, match="method 'magic' is not known"):
         correct(influence, method="magic")
     with pytest.raises(ValueError, match="choose one"):
         correct(influence, strength=0.1, keep=1)

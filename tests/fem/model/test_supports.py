@@ -108,7 +108,7 @@ def test_a_rotor_with_everything_survives_copying():
         (lambda: fem.Support(2, 1.0, speeds=[2, 1]), "at least two, not negative and ascending"),
         (lambda: fem.Support(2, 1.0, speeds=[2]), "speeds must be at least two"),
         (lambda: fem.Support(2, 1.0, speeds="ab"), "speeds must be a list of numbers"),
-        (lambda: fem.Support(1, 1e8, kind="spring"), 'kind must be "bearing" or "seal", not \'spring\''),
+        (lambda: fem.Support(1, 1e8, kind="spring"), "kind 'spring' is not known .*: one of bearing, seal"),
         (lambda: fem.Support(1, 1e8, pedestal=3), "pedestal must be a Pedestal, not 3"),
         (
             lambda: fem.Support(1, 1e8, tilting_stiffness=-1),

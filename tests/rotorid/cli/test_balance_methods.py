@@ -294,7 +294,7 @@ def test_mixed_units_in_one_column(cli, tmp_path):
 
 
 def test_unknown_options(cli):
-    assert "one of least-squares, weighted, minmax" in cli("balance", JOB, "--method", "magic").err
+    assert "one of weighted, least-squares, minmax" in cli("balance", JOB, "--method", "magic").err
     assert "one of measured, computed, combined" in cli("balance", JOB, "--coefficients", "guessed").err
     assert "needs a rotor model" in cli("balance", JOB, "--coefficients", "computed").err.replace(
         "\n", " "
