@@ -21,7 +21,7 @@ from rotorid.cli.common import (
     options_of,
 )
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.balance import BalanceOptions
+from rotorid.workflows.balance import BalanceOptions, choices
 from rotorid.workflows.balance import balance as work
 
 say = options_of(BalanceOptions)
@@ -36,7 +36,7 @@ def balance(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[str | None, say("method", "METHOD")] = None,
+    method: Annotated[str | None, say("method", "METHOD"), choices] = None,
     influence: Annotated[Path | None, say("influence", "FILE")] = None,
     coefficients: Annotated[str | None, say("coefficients", "KIND")] = None,
     model_error: Annotated[float | None, say("model_error", "PERCENT", least=0.0)] = None,

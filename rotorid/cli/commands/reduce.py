@@ -9,7 +9,7 @@ import typer
 
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.reduce import Normalise, Place, ReduceOptions, Rows, View
+from rotorid.workflows.reduce import Normalise, Place, ReduceOptions, Rows, View, choices
 from rotorid.workflows.reduce import reduce as work
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def reduce(
     trade_off: Annotated[
         bool, typer.Option("--trade-off", help="Other masses at these nodes: frequencies against shapes.")
     ] = False,
-    methods: Annotated[bool, typer.Option("--methods", help="Beside Guyan, IRS and SEREP.")] = False,
+    methods: Annotated[bool, typer.Option("--methods", help="Beside other reductions:"), choices] = False,
     response: Annotated[
         str | None,
         typer.Option(

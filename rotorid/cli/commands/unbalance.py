@@ -9,7 +9,7 @@ import typer
 
 from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.unbalance import UnbalanceOptions
+from rotorid.workflows.unbalance import UnbalanceOptions, choices
 from rotorid.workflows.unbalance import unbalance as work
 
 say = options_of(UnbalanceOptions)
@@ -20,7 +20,7 @@ def unbalance(
         Path, typer.Argument(metavar="JOB.toml", help="Job with a rotor and the place of every sensor in it.")
     ],
     stations: Annotated[str, say("stations")],
-    method: Annotated[str, say("method", "METHOD")] = UnbalanceOptions.method,
+    method: Annotated[str, say("method", "METHOD"), choices] = UnbalanceOptions.method,
     modes: Annotated[int | None, say("modes", "K", least=1)] = None,
     ridge: Annotated[float | None, say("ridge", "STRENGTH", least=0.0)] = None,
     model_error: Annotated[float | None, say("model_error", "PERCENT", least=0.0)] = None,
