@@ -102,3 +102,12 @@ def test_the_list_of_complex_functions_only_gets_shorter():
 
 def test_no_circle_is_allowed():
     assert "ignore_imports" not in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+def test_the_command_line_computes_nothing():
+    numerical = re.compile(r"^\s*(from|import) (numpy|scipy|pandas|fem|balancing|sympy)\b", re.MULTILINE)
+    rooms = re.compile(r"rotorid\.(regression|harmonic|timedomain|reduction|report|expressions)\b")
+    own = list((ROOT / "rotorid" / "cli").rglob("*.py"))
+    texts = {path.name: path.read_text(encoding="utf-8") for path in own}
+    assert [name for name, text in texts.items() if numerical.search(text) or rooms.search(text)] == []
+    assert sum(len(text.splitlines()) for text in texts.values()) < 3500

@@ -177,15 +177,9 @@ def _plain(value: object) -> str:
 def versions() -> dict[str, str]:
     """Of the program, of Python, and of the libraries that compute."""
     import platform
-
-    import numpy as np
-    import scipy
+    from importlib.metadata import version
 
     from rotorid import __version__
 
-    return {
-        "rotorid": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-    }
+    libraries = {name: version(name) for name in ("numpy", "scipy")}
+    return {"rotorid": __version__, "python": platform.python_version(), **libraries}
