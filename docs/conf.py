@@ -25,6 +25,7 @@ extensions = [
     "commands",
     "drawn",
     "mathml",
+    "methods",
     "names",
     "results",
 ]

@@ -43,7 +43,7 @@ def test_files_of_the_repository_that_are_named_exist():
     ]
     gone = {
         (path.name, name)
-        for path in (*texts, ROOT / "README.md", ROOT / "Makefile")
+        for path in (*texts, *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "Makefile")))
         for name in named.findall(path.read_text(encoding="utf-8"))
         if not (ROOT / name).is_file()
     }

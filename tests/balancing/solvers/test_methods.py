@@ -7,8 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from balancing import Labels, Limits, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
+from balancing import (
+    Labels,
+    Limits,
+    ReadingErrors,
+    Trials,
+    UndeterminedError,
+    correct,
+    estimate_influence,
+    unbalance,
+)
+from balancing.correction import correction_result
+from balancing.solvers import methods
 from balancing.solvers.effective_variance import effective_variance
+from fem.model import supports
+from rotorid.base.registry import Method
+from rotorid.reduction import methods as reduction
 
 ERRORS = ReadingErrors(0.02, 0.02)
 S, C, P = 3, 4, 2
@@ -242,3 +256,27 @@ def test_planes_must_be_told_apart_by_readings_that_count(method):
     rows[0, 0] = 1
     with pytest.raises(UndeterminedError, match="at least 2 readings"):
         correct(estimate_influence(trials), row_weights=rows, method=method)
+
+
+def test_a_method_is_one_entry(monkeypatch):
+    mine = Method(
+        "mine",
+        "the answer is that of least squares",
+        methods.find(methods.METHODS, "least-squares", "").function,
+    )
+    for module in (methods, correction_result):
+        monkeypatch.setattr(module, "METHODS", (*methods.METHODS, mine))
+    trials, _ = job()
+    influence = estimate_influence(trials)
+    found = correct(influence, method="mine")
+    np.testing.assert_array_equal(found.weights, correct(influence, method="least-squares").weights)
+    assert found.to_dict()["method"] == "mine"
+    assert "Mine: the answer is that of least squares." in " ".join(found.summary().split())
+
+
+@pytest.mark.parametrize(
+    "known", [methods.METHODS, methods.VARIANTS, unbalance.METHODS, reduction.METHODS, supports.KINDS]
+)
+def test_each_entry_of_a_registry_has_a_name_of_its_own_and_a_clause(known):
+    assert len({each.name for each in known}) == len(known)
+    assert all(each.about and not each.about.endswith(".") for each in known)
