@@ -20,7 +20,9 @@ from rotorid.tables.runs import runs_table as runs
 from rotorid.tables.runs import weights_table as weights
 
 TEXT = (sample_data().parent / "docs" / "files.md").read_text(encoding="utf-8")
-WORDS = {word for code in re.findall(r"`([^`]+)`", TEXT) for word in re.findall(r"\w+", code)}
+WORDS = {
+    word for code in re.findall(r"`([^`]+)`", TEXT.replace("```", "")) for word in re.findall(r"\w+", code)
+}
 NAMED_BY_USERS = {
     "planes",
     "sensors",
