@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -307,9 +308,13 @@ def _followed_closely(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, 
     knots = rotor.knots[(rotor.knots > speeds[0]) & (rotor.knots < speeds[-1])]
     grid = _with(speeds, knots)
     if not rotor.constant:
-        grid = _with(grid, np.linspace(speeds[0], speeds[-1], _PARTS + 1))
-    whirl, paths, columns = followed(rotor, grid, n)
-    known: dict[float, Solutions] = {}
+        longest = (speeds[-1] - speeds[0]) / _PARTS
+        grid = np.unique(
+            np.concatenate(
+                [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1) for a, b in pairwise(grid)] or [grid]
+            )
+        )
+    whirl, paths, columns, known = followed(rotor, grid, n)
     extra = grid
     for _ in range(0 if rotor.constant else _ROUNDS):
         new = np.isin(whirl.speeds, extra)
@@ -371,20 +376,23 @@ def _cut(whirl: Whirl, paths: Followed, columns: IndexArray) -> str:
     return ""
 
 
-def followed(rotor: Rotor, speeds: FloatArray, n: int) -> tuple[Whirl, Followed, IndexArray]:
-    """Modes over speed, and which n (or fewer) of them were asked for."""
+def followed(
+    rotor: Rotor, speeds: FloatArray, n: int
+) -> tuple[Whirl, Followed, IndexArray, dict[float, Solutions]]:
+    """Modes over speed, which n (or fewer) of them were asked for, and solutions between the speeds."""
     P = both_planes(rotor)
     available = available_modes(rotor)
     m = min(n + n % 2 + _SPARE, available)  # even: modes come in pairs, a forward and a backward one
     best, missing = None, np.inf
     while True:
         whirl = solve_whirl(P, speeds, m)
-        paths = follow(whirl)
+        known: dict[float, Solutions] = {}
+        paths = follow(whirl, known)
         columns = asked_for(paths, speeds, n)
         above = int(went_above(whirl, paths, columns).sum())
         # A mode that went on above those computed needs more of them, an overdamped one is not found so.
         if best is None or above < missing:
-            best, missing = (whirl, paths, columns), above
+            best, missing = (whirl, paths, columns, known), above
         else:
             return best
         if not above or m >= min(_MOST * n + 16, available):
