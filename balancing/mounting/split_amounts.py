@@ -15,9 +15,11 @@ from rotorid.base.arrays import FloatArray, IndexArray
 
 _SLACK = 1e-12
 _MOST = 1_000_000
+_Parts = list[tuple[int, float]]  # (hole, amount)
+_Found = tuple[float, _Parts]  # error first
 
 
-def nearest_amounts(target: complex, holes: Holes) -> FloatArray:  # noqa: C901
+def nearest_amounts(target: complex, holes: Holes) -> FloatArray:
     """Amounts (H,) of the nearest vector; of equally near ones that with fewer holes.
 
     Raises
@@ -25,43 +27,28 @@ def nearest_amounts(target: complex, holes: Holes) -> FloatArray:  # noqa: C901
     ValueError
         Where nothing is admissible, not even to mount nothing, or a step so fine that it means nothing.
     """
-    best: tuple[float, int, list[tuple[int, float]]] | None = None
-    scale = max(abs(target), holes.step)
+    best = _better(None, [], target, holes)
     wanted = nearest_allowed(target, holes)
-
-    def offer(parts: list[tuple[int, float]]) -> None:
-        nonlocal best
-        parts = [(h, a) for h, a in parts if a > 0]
-        vector = sum((a * np.exp(1j * holes.angles[h]) for h, a in parts), 0j)
-        if not holes.allows(vector):
-            return
-        error = abs(vector - target)
-        nearer = best is None or error < best[0] - _SLACK * scale
-        if nearer or (best and error <= best[0] + _SLACK * scale and len(parts) < best[1]):
-            best = error, len(parts), parts
-
-    offer([])
     free = np.flatnonzero(holes.free)
     for k in free:
         alone = _on_ray(target, np.exp(1j * holes.angles[k]), 0j, holes)
         if alone is not None:
-            offer([(int(k), alone)])
+            best = _better(best, [(int(k), alone)], target, holes)
     for g, h in _neighbours(target, holes, free):
         if holes.step > 0:
-            for a, b in _lattice(target, g, h, holes, np.inf if best is None else best[0]):
-                offer([(g, a), (h, b)])
+            pairs = _lattice(target, g, h, holes, np.inf if best is None else best[0])
         else:
-            for point in {target, wanted}:
-                a, b = _coordinates(point, holes.angles[g], holes.angles[h])
-                if min(a, b) >= 0:
-                    offer([(g, a), (h, b)])
+            pairs = [_coordinates(point, holes.angles[g], holes.angles[h]) for point in {target, wanted}]
+        for a, b in pairs:
+            if min(a, b) >= 0:
+                best = _better(best, [(g, a), (h, b)], target, holes)
     if best is None:
         raise ValueError(
             "no admissible weight at all: what is mounted already exceeds the largest weight of the plane, "
             "and nothing that fits these holes makes it small enough"
         )
     amounts = np.zeros(len(holes.angles))
-    for h, amount in best[2]:
+    for h, amount in best[1]:
         amounts[h] = amount
     return amounts
 
@@ -72,6 +59,18 @@ def nearest_allowed(target: complex, holes: Holes) -> complex:
     if abs(total) <= holes.max_weight:
         return target
     return total / abs(total) * holes.max_weight - holes.mounted
+
+
+def _better(best: _Found | None, parts: _Parts, target: complex, holes: Holes) -> _Found | None:
+    """The best so far, or these amounts where they are nearer, or as near in fewer holes."""
+    parts = [(h, a) for h, a in parts if a > 0]
+    vector = sum((a * np.exp(1j * holes.angles[h]) for h, a in parts), 0j)
+    if not holes.allows(vector):
+        return best
+    error, slack = abs(vector - target), _SLACK * max(abs(target), holes.step)
+    if best is None or error < best[0] - slack:
+        return error, parts
+    return (error, parts) if error <= best[0] + slack and len(parts) < len(best[1]) else best
 
 
 def _neighbours(target: complex, holes: Holes, free: IndexArray) -> list[tuple[int, int]]:

@@ -9,7 +9,7 @@ T = [[1, 1], [−i, i]]: Hermitian, if D is real and symmetric. Pedestals add un
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -78,10 +78,7 @@ def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, fl
     """Pencil of one plane, on given springs {node: N/m}; by default on the stiffness of plain supports."""
     K = A.stiffness
     if springs is None:
-        springs = {}
-        for support in rotor.supports:
-            if support.plain:
-                springs[support.node] = springs.get(support.node, 0.0) + support.stiffness
+        springs = _at_nodes((s.node, s.stiffness) for s in rotor.supports if s.plain)
     else:
         K = A.shaft.copy(order="K")
         for node, k in springs.items():
@@ -121,7 +118,7 @@ def static_stiffness(support: Support, speed: float) -> FloatArray:
     return np.asarray((k + k.T) / 2)
 
 
-def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:  # noqa: C901, PLR0915
+def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     """Pencil of the synchronous conservative rotor with all its supports as they are at a speed.
 
     One plane, forward, where the supports are rotationally symmetric, else both. Unknowns of pedestals
@@ -130,111 +127,125 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:  # noq
     if all(support.plain for support in rotor.supports):
         return one_plane(rotor, A, 1)
     planes = 1 if rotor.symmetric else 2
-    forms = [(s, static_stiffness(s, speed)) for s in rotor.supports]
-    forms = [(s, k) for s, k in forms if k.any()]
-    pedestals = [s for s, _ in forms if s.pedestal is not None]
+    forms = [(s, k) for s in rotor.supports if (k := static_stiffness(s, speed)).any()]
+    pedestals = [(s.node, s.pedestal.mass) for s, _ in forms if s.pedestal is not None]
     if planes == 1 and not pedestals:
-        springs: dict[int, float] = {}
-        for s, k in forms:
-            springs[s.node] = springs.get(s.node, 0.0) + float(k[0, 0])
-        return one_plane(rotor, A, 1, springs)
+        return one_plane(rotor, A, 1, _at_nodes((s.node, float(k[0, 0])) for s, k in forms))
 
     skew = any(k[0, 1] or k[1, 0] for _, k in forms)
     dtype = complex if skew and planes == 2 else float
-    # Where the unknown i of one plane, and those of the pedestals, stand.
-    place = np.arange(A.size)
-    for s in pedestals:
-        place[A.deflection(s.node) + 1 :] += 1
-    seats: list[int] = []
-    used: dict[int, int] = {}
-    for s in pedestals:
-        i = A.deflection(s.node)
-        used[i] = used.get(i, 0) + 1
-        seats.append(int(place[i]) + used[i])
-    size = planes * (A.size + len(pedestals))
-    span = int((place[A.width :] - place[: -A.width]).max()) if A.size > A.width else A.size - 1
-    width = planes * span + planes - 1
+    shaft, stands = _places(A, [node for node, _ in pedestals], planes)
+    size = shaft.size + stands.size
+    width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max()) + planes - 1
     K, M = (np.zeros((width + 1, size), dtype=dtype) for _ in range(2))
     whirls: tuple[Whirl, ...] = (1, -1)
-    for plane, whirl in enumerate(whirls[:planes]):
-        where = planes * place + plane
-        for band, source in ((K, A.shaft), (M, whirling_mass(A, whirl))):
-            for above in range(A.width + 1):
-                rows, columns = where[: A.size - above], where[above:]
-                band[width + rows - columns, columns] += source[A.width - above, above:]
-
-    springs_at: list[tuple[IndexArray, AnyArray]] = []  # unknowns and Hermitian form of each spring
-    offsets = np.arange(planes)
-
-    def turned(k: FloatArray) -> AnyArray:
-        """Form on (F, b), or on F alone."""
-        form = np.asarray(FROM_XY @ k @ TO_XY)[:planes, :planes]
-        return form.real if dtype is float else form
-
-    seat = iter(seats)
-    for s, k in forms:
-        node = planes * place[A.deflection(s.node)] + offsets
-        form = turned(k)
-        if s.pedestal is None:
-            springs_at.append((node, form))
-            continue
-        own = planes * next(seat) + offsets
-        both = np.concatenate((node, own))
-        springs_at.append((both, np.block([[form, -form], [-form, form]])))
-        stand = turned(np.diag(s.pedestal.xy("stiffness")))
-        springs_at.append((own, stand))
-        M[width, own] += s.pedestal.mass
-    for unknowns, form in springs_at:
-        for a, i in enumerate(unknowns):
-            for b, j in enumerate(unknowns):
-                if i <= j:
-                    K[width + i - j, j] += form[a, b]
+    for places, whirl in zip(shaft, whirls[:planes], strict=True):
+        _add_band(K, A.shaft, places)
+        _add_band(M, whirling_mass(A, whirl), places)
+    springs = list(_springs(forms, shaft[:, A.deflections], stands, dtype))
+    for unknowns, form in springs:
+        _add_form(K, form, unknowns)
+    M[width, stands] += np.array([mass for _, mass in pedestals])
 
     def energy(X: AnyArray) -> FloatArray:
         total = np.zeros(X.shape[1])
-        for plane in range(planes):
-            Y = X[planes * place + plane]
+        for places in shaft:
+            Y = X[places]
             total = total + shaft_energy(rotor, Y.real)
             if dtype is complex:
                 total = total + shaft_energy(rotor, Y.imag)
-        for unknowns, form in springs_at:
+        for unknowns, form in springs:
             Y = X[unknowns]
             total = total + np.einsum("im,ij,jm->m", Y.conj(), form, Y).real
         return np.asarray(total)
 
+    motions = _whirling_rigid(rotor, A, forms, dtype, planes)
+    rigid = np.zeros((size, motions.shape[2]), dtype=dtype)
+    rigid[shaft] = motions
+    total = sum(float(np.trace(k)) / 2 for _, k in forms)
+    waves, tilts = shaft[:, A.deflections], shaft[:, A.deflections + 1]
+    return Pencil(rotor, A, K, M, energy, rigid, total, waves, tilts, not rotor.model.gyroscopic)
+
+
+def _at_nodes(springs: Iterable[tuple[int, float]]) -> dict[int, float]:
+    """Springs {node: N/m}, those of one node added."""
+    sums: dict[int, float] = {}
+    for node, k in springs:
+        sums[node] = sums.get(node, 0.0) + k
+    return sums
+
+
+def _places(A: Matrices, pedestals: list[int], planes: int) -> tuple[IndexArray, IndexArray]:
+    """Where unknowns of the shaft stand, (planes, size), and of pedestals at nodes, (planes, pedestals)."""
+    at = [A.deflection(node) for node in pedestals]
+    place = np.arange(A.size)
+    for i in at:
+        place[i + 1 :] += 1
+    stands = np.array([place[i] + 1 + at[:k].count(i) for k, i in enumerate(at)], dtype=np.intp)
+    plane = np.arange(planes)[:, None]
+    return planes * place + plane, planes * stands + plane
+
+
+def _add_band(band: AnyArray, source: FloatArray, places: IndexArray) -> None:
+    """Add the band of one plane where its unknowns stand."""
+    width, own, size = len(band) - 1, len(source) - 1, len(places)
+    for above in range(own + 1):
+        rows, columns = places[: size - above], places[above:]
+        band[width + rows - columns, columns] += source[own - above, above:]
+
+
+def _add_form(band: AnyArray, form: AnyArray, unknowns: IndexArray) -> None:
+    """Add a Hermitian form of a few unknowns."""
+    for a, i in enumerate(unknowns):
+        for b, j in enumerate(unknowns):
+            if i <= j:
+                band[len(band) - 1 + i - j, j] += form[a, b]
+
+
+def _springs(
+    forms: list[tuple[Support, FloatArray]], nodes: IndexArray, stands: IndexArray, dtype: type
+) -> Iterator[tuple[IndexArray, AnyArray]]:
+    """Unknowns and Hermitian form, on (F, b) or on F alone, of each bearing and pedestal."""
+    planes, seats = len(nodes), iter(stands.T)
+
+    def turned(k: FloatArray) -> AnyArray:
+        form = np.asarray(FROM_XY @ k @ TO_XY)[:planes, :planes]
+        return form.real if dtype is float else form
+
+    for s, k in forms:
+        node, form = nodes[:, s.node - 1], turned(k)
+        if s.pedestal is None:
+            yield node, form
+            continue
+        own = next(seats)
+        yield np.concatenate((node, own)), np.block([[form, -form], [-form, form]])
+        yield own, turned(np.diag(s.pedestal.xy("stiffness")))
+
+
+def _whirling_rigid(
+    rotor: Rotor, A: Matrices, forms: list[tuple[Support, FloatArray]], dtype: type, planes: int
+) -> AnyArray:
+    """Rigid motions of the shaft that strain no support: F, or F and b, shape (planes, size, r)."""
+    if planes == 1:
+        return _rigid(rotor, A, [(s.node, np.ones(1)) for s, _ in forms], 1)[0][None]
     constraints = []
     for s, k in forms:
         values, directions = np.linalg.eigh(k)
-        constraints += [
-            (s.node, directions[:planes, i]) for i in (0, 1) if abs(values[i]) > 1e-12 * abs(values).max()
-        ]
-    if planes == 1:
-        constraints = [(s.node, np.array([1.0])) for s, _ in forms]
-    motions, free = _rigid(rotor, A, constraints, planes)
-    rigid = np.zeros((size, motions.shape[1]), dtype=dtype)
-    if planes == 1:
-        rigid[place] = motions
-    else:
-        x, y = free  # deflections of both planes
-        for plane, sign in ((0, 1), (1, -1)):
-            # A motion in y alone is as good with any phase; one of them makes (F, b) real.
-            rigid[planes * place + plane] = (x + sign * (1j if skew else 1) * y) / 2
-    total = sum(float(np.trace(k)) / 2 for _, k in forms)
-    at = A.deflections
-    waves, tilts = (np.array([planes * place[i] + plane for plane in range(planes)]) for i in (at, at + 1))
-    return Pencil(rotor, A, K, M, energy, rigid, total, waves, tilts, not rotor.model.gyroscopic)
+        stiff = np.abs(values) > 1e-12 * np.abs(values).max()
+        constraints += [(s.node, direction) for direction in directions.T[stiff]]
+    x, y = _rigid(rotor, A, constraints, 2)
+    # A motion in y alone is as good with any phase; one of them makes (F, b) real.
+    turned = (1j if dtype is complex else 1) * y
+    return np.stack((x + turned, x - turned)) / 2
 
 
 def _rigid(
     rotor: Rotor, A: Matrices, constraints: list[tuple[int, FloatArray]], planes: int
-) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-    """Rigid motions that leave every (node, direction) in place, whatever the stiffness there.
-
-    Returns them stacked in one plane, shape (size, r), or apart in two, (size, r) each.
-    """
+) -> tuple[FloatArray, FloatArray]:
+    """Rigid motions, (size, r), in x and in y (one plane: 0) that leave every (node, direction) in place."""
     if constraints and planes == 1 and len({node for node, _ in constraints}) > 1:
         none = np.zeros((A.size, 0))
-        return none, (none, none)
+        return none, none
     translation, tilt = np.zeros(A.size), np.zeros(A.size)
     translation[A.deflections] = 1.0
     span = float(rotor.positions[-1])
@@ -249,8 +260,8 @@ def _rigid(
     motions = np.column_stack((translation, tilt))
     x = motions @ basis[:2]
     if planes == 1:
-        return x, (x, np.zeros_like(x))
-    return x, (x, motions @ basis[2:])
+        return x, np.zeros_like(x)
+    return x, motions @ basis[2:]
 
 
 def orthonormal_rigid(pencil: Pencil) -> tuple[AnyArray, FloatArray]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 Monomial = tuple[tuple[str, int], ...]
@@ -110,7 +111,7 @@ class Ratio:
         return top
 
 
-def from_expression(  # noqa: C901
+def from_expression(
     expression: Any,  # noqa: ANN401 - a sympy expression; sympy has no types
     constant: Callable[[Any], Fraction | None],
 ) -> Ratio:
@@ -132,34 +133,27 @@ def from_expression(  # noqa: C901
     if expression.is_Symbol:
         return Ratio({((expression.name, 1),): Fraction(1)})
     if expression.is_Rational:
-        value = Fraction(int(expression.p), int(expression.q))
-        return Ratio({ONE: value} if value else {})
+        return _number(Fraction(int(expression.p), int(expression.q)))
     if expression.is_Float:
-        value = Fraction(repr(float(expression)))
-        return Ratio({ONE: value} if value else {})
-    if expression.is_Add:
-        total = Ratio({})
-        for part in expression.args:
-            total = total + from_expression(part, constant)
-        return total
-    if expression.is_Mul:
-        product = Ratio({ONE: Fraction(1)})
-        for part in expression.args:
-            product = product * from_expression(part, constant)
-        return product
+        return _number(Fraction(repr(float(expression))))
+    if expression.is_Add or expression.is_Mul:
+        join, start = (Ratio.__add__, 0) if expression.is_Add else (Ratio.__mul__, 1)
+        parts = (from_expression(part, constant) for part in expression.args)
+        return reduce(join, parts, _number(Fraction(start)))
     if expression.is_Pow and expression.exp.is_Integer:
-        exponent = int(expression.exp)
+        base, exponent = expression.base, int(expression.exp)
         if abs(exponent) > MAX_EXPONENT:
             raise ValueError(f"the exponent {exponent} is too large (at most {MAX_EXPONENT})")
-        if exponent >= 0 or not (free := constant(expression.base)):
-            return from_expression(expression.base, constant).to_power(exponent)
-        if expression.base.is_Symbol:
-            return from_expression(expression.base, constant).to_power(exponent)
-        return Ratio({ONE: free**exponent})
+        value = None if exponent >= 0 or base.is_Symbol else constant(base)
+        return _number(value**exponent) if value else from_expression(base, constant).to_power(exponent)
     found = constant(expression)
     if found is None:
         raise ValueError(
             f"'{expression}' is neither a polynomial nor a fraction of polynomials in p and the parameters; "
             f"give such a term a name and estimate that"
         )
-    return Ratio({ONE: found} if found else {})
+    return _number(found)
+
+
+def _number(value: Fraction) -> Ratio:
+    return Ratio({ONE: value} if value else {})

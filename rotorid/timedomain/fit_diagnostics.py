@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,65 +35,80 @@ class Judgement:
     autocorrelation: float | None
 
 
-def judge(problem: Problem, path: Path, loss: str) -> Judgement:  # noqa: C901, PLR0915
+@dataclass(eq=False)
+class _Draft:
+    """A judgement in the making."""
+
+    estimate: Estimate
+    reliable: bool
+    warnings: list[str] = field(default_factory=list)
+    integration_change: FloatArray | None = None
+
+    def note(self, *words: str, spoils: bool = False) -> None:
+        """Add warnings, empty ones left out; those that spoil the fit leave no intervals."""
+        said = [text for text in words if text]
+        self.warnings += said
+        self.reliable &= not (said and spoils)
+
+
+def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
-    found, names = path.estimate, problem.model.parameters
-    warnings: list[str] = []
-    reliable = path.converged
-    if not path.converged:
-        warnings.append(f"{path.message}; no intervals are given")
-    if path.at_bounds:
-        one = len(path.at_bounds) == 1
-        warnings.append(
-            f"{', '.join(path.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: no "
-            "standard deviation is given, and those of the others hold it fixed"
-        )
-    r = found.residuals
-    change = None
+    draft, r = _Draft(path.estimate, path.converged), path.estimate.residuals
+    draft.note(*_end_words(path))
     try:
-        J = problem.jacobian(found.solution)
-        weak = _insensitive(problem, J, found)
-        if weak:
-            warnings.append(f"the record hardly depends on {', '.join(weak)}")
-        if path.converged:
-            found, local = combined(problem, found)
-            warnings += [local] if local else []
-        spread = None if problem.stated or loss != "linear" else unequal(problem, len(names), r)
-        if spread is not None:
-            warnings.append(_unequal_words(problem, found, J, spread))
-        if path.converged and loss == "linear":
-            pointed, wrong = causes(problem, found.solution, J, r)
-            warnings += pointed
-            reliable &= not wrong
-        change = _integration_change(problem, found, J)
+        _note_sensitivities(draft, problem, path, loss)
     except SimulationError as error:
-        warnings.append(f"the model cannot be simulated with the result: {error}")
-        reliable = False
+        draft.note(f"the model cannot be simulated with the result: {error}", spoils=True)
+    found = draft.estimate
     if not found.full_rank and path.converged:
-        warnings.append(found.describe_rank())
+        draft.note(found.describe_rank())
     if not problem.data.any():
-        warnings.append("the record is zero throughout: a sensor without a signal?")
-    if change is not None:
-        warnings += _integration_words(found, change, names)
+        draft.note("the record is zero throughout: a sensor without a signal?")
+    draft.note(*_integration_words(found, draft.integration_change, problem.model.parameters))
     seen = correlation(problem, r)
     poor = misfit(problem, found.dof, r, loss)
-    if poor:
-        warnings.append(poor)
-        reliable = False
-    elif seen is not None and seen.words():
-        warnings.append(seen.words())
-    if found.errors_stated and not poor and found.dof > 0 and found.chi_square is not None:
-        warnings += _chi_words(found.chi_square, found.dof)
-    warnings += _aliases(problem, found.solution)
-    missed = _pulses(problem, found.solution) if reliable else []
-    if missed:
-        warnings += missed
-        reliable = False
-    warnings += _begins_later(problem)
-    if not reliable:
+    draft.note(poor, spoils=True)
+    if not poor:
+        draft.note("" if seen is None else seen.words(), *_chi_words(found))
+    draft.note(*_aliases(problem, found.solution))
+    if draft.reliable:
+        draft.note(*_pulses(problem, found.solution), spoils=True)
+    draft.note(*_begins_later(problem))
+    if not draft.reliable:
         curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
         found = replace(found, covariance=None, solution_covariance=None, curved=curved)
-    return Judgement(found, reliable, tuple(warnings), change, None if seen is None else seen.neighbours)
+    neighbours = None if seen is None else seen.neighbours
+    return Judgement(found, draft.reliable, tuple(draft.warnings), draft.integration_change, neighbours)
+
+
+def _end_words(path: Path) -> list[str]:
+    """Where the method stopped: before the minimum, or at bounds."""
+    words = [] if path.converged else [f"{path.message}; no intervals are given"]
+    if path.at_bounds:
+        stand = "stands at its bound" if len(path.at_bounds) == 1 else "stand at their bounds"
+        words.append(
+            f"{', '.join(path.at_bounds)} {stand}: no standard deviation is given, and those of the others "
+            "hold it fixed"
+        )
+    return words
+
+
+def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:
+    """What needs the model simulated at the values found; SimulationError where it cannot be."""
+    found, r = draft.estimate, draft.estimate.residuals
+    J = problem.jacobian(found.solution)
+    if weak := _insensitive(problem, J, found):
+        draft.note(f"the record hardly depends on {', '.join(weak)}")
+    if path.converged:
+        draft.estimate, local = combined(problem, found)
+        draft.note(local)
+    spread = None if problem.stated or loss != "linear" else unequal(problem, J.shape[1], r)
+    if spread is not None:
+        draft.note(_unequal_words(problem, draft.estimate, J, spread))
+    if path.converged and loss == "linear":
+        pointed, wrong = causes(problem, found.solution, J, r)
+        draft.note(*pointed, spoils=wrong)
+    draft.integration_change = _integration_change(problem, draft.estimate, J)
 
 
 def _begins_later(problem: Problem) -> list[str]:
@@ -128,7 +143,9 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     return least_squares(J, r - exact, rcond=RCOND).solution
 
 
-def _integration_words(found: Estimate, change: FloatArray, names: tuple[str, ...]) -> list[str]:
+def _integration_words(found: Estimate, change: FloatArray | None, names: tuple[str, ...]) -> list[str]:
+    if change is None:
+        return []
     size = np.abs(change)
     floor = 1e-8 * np.abs(found.solution)
     limit = floor if found.std is None else np.maximum(floor, 0.1 * np.nan_to_num(found.std))
@@ -196,14 +213,17 @@ def _unequal_words(problem: Problem, found: Estimate, J: FloatArray, variances: 
     return f"{words}. With --sigma auto precise outputs count for more"
 
 
-def _chi_words(chi_square: float, dof: int) -> list[str]:
+def _chi_words(found: Estimate) -> list[str]:
+    """Whether the residuals are as large as stated errors let one expect."""
+    chi_square, dof = found.chi_square, found.dof
+    if not found.errors_stated or dof <= 0 or chi_square is None:
+        return []
+    ratio = np.sqrt(chi_square / dof)
     if chance(chi_square, dof) < 1e-3:
-        ratio = np.sqrt(chi_square / dof)
         return [
             f"residuals are {ratio:.2g} times as large as the stated errors explain: intervals are too "
             "narrow, or the model does not quite describe the record"
         ]
     if chance(chi_square, dof) > 1 - 1e-6 and chi_square < dof / 2:
-        ratio = np.sqrt(chi_square / dof)
         return [f"residuals are only {ratio:.2g} times as large as the stated errors: these are too large"]
     return []

@@ -26,24 +26,27 @@ def differences(a: Job, b: Job) -> tuple[str, ...]:
     return tuple(_unlike(a, b, ""))
 
 
-def _unlike(a: Any, b: Any, name: str) -> Iterator[str]:  # noqa: ANN401, C901
-    if dataclasses.is_dataclass(a) and type(a) is type(b):
-        for field in dataclasses.fields(a):
-            if field.name not in _NOT_SAID:
-                inner = f"{name}.{field.name}" if name else field.name
-                yield from _unlike(getattr(a, field.name), getattr(b, field.name), inner)
-    elif isinstance(a, Mapping) and isinstance(b, Mapping):
-        if list(a) != list(b):
+def _parts(value: object) -> tuple[type, str, Mapping[Any, Any]] | None:
+    """Kind, form of the names and parts of what has parts."""
+    if dataclasses.is_dataclass(value):
+        names = (field.name for field in dataclasses.fields(value) if field.name not in _NOT_SAID)
+        return type(value), ".{}", {name: getattr(value, name) for name in names}
+    if isinstance(value, Mapping):
+        return Mapping, ".{}", value
+    if isinstance(value, (tuple, list)):
+        return list, "[{}]", dict(enumerate(value, start=1))
+    return None
+
+
+def _unlike(a: object, b: object, name: str) -> Iterator[str]:
+    mine, other = _parts(a), _parts(b)
+    if mine and other and mine[0] is other[0]:
+        _, form, parts = mine
+        if list(parts) != list(other[2]):
             yield name
             return
-        for key in a:
-            yield from _unlike(a[key], b[key], f"{name}.{key}")
-    elif isinstance(a, (tuple, list)) and isinstance(b, (tuple, list)):
-        if len(a) != len(b):
-            yield name
-            return
-        for k, (one, other) in enumerate(zip(a, b, strict=True), start=1):
-            yield from _unlike(one, other, f"{name}[{k}]")
+        for key, part in parts.items():
+            yield from _unlike(part, other[2][key], (name + form.format(key)).removeprefix("."))
     elif isinstance(a, (np.ndarray, float)) and isinstance(b, (np.ndarray, float)):
         rounding = _ROUNDING if name.startswith(_ROUNDED) else 0.0
         if np.shape(a) != np.shape(b) or not np.allclose(a, b, rtol=rounding, atol=0.0, equal_nan=True):

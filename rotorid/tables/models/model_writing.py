@@ -161,7 +161,7 @@ def _sum(values: Sequence[float], names: Sequence[str]) -> str:
     return " + ".join(terms) or "0"
 
 
-def _check(  # noqa: C901
+def _check(
     motion: Motion,
     dampers: Mapping[str, float],
     initial: Mapping[str, float],
@@ -171,8 +171,7 @@ def _check(  # noqa: C901
     for key in "MCK":
         if not np.isfinite(getattr(motion, key)).all():
             raise ValueError(f"{key} holds numbers that are not finite: such a model cannot be written")
-    both = {"dampers": dampers, "initial": initial}
-    for what, values in both.items():
+    for what, values in (("dampers", dampers), ("initial", initial)):
         for name, value in values.items():
             if not np.isfinite(value):
                 raise ValueError(f"{what}: the value of {name} must be a finite number, not {value!r}")
@@ -182,19 +181,19 @@ def _check(  # noqa: C901
             raise ValueError(
                 f"dampers: the starting value of {name} must be 0 or more, not {dampers[name]:g}"
             )
-    allowed = {
-        "input": [f"f_{name}" for name in motion.coordinates],
-        "output": [*motion.coordinates, *(f"v_{name}" for name in motion.coordinates)],
-    }
-    for kind, chosen in (("input", inputs), ("output", outputs or ())):
-        if isinstance(chosen, str):
-            raise ValueError(f"{kind}s must be a list of names, not the one name {chosen!r}")
-        for i, name in enumerate(chosen):
-            if name not in allowed[kind]:
-                first = allowed[kind][0]
-                raise ValueError(f"no {kind} {name!r} in this model: they are named like {first}")
-            if name in chosen[:i]:
-                raise ValueError(f"the {kind} {name} is named twice")
+    forces, rates = ([f"{kind}_{name}" for name in motion.coordinates] for kind in "fv")
+    _check_names("input", inputs, forces)
+    _check_names("output", outputs or (), [*motion.coordinates, *rates])
+
+
+def _check_names(kind: str, chosen: Sequence[str], allowed: Sequence[str]) -> None:
+    if isinstance(chosen, str):
+        raise ValueError(f"{kind}s must be a list of names, not the one name {chosen!r}")
+    for i, name in enumerate(chosen):
+        if name not in allowed:
+            raise ValueError(f"no {kind} {name!r} in this model: they are named like {allowed[0]}")
+        if name in chosen[:i]:
+            raise ValueError(f"the {kind} {name} is named twice")
 
 
 def _names(names: Iterable[str]) -> str:
