@@ -13,8 +13,8 @@ PACKAGES = ("fem", "balancing", "rotorid")
 MOST, LEAST = 24, 4
 """Modules of a folder: more is a corridor, fewer (with a package's own page) is a module."""
 
-COMPLEX_FUNCTIONS = 23
-"""Breaches of the limits of complexity, statements and arguments that stand in the code: they may only go."""
+COMPLEX_FUNCTIONS = 17
+"""Breaches of the limits of statements and arguments that stand in the code: they may only go."""
 
 
 def modules():
@@ -90,7 +90,7 @@ def test_what_the_floor_has_is_written_there_only(pattern):
 
 
 def test_the_list_of_complex_functions_only_gets_shorter():
-    listed = re.compile(r"# noqa: .*(C901|PLR0913|PLR0915)")
+    listed = re.compile(r"# noqa: .*(PLR0913|PLR0915)")
     found = [
         path.name
         for path in modules()
@@ -98,6 +98,7 @@ def test_the_list_of_complex_functions_only_gets_shorter():
         if listed.search(line)
     ]
     assert len(found) == COMPLEX_FUNCTIONS, found
+    assert not [path.name for path in modules() if "C901" in path.read_text(encoding="utf-8")]
 
 
 def test_no_circle_is_allowed():
