@@ -16,11 +16,12 @@ import typer
 from rotorid.cli.progress import busy
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
     from matplotlib.figure import Figure
 
     from rotorid.workflows.outcome import Outcome
 
-_O = TypeVar("_O")
+_O = TypeVar("_O", bound="DataclassInstance")
 _R = TypeVar("_R", bound="Outcome")
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
@@ -37,7 +38,7 @@ def chosen(kind: type[_O], given: Mapping[str, Any]) -> _O:
     given
         The parameters: `locals()` at the beginning of the command.
     """
-    fields = dataclasses.fields(kind)  # type: ignore[arg-type]
+    fields = dataclasses.fields(kind)
     found = {f.name: f.default if given[f.name] is None else given[f.name] for f in fields}
     return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in found.items()})
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     import pandas as pd
+    from _typeshed import DataclassInstance
     from matplotlib.figure import Figure
 
     from fem import Rotor
@@ -105,7 +106,7 @@ def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
 def provenance(
     files: Iterable[Path],
-    options: Any,  # noqa: ANN401 - any options dataclass
+    options: DataclassInstance,
     **given: object,
 ) -> dict[str, Any]:
     """Program version, input files with their hashes, date, and options that differ from their defaults.
@@ -129,7 +130,7 @@ def provenance(
     }
 
 
-def changed(options: Any) -> dict[str, object]:  # noqa: ANN401 - any options dataclass
+def changed(options: DataclassInstance) -> dict[str, object]:
     """Options that differ from their defaults."""
     found = {}
     for field in dataclasses.fields(options):
