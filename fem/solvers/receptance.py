@@ -26,7 +26,7 @@ TOLERANCE = 1e-10  # of the series, relative to the response
 NEAR = 1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits
 PIVOT = 1e-4  # of the low-rank change, relative: below, four digits are lost
 _TERMS = 12
-_CHUNK = 128  # speeds at a time, to stay in the processor's cache
+_CHUNK = 256  # speeds at a time, to stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
