@@ -26,7 +26,7 @@ TOLERANCE = 1e-10  # of the series, relative to the response
 NEAR = 1e-8  # |ω² − λ| / λ where the fast formula has lost half of the digits
 PIVOT = 1e-4  # of the low-rank change, relative: below, four digits are lost
 _TERMS = 12
-_CHUNK = 256  # speeds at a time, to stay in the processor's cache
+_CHUNK, _ROWS = 256, 64  # speeds at a time up to so many rows, to stay in the processor's cache; above, half
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,9 @@ class Receptance:
 
     def parts(self, speeds: FloatArray) -> Iterator[tuple[slice, Amplitudes]]:
         """Amplitudes at speeds in rad/s, some speeds at a time, so that memory does not grow with them."""
-        for start in range(0, speeds.size, _CHUNK):
-            part = slice(start, start + _CHUNK)
+        step = _CHUNK if self.rows.size <= _ROWS else _CHUNK // 2
+        for start in range(0, speeds.size, step):
+            part = slice(start, start + step)
             yield part, self._at(speeds[part])
 
     def _at(self, speeds: FloatArray) -> Amplitudes:
