@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
+from rotorid.workflows.given import file_of
 from rotorid.workflows.other_readings import with_contradiction, with_other_readings
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
@@ -298,17 +299,18 @@ def _check(options: BalanceOptions) -> None:
 
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
+    from rotorid.tables import Job
     from rotorid.tables.job.source import JobSource
 
     stored = None if options.influence is None else Path(options.influence)
     errors = options.amplitude_error, options.phase_error, options.run_error
     said = (options.phase, options.angles, *errors)
-    files = [job] if isinstance(job, Path | str) else job
-    if isinstance(files, Sequence):
-        return JobSource(tuple(Path(file) for file in files), stored, *said)
+    if not isinstance(job, Job):
+        files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
+        return JobSource(tuple(file_of(file, "a job") for file in files), stored, *said)
     if any(value is not None for value in (stored, *said)):
         raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
-    return files
+    return job
 
 
 def _read(source: Job | JobSource, options: BalanceOptions) -> Job:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.workflows.given import rotor_source
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Band, band
-from rotorid.workflows.sources import rotor_source
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import one_of
 from rotorid.workflows.demo_samples import SAMPLES, Sample
+from rotorid.workflows.given import file_of
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
@@ -147,8 +148,9 @@ def demo(folder: Path | str, options: DemoOptions | None = None) -> Demo:
     """
     options = options or DemoOptions()
     sample = SAMPLES[one_of(options.sample, "--sample", tuple(SAMPLES))]
-    copies = _copy(Path(folder), sample)
-    return Demo(folder=Path(folder), name=options.sample, provenance=provenance(copies, options))
+    place = file_of(folder, "a folder")
+    copies = _copy(place, sample)
+    return Demo(folder=place, name=options.sample, provenance=provenance(copies, options))
 
 
 def _copy(folder: Path, sample: Sample) -> list[Path]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
+from rotorid.workflows.given import file_of
 from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
 from rotorid.workflows.parameters import number, pairs
 
@@ -106,7 +107,7 @@ class RecordFit(Outcome):
 @workflow
 def fit(
     model: OdeModel | Path | str,
-    records: Sequence[Record | Path | str],
+    records: Sequence[Record | Path | str] | Path | str,
     options: FitOptions | None = None,
 ) -> RecordFit:
     """Estimate parameters of differential equations from time records, with intervals.
@@ -116,7 +117,7 @@ def fit(
     model
         A model, or its file.
     records
-        Records, or their files.
+        Records, or their files; or one file.
     options
         Those that differ from the defaults.
 
@@ -126,15 +127,18 @@ def fit(
         For files, options or records that cannot be.
     """
     from rotorid.tables import read_ode_model
+    from rotorid.timedomain import OdeModel
     from rotorid.timedomain.fit import fit as estimate
     from rotorid.timedomain.methods.problem import RTOL
 
     options = options or FitOptions()
     _check(options)
+    if isinstance(records, Path | str) or not isinstance(records, Collection):
+        records = [file_of(records, "records")]
     paths = [Path(given) for given in records if isinstance(given, Path | str)]
     _check_once(paths)
     files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
-    equations = read_ode_model(model) if isinstance(model, Path | str) else model
+    equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
     begin = None if options.start is None else _start(options.start, equations, len(records))
     weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
     deviations = None if weigh or options.sigma is None else _sigma(options.sigma, equations.outputs)
@@ -206,11 +210,12 @@ def _read(
     """All records, with standard deviations for all of them or for none."""
     from rotorid.tables import read_record
     from rotorid.tables.data.records import STD
+    from rotorid.timedomain import Record
 
     records = [
-        read_record(one, model, allow_missing=allow_missing, sigma=sigma)
-        if isinstance(one, Path | str)
-        else replace(one, sigma=one.sigma if sigma is None else sigma)
+        replace(one, sigma=one.sigma if sigma is None else sigma)
+        if isinstance(one, Record)
+        else read_record(file_of(one, "a record"), model, allow_missing=allow_missing, sigma=sigma)
         for one in given
     ]
     stated = [record for record in records if record.sigma is not None]
@@ -246,7 +251,7 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
             raise ValueError(f"--start: {name} = {value:g} is outside its bounds {low:g} to {high:g}")
         return value
 
-    found = pairs(given, "--start", inside, "k=2,d=0.1")
+    found = pairs(_texts(given), "--start", inside, "k=2,d=0.1")
     # what holds for all records first: a value for one of them replaces it
     return dict(sorted(found.items(), key=lambda item: item[0] not in model.parameters))
 
@@ -268,7 +273,12 @@ def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
 
     if isinstance(given, float | int) or (isinstance(given, str) and not {"=", ","} & set(given)):
         given = ",".join(f"{name}={given}" for name in outputs)
-    found = pairs(given, "--sigma", positive, "y1=0.01,y2=0.02")
+    found = pairs(_texts(given), "--sigma", positive, "y1=0.01,y2=0.02")
     if lost := [name for name in outputs if name not in found]:
         raise ValueError(f"--sigma: the standard deviation of {listing(lost, 'and')} is missing")
     return found
+
+
+def _texts(given: Values) -> str | dict[str, str]:
+    """Values by name as texts, so that they are read and checked as those of the command line."""
+    return {key: str(value) for key, value in given.items()} if isinstance(given, Mapping) else given

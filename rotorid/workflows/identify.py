@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import one_of
+from rotorid.workflows.given import file_of
 from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
 from rotorid.workflows.parameters import Speeds, speeds
 
@@ -111,27 +112,28 @@ def identify(
     ValueError
         For files, options or data that cannot be.
     """
-    from rotorid.harmonic import HarmonicModel
+    from rotorid.harmonic import Experiments, HarmonicModel
     from rotorid.harmonic import identify as estimate
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
+    _check(options)
     if data is None and options.design is None:
         raise ValueError(_NO_DATA)
-    _check(options)
     files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
-        model = read_harmonic_model(model)
+        model = read_harmonic_model(file_of(model, "a model"))
     file = replace(model, errors=_errors(model.errors, options.amplitude_error, options.phase_error))
     result = None
     if data is not None:
-        experiments = read_measurements(data, file) if isinstance(data, Path | str) else data
+        if not isinstance(data, Experiments):
+            data = read_measurements(file_of(data, "a table of amplitudes"), file)
         with phase("identification"):
             result = estimate(
                 file.model,
-                experiments,
+                data,
                 method=options.method,
                 bounds=file.bounds or None,
                 loss=options.loss,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
+import inspect
 import logging
 import time
 from abc import ABC, abstractmethod
@@ -13,6 +14,8 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from rotorid.workflows.given import changed, checked, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,11 +55,11 @@ class Outcome(ABC):
 
     def figure(self) -> Figure:
         """The main picture."""
-        raise ValueError(f"there is no picture of a {type(self).__name__.lower()}")
+        raise ValueError(f"{type(self).__name__} has no picture")
 
     def sheet(self) -> bytes:
         """To print or to send, one HTML file."""
-        raise ValueError(f"there is no sheet of a {type(self).__name__.lower()}")
+        raise ValueError(f"{type(self).__name__} has no sheet")
 
     @property
     def document(self) -> dict[str, Any]:
@@ -92,14 +95,20 @@ class Found(Outcome):
 
 
 def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
-    """While it works each file is read once, so that its hash is that of what was read."""
+    """Check its options first; while it works each file is read once: its hash is that of what was read."""
+    signature = inspect.signature(function)
+    kind, _, rest = str(signature.parameters["options"].annotation).partition(" | ")
 
     @functools.wraps(function)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
         from rotorid.tables.reader.input_file import each_file_once
 
+        given = signature.bind(*args, **kwargs)
+        options = given.arguments.get("options")
+        if options is not None or not rest:
+            given.arguments["options"] = checked(options, function.__globals__[kind])
         with each_file_once():
-            return function(*args, **kwargs)
+            return function(*given.args, **given.kwargs)
 
     return wrapper
 
@@ -115,8 +124,8 @@ def provenance(
 
     Raises
     ------
-    ValueError
-        For an option that is a number beyond all sizes.
+    InputError
+        For a file that cannot be read.
     """
     from rotorid import __version__
     from rotorid.tables.reader.input_file import file_content
@@ -126,30 +135,8 @@ def provenance(
         "version": __version__,
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
-        "options": {key: _plain(value) for key, value in (given | changed(options)).items()},
+        "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }
-
-
-def changed(options: DataclassInstance) -> dict[str, object]:
-    """Options that differ from their defaults."""
-    found = {}
-    for field in dataclasses.fields(options):
-        value = getattr(options, field.name)
-        same = value == field.default
-        if hasattr(same, "__len__") or not same:  # an array is no default
-            found[field.name] = value
-    return found
-
-
-def _plain(value: object) -> object:
-    """An option as JSON has it."""
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, str | int | float) or value is None:
-        return value
-    return [_plain(item) for item in value] if isinstance(value, Iterable) else str(value)
 
 
 @contextmanager

@@ -13,10 +13,10 @@ from typing import TypeVar, cast
 from rotorid.base.suggestions import one_of as one_of
 
 _T = TypeVar("_T")
-Speeds = str | Sequence[float]
-"""As `speeds` reads them, or rad/s."""
-Band = str | tuple[float, float]
-"""As `band` reads it, or the lowest and highest speed, rad/s."""
+Speeds = str | Sequence[float | str]
+"""As `speeds` reads them, or one by one: rad/s, or "3000rpm"."""
+Band = str | tuple[float | str, float | str]
+"""As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
 Nodes = str | Sequence[str | int]
 """As `nodes` reads them, or numbers of nodes and names of stations."""
 Sensor = str | int | tuple[str | int, float]
@@ -44,19 +44,19 @@ def number(text: str) -> float:
 
 def nodes(given: Nodes, what: str) -> list[str | int]:
     """Read "7,12,impeller 3" as node numbers and names of stations."""
-    if not isinstance(given, str):
-        return list(given)
-    parts = [part.strip() for part in given.split(",")]
-    if not all(parts):
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not parts or not all(part != "" for part in parts):
         raise ValueError(
             f"{what} takes nodes or names of stations with commas, such as 7,12,18; got {given!r}"
         )
-    return [int(part) if part.isdecimal() else part for part in parts]
+    return [int(part) if isinstance(part, str) and part.isdecimal() else part for part in parts]
 
 
 def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sensor]:
     """Read "2,22:45,probe DE:-30" as nodes with angles in degrees from x, with the rotation; 0 without."""
     if not isinstance(given, str):
+        if not given:
+            raise ValueError(f"{what}: at least one node or station is needed")
         return list(given)
     found: list[Sensor] = []
     for part in given.split(","):
@@ -77,16 +77,16 @@ def degrees(given: str | float, what: str) -> float:
 
 def names(given: Names | None) -> list[str] | None:
     """Read "A,B" as names; None stays None."""
-    if given is None or not isinstance(given, str):
-        return None if given is None else list(given)
-    found = [part.strip() for part in given.split(",")]
-    if not all(found):
+    if given is None:
+        return None
+    found = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not found or not all(found):
         raise ValueError(f"names with commas between them are needed, such as left,right; got {given!r}")
     return found
 
 
 def pairs(
-    given: str | Sequence[str] | Mapping[str, _T],
+    given: str | Sequence[str] | Mapping[str, _T] | Mapping[str, str],
     what: str,
     read: Callable[[str, str], _T],
     example: str,
@@ -116,10 +116,12 @@ def pairs(
         For anything else, and for a name that stands twice.
     """
     if isinstance(given, Mapping):
-        return dict(given)
-    shown = given if isinstance(given, str) else ",".join(given)
-    found: dict[str, _T] = {}
-    for part in given.split(",") if isinstance(given, str) else given:
+        return {str(key): read(str(key), v) if isinstance(v, str) else v for key, v in given.items()}
+    parts = given.split(",") if isinstance(given, str) else given
+    if not all(isinstance(part, str) for part in parts):
+        raise ValueError(f"{what} {given!r}: texts are needed, such as {example}")
+    shown, found = ",".join(parts), dict[str, _T]()
+    for part in parts:
         name, found_sign, text = (piece.strip() for piece in part.rpartition(sign))
         if not (name and found_sign) and (found_sign or not text or alone is None):
             raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}")
@@ -130,26 +132,31 @@ def pairs(
     return found
 
 
-def numbers(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
-    """`pairs` of names with finite numbers."""
+def numbers(
+    given: str | Mapping[str, float], what: str, example: str, whole: float = 1.0
+) -> dict[str, float]:
+    """`pairs` of names with finite numbers, those of texts divided by `whole`."""
 
     def read(name: str, text: str) -> float:
         value = number(text)
         if math.isnan(value):
             raise ValueError(f"{what} {given!r}: {name}={text} is no NAME=NUMBER; use {example}")
-        return value
+        return value / whole
 
     return pairs(given, what, read, example)
 
 
 def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
     """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
-    if given is None or not isinstance(given, str):
-        return given
-    text = given.strip()
-    unit = next((name for name in _SPEED_UNITS if text.endswith(name)), "")
-    factor = _SPEED_UNITS.get(unit, 1.0)
-    ends = [number(part) for part in text.removesuffix(unit).split(":")]
+    if given is None:
+        return None
+    if not isinstance(given, str):
+        factor, ends = 1.0, [one_speed(end, what) for end in given]
+    else:
+        text = given.strip()
+        unit = next((name for name in _SPEED_UNITS if text.endswith(name)), "")
+        factor = _SPEED_UNITS.get(unit, 1.0)
+        ends = [number(part) for part in text.removesuffix(unit).split(":")]
     if len(ends) != 2 or not 0 <= ends[0] < ends[1] <= FASTEST / factor:
         raise ValueError(
             f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
@@ -164,7 +171,8 @@ def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[f
     range is included where the steps meet it.
     """
     if not isinstance(given, str):
-        return _possible([float(value) for value in given], what, given)
+        found = [one_speed(value, what) if isinstance(value, str) else value for value in given]
+        return _possible([float(value) for value in found], what, given)
     sign = ":" if ":" in given else ","
     parts = [_speed(part) for part in given.split(sign)]
     usual = unit.replace("rad_s", "rad/s")

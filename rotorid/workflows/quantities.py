@@ -31,10 +31,10 @@ Vector = str | complex
 """Weights at angles as `vectors` reads them, or one in kg."""
 Positions = str | Mapping[str, float | None]
 """As `positions` reads them, or m by plane; None: without."""
-Weights = Amount | Mapping[str, float]
+Weights = Amount | Mapping[str, Amount]
 """One of all planes, or by plane, in SI as the weights of the job are: kg or kg·m."""
-Amplitudes = Sequence[str] | Mapping[str, float]
-"""`SENSOR=VALUE` each, or amplitudes by sensor in SI."""
+Amplitudes = str | Sequence[str] | Mapping[str, Amount]
+"""`SENSOR=VALUE`, one or several, or amplitudes by sensor in SI."""
 _WORD = re.compile(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d].*)?")
 _PLUS = re.compile(r"(?<=[0-9.])\s*\+\s*(?=[0-9.])")
 
@@ -148,6 +148,8 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
         For anything else, and for units that do not convert to that of the first one.
     """
     way = as_angles(one_of(angles, "--angles", ANGLES))
+    if not isinstance(given, str | int | float | complex):
+        raise ValueError(f"{what}: a text such as 35g@120 or one complex weight is needed, not {given!r}")
     if not isinstance(given, str):
         return Labels(weight_unit="g", weight_scale=1e3, angles=way), [complex(given)]
     labels, found = None, []
@@ -206,7 +208,12 @@ def largest_weights(job: Job, given: Weights | None, what: str = "--max-mass") -
         found = pairs(given, what, read, "5g or left=5g,right=3g", alone)
     else:
         several = given if isinstance(given, Mapping) else dict.fromkeys(job.used, given)
-        found = {name: Quantity(f"{what} {name}", value, _si(own)) for name, value in several.items()}
+        found = {
+            name: read(name, value)
+            if isinstance(value, str)
+            else Quantity(f"{what} {name}", _above_zero(value, value, what, "0.005 kg"), _si(own))
+            for name, value in several.items()
+        }
     return _of(job.planes, "plane", found, f"{what} {given!r}")
 
 
@@ -237,10 +244,15 @@ def largest_amplitudes(job: Job, given: Amplitudes, what: str = "--limit") -> di
         return Quantity(f"{what} {text!r}", value, unit)
 
     if isinstance(given, Mapping):
-        found = {name: Quantity(f"{what} {name}", v * own.scale, own) for name, v in given.items()}
+        found = {
+            name: read(name, v)
+            if isinstance(v, str)
+            else Quantity(f"{what} {name}", _above_zero(v, v, what, "20e-6") * own.scale, own)
+            for name, v in given.items()
+        }
         return _of(sensors, "sensor", found, what)
     found = {}
-    for option in given:
+    for option in [given] if isinstance(given, str) else given:
         each = pairs([option], what, read, "SENSOR=20", lambda text: dict.fromkeys(sensors, read("", text)))
         found |= _of(sensors, "sensor", each, f"{what} {option!r}")
     return found

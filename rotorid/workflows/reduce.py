@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.text import counted
+from rotorid.workflows.given import rotor_source
 from rotorid.workflows.outcome import log, provenance, workflow
 from rotorid.workflows.parameters import (
     Band,
@@ -19,9 +20,9 @@ from rotorid.workflows.parameters import (
     numbers,
     one_of,
     one_speed,
+    option_name,
     rising_speeds,
 )
-from rotorid.workflows.sources import rotor_source
 
 if TYPE_CHECKING:
     from fem import Rotor
@@ -144,7 +145,7 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     _check_used(options, rotor is not None)
     if rotor is None:
         result, files = _of_tables(options, how)
-        forces = nodes(options.force or (), "--force")
+        forces = _forces(options)
         found = ReducedRotor(result=result, forces=forces, provenance=provenance(files, options))
     else:
         found = _of_rotor(rotor, options, how)
@@ -165,7 +166,7 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     asked = {name: getattr(options, name) for name in of_rotor}
     given = [name for name, value in asked.items() if value is not None and value is not False]
     if not has_rotor and given:
-        raise ValueError(f"{_option(given[0])} needs a rotor: give ROTOR instead of --compliance")
+        raise ValueError(f"{option_name(given[0])} needs a rotor: give ROTOR instead of --compliance")
     if has_rotor and (options.compliance is not None or options.seals is not None):
         raise ValueError("--compliance and --seals take the place of a rotor: give them, or ROTOR, not both")
     for name in ("masses", "candidates"):
@@ -173,13 +174,13 @@ def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
             raise ValueError(f"--{name} does nothing without --rank or --place")
     if options.measured is not None and given and given[0] in computed:
         raise ValueError(
-            f"{_option(given[0])} compares with the computed rotor, not with the measured modes: "
-            f"leave out {_option(given[0])} or --measured"
+            f"{option_name(given[0])} compares with the computed rotor, not with the measured modes: "
+            f"leave out {option_name(given[0])} or --measured"
         )
 
 
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def _forces(options: ReduceOptions) -> list[str | int]:
+    return [] if options.force is None else nodes(options.force, "--force")
 
 
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
@@ -195,12 +196,12 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     data = None if options.measured is None else read_modes(options.measured, machine)
     placement = None
     if options.rank or options.place is not None:
-        masses = options.masses or 3
+        masses = 3 if options.masses is None else options.masses
         candidates = None if options.candidates is None else nodes(options.candidates, "--candidates")
         placement = rank_nodes(
             machine,
             masses,
-            options.modes or min(2, masses),
+            min(2, masses) if options.modes is None else options.modes,
             candidates=candidates,
             speed=at,
             normalise=options.normalise,
@@ -228,7 +229,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         damping=given.damping_ratios(options.damping),
         speed=max(tables, default=0.0) if at is None else at,
         both_planes=options.both_planes,
-        forces=[machine.node(node) for node in nodes(options.force or (), "--force")],
+        forces=[machine.node(node) for node in _forces(options)],
         provenance=provenance(files, options),
     )
     return _beside(found, machine, options, at)
@@ -246,7 +247,7 @@ def _places(
         raise ValueError("--nodes and --place are two ways to the same end: choose one")
     if options.nodes is not None:
         return [rotor.node(node) for node in nodes(options.nodes, "--nodes")]
-    masses = options.masses or 3
+    masses = 3 if options.masses is None else options.masses
     if options.place == "book":
         from rotorid.reduction import book_nodes
 

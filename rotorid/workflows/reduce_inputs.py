@@ -86,9 +86,8 @@ def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) 
 
 
 def shares(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
-    """Read "alpha12=1.3,U31=-0.3", in percent, as shares."""
-    found = numbers(given, what, example)
-    return {name: value / 100 for name, value in found.items()} if isinstance(given, str) else found
+    """Read "alpha12=1.3,U31=-0.3", in percent, as shares; numbers in a mapping are shares."""
+    return numbers(given, what, example, 100.0)
 
 
 def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.text import counted
 from rotorid.base.units import RPM
+from rotorid.workflows.given import file_of, rotor_source
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import (
     Band,
@@ -21,7 +22,6 @@ from rotorid.workflows.parameters import (
     rising_speeds,
     sensors,
 )
-from rotorid.workflows.sources import rotor_source
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -254,9 +254,10 @@ def response(
     nodes = dict.fromkeys(model.node(as_sensor(place, model).node) for place in places)
     nodes |= dict.fromkeys(support.node for support in model.supports)
     speeds = rising_speeds(options.speeds)
-    if isinstance(unbalance, Path | str):
-        files = (*files, Path(unbalance))
-        unbalance = read_unbalance(unbalance, model)
+    if not isinstance(unbalance, Iterable) or isinstance(unbalance, str):
+        table = file_of(unbalance, "unbalance by node or station,")
+        files = (*files, table)
+        unbalance = read_unbalance(table, model)
     with phase(f"response at {counted(len(speeds), 'speed')}"):
         found = response_from_rest(model, unbalance, speeds, [*nodes])
     with phase("peaks"):

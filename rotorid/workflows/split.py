@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.outcome import Outcome, changed, provenance, workflow
+from rotorid.workflows.given import changed
+from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import degrees, option_name, pairs
 
 if TYPE_CHECKING:

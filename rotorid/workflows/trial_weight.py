@@ -8,9 +8,9 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rotorid.workflows.outcome import Outcome, changed, log, provenance, workflow
+from rotorid.workflows.given import changed, job_source
+from rotorid.workflows.outcome import Outcome, log, provenance, workflow
 from rotorid.workflows.parameters import Names, degrees, names, number, one_of, option_name
-from rotorid.workflows.sources import job_source
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.workflows.given import job_source
 from rotorid.workflows.outcome import Found, provenance, workflow
 from rotorid.workflows.parameters import Nodes, nodes
-from rotorid.workflows.sources import job_source
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance

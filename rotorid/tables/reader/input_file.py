@@ -17,8 +17,12 @@ _read: ContextVar[dict[Path, bytes] | None] = ContextVar("read", default=None)
 
 @contextmanager
 def each_file_once() -> Iterator[None]:
-    """While a command runs, a file that was read is not read again, and `-` is standard input."""
-    token = _read.set({})
+    """While a command runs, a file that was read is not read again, and `-` is standard input.
+
+    Inside another one what that has read counts.
+    """
+    seen = _read.get()
+    token = _read.set({} if seen is None else seen)
     try:
         yield
     finally:
