@@ -117,9 +117,7 @@ def identify(
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
-    _check(options)
-    if data is None and options.design is None:
-        raise ValueError(_NO_DATA)
+    _check(options, measured=data is not None)
     files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
@@ -147,12 +145,14 @@ def identify(
     )
 
 
-def _check(options: IdentifyOptions) -> None:
-    """Refuse names that are not known, and options that do not go together."""
+def _check(options: IdentifyOptions, *, measured: bool) -> None:
+    """Refuse names that are not known, no data, and options that do not go together."""
     from rotorid.base.registry import names
 
     for option, known in choices().items():
         one_of(getattr(options, option), f"--{option}", names(known))
+    if not measured and options.design is None:
+        raise ValueError(_NO_DATA)
     if options.loss != "linear" and options.method != "output-error":
         raise ValueError("--loss belongs to --method output-error: linear regression has none")
     if options.choose is not None and options.design is None:
