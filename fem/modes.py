@@ -9,6 +9,8 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -67,23 +69,23 @@ class Modes:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid critical`."""
-        return {
-            "critical_speeds_rad_s": self.frequencies.tolist(),
-            "critical_speeds_rpm": self.rpm.tolist(),
-            "positions_m": self.positions.tolist(),
-            "mode_shapes": self.shapes.T.tolist(),
-            "direction": list(self.direction),
-            "critical_speeds_cut": self.cut or None,
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "critical_speeds_rad_s": self.frequencies,
+                "critical_speeds_rpm": self.rpm,
+                "positions_m": self.positions,
+                "mode_shapes": self.shapes.T,
+                "direction": self.direction,
+                "critical_speeds_cut": self.cut or None,
+                "warnings": self.warnings,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per node: number, position and the deflection in each mode."""
-        import pandas as pd
-
-        columns: dict[str, Any] = {"node": range(1, self.rotor.n_nodes + 1), "position_m": self.positions}
-        columns |= {f"mode_{k}": shape for k, shape in enumerate(self.shapes.T, start=1)}
-        return pd.DataFrame(columns)
+        nodes = (Column("node", range(1, self.rotor.n_nodes + 1)), Column("position_m", self.positions))
+        modes = (Column(f"mode_{k}", shape) for k, shape in enumerate(self.shapes.T, start=1))
+        return frame((*nodes, *modes))
 
     def summary(self) -> str:
         """Critical speeds as text."""
