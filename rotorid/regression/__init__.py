@@ -1,7 +1,7 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
 from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
-from rotorid.regression.linear import RCOND, gain, least_squares, stack, stretch, unstretch
+from rotorid.regression.linear import RCOND, gain, least_squares, solution, stack, stretch, unstretch
 
 __all__ = [
     "RCOND",
@@ -12,6 +12,7 @@ __all__ = [
     "echelon",
     "gain",
     "least_squares",
+    "solution",
     "stack",
     "stretch",
     "unstretch",

@@ -14,6 +14,7 @@ variance of the residuals and Student's t; without degrees of freedom there is n
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,7 @@ __all__ = [
     "coverage_factor",
     "gain",
     "least_squares",
+    "solution",
     "stack",
     "stretch",
     "unstretch",
@@ -239,6 +241,34 @@ def gain(A: ArrayLike) -> ComplexArray:
     K = np.asarray(A, dtype=complex)
     scale = np.linalg.norm(K, axis=-2, keepdims=True)
     return np.asarray(np.linalg.pinv(K / scale, rcond=1e-14) / np.swapaxes(scale, -1, -2))
+
+
+def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noqa: ANN401
+    """The least-squares solution of A x = y alone, without errors: for steps of an iteration, and bounds.
+
+    Parameters
+    ----------
+    A
+        (m, n), real or complex; its columns are scaled, a column of zeros gives x = 0.
+    y
+        (m,), or (m, k) for k right sides.
+    rcond
+        Scaled singular values below `rcond` times the largest count as zero.
+
+    Returns
+    -------
+    (n,) or (n, k), real where A and y are; of several solutions the one with the smallest scaled length.
+
+    Examples
+    --------
+    >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
+    [1.0, 2.0]
+    """
+    K = np.asarray(A)
+    size = np.linalg.norm(K, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    found = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)[0]
+    return (found.T / scale).T
 
 
 def _real_problem(

@@ -6,7 +6,7 @@ from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rotorid.regression import coverage_factor, gain, least_squares, stack, stretch, unstretch
+from rotorid.regression import coverage_factor, gain, least_squares, solution, stack, stretch, unstretch
 
 # NIST StRD, Longley: total employment; GNP deflator, GNP, unemployed, armed forces, population, year
 LONGLEY = """
@@ -288,3 +288,21 @@ def test_gain_is_the_least_squares_solution_of_every_matrix():
     y = rng.normal(size=7) + 1j * rng.normal(size=7)
     for matrix, G in zip(A, gain(A), strict=True):
         np.testing.assert_allclose(G @ y, unstretch(least_squares(matrix, y).values), rtol=1e-9)
+
+
+@pytest.mark.parametrize("number", [float, complex])
+def test_plain_solution_is_that_of_the_kernel(number):
+    rng = np.random.default_rng(5)
+    A = rng.normal(size=(9, 3)).astype(number) * [1e-6, 1.0, 1e9]
+    y = rng.normal(size=9).astype(number)
+    if number is complex:
+        A, y = A + 1j * A[::-1], y + 1j * y[::-1]
+    found = solution(A, y)
+    assert found.dtype == number
+    expected = least_squares(A, y).solution
+    np.testing.assert_allclose(found, expected if number is float else unstretch(expected), rtol=1e-10)
+    np.testing.assert_allclose(solution(A, np.stack((y, 2 * y), axis=1))[:, 1], 2 * found, rtol=1e-10)
+
+
+def test_plain_solution_of_too_few_equations_is_the_shortest_in_scaled_unknowns():
+    np.testing.assert_allclose(solution([[1.0, 100.0, 0.0]], [2.0]), [1.0, 0.01, 0.0], rtol=1e-12)
