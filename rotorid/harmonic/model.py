@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -26,7 +26,7 @@ from rotorid.harmonic.features import (
     powers_slopes,
 )
 from rotorid.harmonic.features import split_features as _split
-from rotorid.harmonic.polynomial import ONE, Factor, Monomial, Polynomial, add, from_expression
+from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,12 +269,11 @@ def _all_features(
             expanded.append(_expand(side[0], side[1], known))
     changing = _row_by_row([part for part, _ in expanded], names_, inputs, varying)
     features: list[Feature] = []
-    for i, (text, (difference, bottom)) in enumerate(zip(equations, expanded, strict=True)):
+    for i, (text, (terms, below)) in enumerate(zip(equations, expanded, strict=True)):
         with _named(i, text):
-            for name in (name for factor in bottom for monomial, _ in factor for name, _ in monomial):
-                if name in names_ and name not in changing:
-                    raise ValueError(f"it is not linear in the signals: {name} stands in a denominator")
-            own = _split(i, difference, known, frozenset(names_), changing)
+            if lost := sorted(below & set(names_) - changing):
+                raise ValueError(f"it is not linear in the signals: {lost[0]} stands in a denominator")
+            own = _split(i, terms, known, frozenset(names_), changing)
             if not any(f.signal for f in own):
                 raise ValueError(
                     "it contains no signal; names that are neither known nor estimated are signals"
@@ -306,8 +305,8 @@ def _row_by_row(
     return frozenset(found)
 
 
-def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomial, Iterable[Factor]]:  # noqa: ANN401
-    """Left minus right side over the common denominator, and that."""
+def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomial, frozenset[str]]:  # noqa: ANN401
+    """Left minus right side over the common denominator, and the names in that."""
 
     def constant(part: Any) -> Fraction | None:  # noqa: ANN401
         if any(symbol.name not in known for symbol in part.free_symbols):
@@ -318,16 +317,14 @@ def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomi
         return exact_number(value.real)
 
     try:
-        left, right = from_expression(lhs, constant), from_expression(rhs, constant)
+        terms, below = difference(lhs, rhs, constant)
     except ZeroDivisionError:
         raise ValueError("it divides by zero") from None
-    bottom = left.bottom | right.bottom
-    difference = add(left.over(bottom), right.over(bottom), -1)
-    for monomial in difference:
+    for monomial in terms:
         for name, exponent in monomial:
             if name in known and exponent < 0 and not known[name]:
                 raise ValueError(f"it divides by {name}, which is 0")
-    return difference, (*left.bottom, *right.bottom)
+    return terms, below
 
 
 def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
