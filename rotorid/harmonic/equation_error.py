@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.text import listing
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words, ratio_words
 from rotorid.harmonic.influence import leave_one_out
@@ -20,7 +21,6 @@ from rotorid.harmonic.polynomial import ONE, Polynomial
 from rotorid.harmonic.recovery import (
     Recovery,
     System,
-    and_words,
     only_determined,
     recover,
     undetermined_parameters,
@@ -314,7 +314,7 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):
             found.append(
-                f"every multiple of {and_words(loose)} fits, for no known term that is not zero stands in "
+                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands in "
                 f"their equations: no experiment of this kind tells more than ratios; make one of them known"
             )
     if not estimate.full_rank:
@@ -348,7 +348,7 @@ def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recover
 def _notes(model: HarmonicModel, experiments: Experiments, estimate: Estimate) -> tuple[str, ...]:
     notes = []
     if model.varying:
-        notes.append(f"{and_words(model.varying)}: from the measurements, row by row")
+        notes.append(f"{listing(model.varying, 'and')}: from the measurements, row by row")
     if not experiments.stated:
         notes.append(
             "all rows count alike; state errors of the amplitudes to weight them and for honest intervals"

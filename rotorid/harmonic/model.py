@@ -16,6 +16,7 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.features import (
     CONSTANT,
+    NAME,
     Combinations,
     Feature,
     P,
@@ -385,8 +386,6 @@ def _near(name: str, names: Sequence[str]) -> str:
 
 def _by_place(equations: Sequence[str], names: Sequence[str]) -> list[str]:
     """Names in the order in which they first stand in the equations."""
-    import re
-
-    found = re.findall(r"[^\W\d]\w*", " ".join(equations))
+    found = NAME.findall(" ".join(equations))
     place = {name: i for i, name in reversed(list(enumerate(found)))}
     return sorted(names, key=lambda name: place.get(name, len(place)))

@@ -89,7 +89,9 @@ def difference(
 
     first, second = ratio(left), ratio(right)
     whole = first + _Ratio(R(-1)) * second
-    below = {name for factor in (*first.bottom, *second.bottom) for m in as_data(factor, names) for name, _ in m}
+    below = {
+        name for factor in (*first.bottom, *second.bottom) for m in as_data(factor, names) for name, _ in m
+    }
     return as_data(whole.top, names), frozenset(below)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import multipliers
+from rotorid.harmonic.features import NAME, multipliers
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.polynomial import ONE
 
@@ -152,9 +152,7 @@ def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
 
 def ask_about_case(model: HarmonicModel, experiments: Experiments) -> None:
     """Raise ValueError for a signal without readings that differs by case only from another name (x2, X2)."""
-    import re
-
-    words = re.findall(r"[^\W\d]\w*", " ".join(model.equations))
+    words = NAME.findall(" ".join(model.equations))
     for name in model.signals:
         alike = [w for w in words if w != name and w.casefold() == name.casefold()]
         values = np.nan_to_num(experiments.signals.get(name, np.zeros(1)))

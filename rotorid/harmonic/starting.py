@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import CONSTANT, multipliers
 from rotorid.harmonic.hidden import hidden_outputs
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.plausibility import passive_elements
+from rotorid.regression.search import search_from
 
 SEARCHES, AGAIN, BEST = 60, 4, 3
 """Random starts at most; enough of them with one end; how many ends are handed on."""
@@ -63,11 +64,18 @@ def starting_values(
     either = np.array([names[j] not in passive for j in open_])
     rng = np.random.default_rng(0)
     ends: list[tuple[float, FloatArray]] = []
+
+    def whole(x: FloatArray, size: FloatArray) -> FloatArray:
+        full = theta.copy()
+        full[open_] = size * 10.0**x
+        return full
+
     for _ in range(SEARCHES):
         size = scale[open_] * np.where(either, rng.choice((-1.0, 1.0), len(open_)), 1.0)
         begin = rng.uniform(-DECADES, DECADES, len(open_))
-        end = _searched(projected, theta, open_, size, begin)
-        ends = sorted([*ends, *end], key=lambda one: one[0])
+        end = search_from(lambda x, size=size: projected(whole(x, size)), begin, limit=60)
+        if end is not None and end[1].max() < 4 * DECADES:
+            ends = sorted([*ends, (end[0], whole(end[1], size))], key=lambda one: one[0])
         if ends and sum(cost < 1.01 * ends[0][0] + 1e-14 for cost, _ in ends) >= AGAIN:
             break
     if not ends:
@@ -78,29 +86,6 @@ def starting_values(
         if not any(np.allclose(point, other, rtol=1e-3) for other in apart):
             apart.append(point)
     return apart[:BEST]
-
-
-def _searched(
-    projected: Callable[[FloatArray], FloatArray],
-    theta: FloatArray,
-    open_: IntArray,
-    size: FloatArray,
-    begin: FloatArray,
-) -> list[tuple[float, FloatArray]]:
-    """Sum of squares and parameters where one search over their logarithms ends; none if they ran away."""
-    from scipy.optimize import least_squares
-
-    def whole(x: FloatArray) -> FloatArray:
-        full = theta.copy()
-        full[open_] = size * 10.0**x
-        return full
-
-    with np.errstate(all="ignore"):
-        try:
-            found = least_squares(lambda x: projected(whole(x)), begin, max_nfev=60)
-        except (ValueError, np.linalg.LinAlgError):
-            return []
-    return [(float(found.cost), whole(found.x))] if found.x.max() < 4 * DECADES else []
 
 
 def _projected(

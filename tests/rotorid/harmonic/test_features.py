@@ -105,7 +105,10 @@ def test_what_is_multiplied_out_agrees_with_numbers(text):
     slope = value.coeff(Symbol("F"))
     point = {**POINT, "F": 1 / Fraction(int(slope.p), int(slope.q))} if slope else POINT
     total = sum(
-        (x * math.prod(point.get(name, 0) ** e for name, e in monomial) for monomial, x in polynomial.items()),
+        (
+            x * math.prod(point.get(name, 0) ** e for name, e in monomial)
+            for monomial, x in polynomial.items()
+        ),
         Fraction(0),
     )
     assert total == 0 or not slope
