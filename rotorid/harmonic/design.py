@@ -21,7 +21,6 @@ from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import operator_of
 from rotorid.regression import least_squares
 
 if TYPE_CHECKING:
@@ -253,7 +252,7 @@ def _sensitivities(
     measured: Sequence[str] | None,
 ) -> FloatArray:
     """Derivatives of amplitudes over errors, (c, 2·sensors, n)."""
-    operator = operator_of(model)
+    model.check_square()
     sensors = tuple(model.outputs if measured is None else measured)
     for name in sensors:
         if name not in model.outputs:
@@ -266,12 +265,12 @@ def _sensitivities(
     loads = {name: np.full(len(w), complex(inputs[name])) for name in model.inputs}
     table = np.stack(list(loads.values()), axis=1) if loads else np.zeros((len(w), 0), dtype=complex)
     try:
-        Z, _ = operator.forced(theta, w, table, slopes=False)
+        Z, _ = model.forced(theta, w, table, slopes=False)
     except np.linalg.LinAlgError:
         raise ValueError("a candidate frequency is a resonance without damping: move it") from None
     signals = {**loads, **{name: Z[:, model.outputs.index(name)] for name in sensors}}
     plan = gather(model, w, signals, errors=errors, free=False)
-    J = compare(operator, plan).jacobian(theta)
+    J = compare(model, plan).jacobian(theta)
     return J.reshape(len(w), 2 * len(sensors), len(theta))
 
 

@@ -44,7 +44,8 @@ def real_solutions(
         Indices of the unknowns; the others have the values of `base` (n,).
     """
     try:
-        branches = _eliminate(_polynomials(system, free, base), frozenset(range(len(free))))
+        polys = {poly: _unknowns(poly) for poly in _polynomials(system, free, base)}
+        branches = _eliminate(polys, frozenset(range(len(free))))
     except _NotReducible:
         return _search(system, list(free), base), True
     out = []
@@ -90,30 +91,28 @@ def _unknowns(poly: Any) -> set[int]:  # noqa: ANN401
     return {j for j, degree in enumerate(poly.degrees()) if degree > 0}
 
 
-def _eliminate(polys: list[Any], open_: frozenset[int]) -> list[dict[int, float]]:
-    """All branches of values for the open unknowns."""
+def _eliminate(polys: dict[Any, set[int]], open_: frozenset[int]) -> list[dict[int, float]]:
+    """All branches of values for the open unknowns, from polynomials with their unknowns."""
     if not open_:
         return [{}]
-    polys = [p for p in polys if p and _unknowns(p)]
-    single = [p for p in polys if len(_unknowns(p)) == 1]
+    out: list[dict[int, float]] = []
+    single = [poly for poly, unknowns in polys.items() if len(unknowns) == 1]
     if single:
-        poly = min(single, key=lambda p: (max(p.degrees()), len(p)))
-        (j,) = _unknowns(poly)
-        out: list[dict[int, float]] = []
+        poly = min(single, key=lambda p: (p.degree(min(polys[p])), len(p)))
+        (j,) = polys[poly]
         for root in _real_roots(poly, j):
-            rest = [_replace(p, j, p.ring(root), p.ring.one) for p in polys if p is not poly]
+            value = poly.ring.ground_new(poly.ring.domain(root))
+            rest = _others(polys, poly, j, value, poly.ring.one)
             out += [{j: root, **branch} for branch in _eliminate(rest, open_ - {j})]
             if len(out) > MAX_BRANCHES:
                 raise _NotReducible
         return out
     for poly in sorted(polys, key=len):
-        for j in sorted(_unknowns(poly)):
+        for j in sorted(polys[poly]):
             top, bottom = -poly.coeff_wrt(j, 0), poly.coeff_wrt(j, 1)
             if poly.degree(j) != 1 or len(bottom) != 1 or not top:
                 continue
-            rest = [_replace(p, j, top, bottom) for p in polys if p is not poly]
-            out = []
-            for branch in _eliminate(rest, open_ - {j}):
+            for branch in _eliminate(_others(polys, poly, j, top, bottom), open_ - {j}):
                 value = _value(top, branch) / _value(bottom, branch) if _value(bottom, branch) else np.nan
                 if np.isfinite(value):
                     out.append({**branch, j: value})
@@ -121,11 +120,23 @@ def _eliminate(polys: list[Any], open_: frozenset[int]) -> list[dict[int, float]
     raise _NotReducible
 
 
+def _others(polys: dict[Any, set[int]], used: Any, j: int, top: Any, bottom: Any) -> dict[Any, set[int]]:  # noqa: ANN401
+    """The other polynomials with top/bottom for unknown j, each with its unknowns, if it has any."""
+    rest = {}
+    for poly, unknowns in polys.items():
+        if poly is used:
+            continue
+        if j in unknowns:
+            poly = _replace(poly, j, top, bottom)
+            unknowns = _unknowns(poly)
+        if unknowns:
+            rest[poly] = unknowns
+    return rest
+
+
 def _replace(poly: Any, j: int, top: Any, bottom: Any) -> Any:  # noqa: ANN401
-    """Put top/bottom for unknown j, multiplied out; what is left of terms that cancel but for rounding is 0."""
+    """Put top/bottom for unknown j, multiplied out; where terms cancel but for rounding there is nothing."""
     degree = poly.degree(j)
-    if degree <= 0:
-        return poly
     if comb(len(top) + degree - 1, degree) * len(poly) > 50 * MAX_TERMS:
         raise _NotReducible
 

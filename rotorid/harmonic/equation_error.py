@@ -80,7 +80,7 @@ class LinearFit:
 def linear_fit(model: HarmonicModel, experiments: Experiments, bounds: Bounds | None = None) -> LinearFit:
     """Regression of the equations, and the parameters that follow; errors as in `identify`."""
     rows = build_rows(model, experiments)
-    groups = _groups(rows)
+    groups = _groups(model, rows)
     fixed = np.zeros(rows.coefficients.shape[1])
     fixed[[_reference(rows, group) for group in groups]] = 1.0
     if fixed.all():  # each unknown is alone with its factor: nothing is told relative to another
@@ -253,13 +253,13 @@ def _determined(estimate: Estimate) -> FloatArray:
     return np.array(rows) if rows else np.zeros((0, len(estimate.names)))
 
 
-def _groups(rows: Rows) -> tuple[IntArray, ...]:
+def _groups(model: HarmonicModel, rows: Rows) -> tuple[IntArray, ...]:
     """Groups of regression unknowns that may all be multiplied by one factor: right sides are 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
     """
     holds = np.zeros((rows.Y.shape[1], rows.coefficients.shape[1]), dtype=bool)
-    np.logical_or.at(holds, rows.equation, rows.coefficients != 0)
+    np.logical_or.at(holds, model.equation, rows.coefficients != 0)
     linked = holds @ holds.T | np.eye(len(holds), dtype=bool)
     for _ in range(len(holds).bit_length()):
         linked = linked @ linked
@@ -314,8 +314,9 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):
             found.append(
-                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands in "
-                f"their equations: no experiment of this kind tells more than ratios; make one of them known"
+                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
+                "in their equations: no experiment of this kind tells more than ratios; make one of them "
+                "known"
             )
     if not estimate.full_rank:
         now = len(model.parameters) - len(undetermined_parameters(fit.system)[1])

@@ -111,6 +111,11 @@ def split_features(
     return features
 
 
+def exact_number(value: float) -> Fraction:
+    """The decimal number that a float is printed as: 0.1 is 1/10."""
+    return Fraction(repr(float(value)))
+
+
 def multipliers(
     powers: Sequence[int],
     products: Sequence[Monomial],

@@ -21,8 +21,8 @@ MOST_TERMS = 400
 
 def hidden_outputs(model: HarmonicModel, experiments: Experiments) -> tuple[str, ...]:
     """Outputs that no experiment has measured, where others are."""
-    unknown = np.full(len(experiments), np.nan)
-    lost = tuple(o for o in model.outputs if np.isnan(experiments.signals.get(o, unknown)).all())
+    never = np.isnan(experiments.table(model.outputs)).all(axis=0)
+    lost = tuple(model.outputs[j] for j in np.flatnonzero(never))
     return () if len(lost) == len(model.outputs) else lost
 
 

@@ -106,7 +106,7 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     """Measured and fitted mode shapes, one line per natural frequency."""
     outputs = result.model.outputs
     place = np.arange(len(outputs))
-    table = _table(result)
+    table = result.experiments.table(result.model.outputs)
     fitted, natural = _modes(result)
     for i, w in enumerate(_frequencies(result)):
         color = COLORS[i % len(COLORS)]
@@ -178,16 +178,9 @@ def _frequencies(result: Identification) -> FloatArray:
     return np.asarray(result.experiments.frequencies, dtype=float)
 
 
-def _table(result: Identification) -> ComplexArray:
-    """Measured outputs, shape (experiments, outputs)."""
-    unknown = np.full(len(result.experiments), np.nan, dtype=complex)
-    signals = result.experiments.signals
-    return np.stack([np.asarray(signals.get(name, unknown)) for name in result.model.outputs], axis=1)
-
-
 def _outputs(result: Identification) -> list[tuple[str, str, ComplexArray, BoolArray]]:
     """Color, name, measured amplitudes and which experiments, forced ones only, of every output."""
-    table, forced = _table(result), ~result.experiments.free
+    table, forced = result.experiments.table(result.model.outputs), ~result.experiments.free
     return [
         (COLORS[j % len(COLORS)], name, table[forced, j], forced)
         for j, name in enumerate(result.model.outputs)
@@ -235,12 +228,11 @@ def _curve(result: Identification) -> Curve | None:
 def _modes(result: Identification) -> tuple[ComplexArray, FloatArray]:
     """Shapes (experiments, outputs) and frequencies of the identified model; NaN where it predicts none."""
     from rotorid.harmonic.comparison import compare
-    from rotorid.harmonic.operator import operator_of
 
     unknown = np.full((len(result.experiments), len(result.model.outputs)), np.nan, dtype=complex)
     try:
         if np.isfinite(result.values).all():
-            return compare(operator_of(result.model), result.experiments).predict(result.values)
+            return compare(result.model, result.experiments).predict(result.values)
     except (ValueError, np.linalg.LinAlgError):  # a model that predicts nothing has measured points only
         pass
     return unknown, unknown[:, 0].real.copy()

@@ -82,8 +82,8 @@ def difference(
             value = constant(expression)
         if value is None:
             raise ValueError(
-                f"'{expression}' is neither a polynomial nor a fraction of polynomials in p and the parameters; "
-                f"give such a term a name and estimate that"
+                f"'{expression}' is neither a polynomial nor a fraction of polynomials in p and the "
+                "parameters; give such a term a name and estimate that"
             )
         return _Ratio(R(QQ(value.numerator, value.denominator)))
 
