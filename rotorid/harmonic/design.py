@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
@@ -95,31 +96,31 @@ class Design:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per candidate: frequency, how often chosen, expected standard deviations from it alone."""
-        import pandas as pd
-
         counts = np.bincount(self.chosen, minlength=len(self.candidates))
-        frame = pd.DataFrame({"frequency_rad_s": self.candidates, "chosen": counts})
-        for j, name in enumerate(self.parameters):
-            frame[f"{name}_std"] = self.std_alone[:, j]
-        return frame
+        alone = zip(self.parameters, self.std_alone.T, strict=True)
+        return frame(
+            (
+                Column("frequency_rad_s", self.candidates),
+                Column("chosen", counts),
+                *(Column(f"{name}_std", std) for name, std in alone),
+            )
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; None where not determined."""
-        return {
-            "frequencies_rad_s": self.frequencies.tolist(),
-            "candidates_rad_s": self.candidates.tolist(),
-            "parameters": {
-                name: {
-                    "guess": float(self.guess[j]),
-                    "std": finite(self.std[j]),
-                    "std_all_candidates": finite(self.std_all[j]),
-                    "std_alone": [finite(s) for s in self.std_alone[:, j]],
-                }
-                for j, name in enumerate(self.parameters)
-            },
-            "efficiency": finite(self.efficiency),
-            "determined": self.determined,
-        }
+        table = zip(self.parameters, self.guess, self.std, self.std_all, self.std_alone.T, strict=True)
+        return plain(
+            {
+                "frequencies_rad_s": self.frequencies,
+                "candidates_rad_s": self.candidates,
+                "parameters": {
+                    name: {"guess": guess, "std": std, "std_all_candidates": every, "std_alone": alone}
+                    for name, guess, std, every, alone in table
+                },
+                "efficiency": self.efficiency,
+                "determined": self.determined,
+            }
+        )
 
 
 def design(

@@ -133,18 +133,17 @@ def equation_error(
             warnings.append(f"{name} = {value:.6g} lies outside its bounds; output error keeps to them")
 
     theta_cov = None
-    if covariance is not None and recovery.gain is not None:
-        theta_cov = recovery.gain @ covariance @ recovery.gain.T
-        theta_cov[np.isnan(parameters), :] = theta_cov[:, np.isnan(parameters)] = np.nan
-    elif covariance is not None:
+    if covariance is not None:
         theta_cov = np.full((len(parameters), len(parameters)), np.nan)
+        if recovery.gain is not None:
+            theta_cov = recovery.gain @ covariance @ recovery.gain.T
+            theta_cov[np.isnan(parameters), :] = theta_cov[:, np.isnan(parameters)] = np.nan
     if not recovery.solutions:  # what stands alone in the equations is known all the same
-        own = [(i, model.parameters.index(w)) for i, w in enumerate(words) if w in model.parameters]
-        for i, j in own:
-            parameters[j] = values[i]
-            for k, m in own:
-                if theta_cov is not None and covariance is not None:
-                    theta_cov[j, m] = covariance[i, k]
+        own = [i for i, w in enumerate(words) if w in model.parameters]
+        at = [model.parameters.index(words[i]) for i in own]
+        parameters[at] = values[own]
+        if theta_cov is not None and covariance is not None:
+            theta_cov[np.ix_(at, at)] = covariance[np.ix_(own, own)]
     influence = None
     if recovery.gain is not None:
         change = leave_one_out(fit.K, fit.Y, fit.experiment, len(experiments))
@@ -165,15 +164,11 @@ def equation_error(
             if w not in model.parameters
         ),
         solutions=tuple(
-            {
-                name: float("nan") if recovery.undetermined[j] else float(theta[j])
-                for j, name in enumerate(model.parameters)
-            }
+            dict(zip(model.parameters, np.where(recovery.undetermined, np.nan, theta).tolist(), strict=True))
             for theta in recovery.solutions
         ),
         starts=tuple(
-            {name: float(x) for name, x in zip(model.parameters, theta, strict=True)}
-            for theta in recovery.solutions
+            dict(zip(model.parameters, theta.tolist(), strict=True)) for theta in recovery.solutions
         ),
         rank=len(fit.picks),
         condition_number=estimate.condition_number,
@@ -329,19 +324,16 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
 
 def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recovery) -> dict[str, ComplexArray]:
     """Amplitudes of the outputs, NaN in free vibration; empty where the model cannot predict them."""
-    if not recovery.solutions or len(model.outputs) != len(model.equations):
-        return {}
     driven = np.flatnonzero(~experiments.free)
-    if not len(driven):
+    if not recovery.solutions or not len(driven):
         return {}
     part = experiments.take(driven)
     try:
         found = model.predict(recovery.solutions[0], part.frequencies, part.signals, part.varying)
     except (np.linalg.LinAlgError, ValueError):
         return {}
-    out = {}
+    out = {name: np.full(len(experiments), np.nan, dtype=complex) for name in found}
     for name, values in found.items():
-        out[name] = np.full(len(experiments), np.nan, dtype=complex)
         out[name][driven] = values
     return out
 

@@ -14,7 +14,7 @@ from rotorid.harmonic.features import multipliers
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
-from rotorid.regression.estimate import Estimate, coverage_factor
+from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 LARGE = 0.12
@@ -80,7 +80,7 @@ def _refined(refine: Refine, theta: FloatArray) -> tuple[NonlinearEstimate | Non
 
 def _biased(found: Identification, fit: NonlinearEstimate, combinations: FloatArray) -> str:
     """Words where output error lies outside an interval of the linear estimate."""
-    factor = coverage_factor(None if found.errors_stated else found.dof)
+    factor = found.coverage_factor
     if found.std is None or factor is None:
         return ""
     words = [*found.parameters, *(c.words for c in found.combinations)]
