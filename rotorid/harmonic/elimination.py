@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import comb
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.harmonic.features import powers_product, powers_slopes
 from rotorid.regression.search import search_from
 
 NEARLY_REAL = 1e-6
@@ -18,22 +20,63 @@ STARTS = 300
 MAX_BRANCHES = 64
 
 
-class PolynomialSystem(Protocol):
-    """What `recovery.System` offers."""
+@dataclass(frozen=True, eq=False)
+class System:
+    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
 
-    @property
-    def exponents(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def matrix(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def values(self) -> FloatArray: ...  # noqa: D102
-    def monomials(self, theta: FloatArray) -> FloatArray: ...  # noqa: D102
-    def jacobian(self, theta: FloatArray) -> FloatArray: ...  # noqa: D102
+    Attributes
+    ----------
+    names
+        Of the n parameters.
+    exponents
+        (monomials, n).
+    matrix
+        (q, monomials).
+    values, covariance
+        (q,), and (q, q) or None.
+    below
+        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
+    """
+
+    names: tuple[str, ...]
+    exponents: FloatArray
+    matrix: FloatArray
+    values: FloatArray
+    covariance: FloatArray | None
+    below: FloatArray | None = None
+
+    def combinations(self, theta: FloatArray) -> FloatArray:
+        """Values (q,) at the parameters."""
+        return np.asarray(self.matrix @ self.monomials(theta) / self.bottom(theta))
+
+    def cleared(self) -> System:
+        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
+        if self.below is None:
+            return self
+        matrix = self.matrix - self.values[:, None] * self.below
+        values = np.where(self.below.any(axis=1), 0.0, self.values)
+        return System(self.names, self.exponents, matrix, values, None)
+
+    def bottom(self, theta: FloatArray) -> FloatArray:
+        """What stands below each sum (q,), 1 where nothing does."""
+        if self.below is None:
+            return np.ones(len(self.values))
+        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
+
+    def monomials(self, theta: FloatArray) -> FloatArray:
+        """Values (monomials,)."""
+        return powers_product(self.exponents, theta)
+
+    def jacobian(self, theta: FloatArray) -> FloatArray:
+        """Derivatives (q, n) of the combinations by the parameters."""
+        out = powers_slopes(self.exponents, theta)
+        slopes = self.matrix @ out
+        if self.below is not None:
+            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
+        return np.asarray(slopes / self.bottom(theta)[:, None])
 
 
-def real_solutions(
-    system: PolynomialSystem, free: Sequence[int], base: FloatArray
-) -> tuple[list[FloatArray], bool]:
+def real_solutions(system: System, free: Sequence[int], base: FloatArray) -> tuple[list[FloatArray], bool]:
     """Candidates for all real solutions, and whether a search was needed (which may miss some).
 
     Parameters
@@ -61,7 +104,7 @@ class _NotReducible(Exception):
     """No unknown can be eliminated by these simple means."""
 
 
-def _polynomials(system: PolynomialSystem, free: Sequence[int], base: FloatArray) -> list[Any]:
+def _polynomials(system: System, free: Sequence[int], base: FloatArray) -> list[Any]:
     """The equations in a ring of sympy, whose generators are the free unknowns."""
     from sympy import RR, ring, symbols
 
@@ -177,7 +220,7 @@ def _value(poly: Any, values: dict[int, float]) -> float:  # noqa: ANN401
     )
 
 
-def _search(system: PolynomialSystem, free: list[int], base: FloatArray) -> list[FloatArray]:
+def _search(system: System, free: list[int], base: FloatArray) -> list[FloatArray]:
     """Levenberg–Marquardt from many starting points of all magnitudes and signs."""
     size = np.where(system.values != 0, np.abs(system.values), 1.0)
     rng = np.random.default_rng(1)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import listing
+from rotorid.harmonic.elimination import System
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words, ratio_words
 from rotorid.harmonic.influence import leave_one_out
@@ -20,7 +21,6 @@ from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
 from rotorid.harmonic.recovery import (
     Recovery,
-    System,
     only_determined,
     recover,
     undetermined_parameters,

@@ -49,11 +49,10 @@ def figure_identification(result: Identification) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
     if result.experiments.free.all():
-        grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
         draw_shapes(result, figure.add_subplot(grid[:, 0]))
     else:
-        grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
         above = figure.add_subplot(grid[0, 0])
         draw_amplitudes(result, above)
         draw_phases(result, figure.add_subplot(grid[1, 0], sharex=above))
@@ -79,10 +78,7 @@ def draw_amplitudes(result: Identification, axes: Axes) -> None:
         axes.set_yscale("log")
         axes.set_ylim(smallest / 2, largest * 2)
     axes.set(xlabel="frequency, rad/s", ylabel="amplitude")
-    axes.grid(alpha=0.3)
-    axes.set_title("measured (points) and identified model (lines)", fontsize=10)
-    if len(result.model.outputs) <= MANY:
-        axes.legend(frameon=False, fontsize=9)
+    _finish(axes, "measured (points) and identified model (lines)", len(result.model.outputs))
 
 
 def draw_phases(result: Identification, axes: Axes) -> None:
@@ -117,20 +113,17 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     axes.set_xticks(place, outputs)
     axes.set(ylabel="shape")
     fit = " and identified model (lines)" if np.isfinite(fitted).any() else ""
-    axes.set_title(f"shapes: measured (points){fit}", fontsize=10)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=9)
+    _finish(axes, f"shapes: measured (points){fit}")
 
 
 def draw_residuals(result: Identification, axes: Axes) -> None:
     """Residuals of each equation (or output) and experiment: real part filled, imaginary part open."""
     place = np.arange(len(result.experiments))
-    width = min(0.6, 0.12 * len(result.residual_names))
+    number = len(result.residual_names)
+    width = min(0.6, 0.12 * number)
     for j, name in enumerate(result.residual_names):
         color = COLORS[j % len(COLORS)]
-        shift = place + (j - (len(result.residual_names) - 1) / 2) * width / max(
-            1, len(result.residual_names)
-        )
+        shift = place + (j - (number - 1) / 2) * width / number
         values = result.residuals[:, j]
         axes.plot(shift, values.real, "o", color=color, ms=5, label=name)
         if not result.experiments.free.all():
@@ -142,10 +135,7 @@ def draw_residuals(result: Identification, axes: Axes) -> None:
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.set(xlabel="experiment", ylabel="residual")
     parts = "" if result.experiments.free.all() else ": real part filled, imaginary open"
-    axes.set_title(f"residuals{parts} (rms {result.residual_rms:.3g})", fontsize=10)
-    axes.grid(alpha=0.3)
-    if len(result.residual_names) <= MANY:
-        axes.legend(frameon=False, fontsize=9)
+    _finish(axes, f"residuals{parts} (rms {result.residual_rms:.3g})", len(result.residual_names))
 
 
 def draw_correlations(result: Identification, axes: Axes) -> None:
@@ -172,6 +162,14 @@ def draw_correlations(result: Identification, axes: Axes) -> None:
             color = "white" if abs(value) > 0.6 else "black"
             axes.text(j, i, f"{value:.2f}", ha="center", va="center", fontsize=8, color=color)
     axes.set_title("correlations of the parameters", fontsize=10)
+
+
+def _finish(axes: Axes, title: str, names: int = 0) -> None:
+    """Grid, title, and a legend where it has not too many names."""
+    axes.grid(alpha=0.3)
+    axes.set_title(title, fontsize=10)
+    if names <= MANY:
+        axes.legend(frameon=False, fontsize=9)
 
 
 def _frequencies(result: Identification) -> FloatArray:
@@ -207,15 +205,13 @@ def _curve(result: Identification) -> Curve | None:
         values = np.array([result.solutions[0].get(name, np.nan) for name in model.parameters])
     forced = ~data.free
     w = _frequencies(result)[forced]
-    if not np.isfinite(values).all() or len(w) < 2 or len(model.outputs) != len(model.equations):
-        return None
-    if model.varying:
+    if model.varying or not np.isfinite(values).all() or len(w) < 2:
         return None
     # what is measured may lie at a peak: the line passes exactly there
     grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
     inputs: dict[str, ComplexArray] = {}
     for name in model.inputs:
-        given = np.asarray(data.signals.get(name, np.full(len(data), np.nan)))[forced]
+        given = data.table([name])[forced, 0]
         if np.isnan(given).any() or not np.allclose(given, given[0], rtol=1e-9, atol=0.0):
             return None
         inputs[name] = np.full(len(grid), given[0])

@@ -10,8 +10,8 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.text import listing
-from rotorid.harmonic.elimination import real_solutions
-from rotorid.harmonic.features import NAME, powers_product, powers_slopes
+from rotorid.harmonic.elimination import System, real_solutions
+from rotorid.harmonic.features import NAME
 from rotorid.regression import echelon, least_squares, solution
 
 Bounds = Mapping[str, tuple[float, float]]
@@ -20,61 +20,6 @@ GAUGE = 0.7318
 """Value given to a parameter that nothing determines while the others are solved for."""
 SAME = 1e-6
 """Relative difference below which two solutions are one."""
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
-
-    Attributes
-    ----------
-    names
-        Of the n parameters.
-    exponents
-        (monomials, n).
-    matrix
-        (q, monomials).
-    values, covariance
-        (q,), and (q, q) or None.
-    below
-        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
-    """
-
-    names: tuple[str, ...]
-    exponents: FloatArray
-    matrix: FloatArray
-    values: FloatArray
-    covariance: FloatArray | None
-    below: FloatArray | None = None
-
-    def combinations(self, theta: FloatArray) -> FloatArray:
-        """Values (q,) at the parameters."""
-        return np.asarray(self.matrix @ self.monomials(theta) / self._bottom(theta))
-
-    def cleared(self) -> System:
-        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
-        if self.below is None:
-            return self
-        matrix = self.matrix - self.values[:, None] * self.below
-        values = np.where(self.below.any(axis=1), 0.0, self.values)
-        return System(self.names, self.exponents, matrix, values, None)
-
-    def _bottom(self, theta: FloatArray) -> FloatArray:
-        if self.below is None:
-            return np.ones(len(self.values))
-        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
-
-    def monomials(self, theta: FloatArray) -> FloatArray:
-        """Values (monomials,)."""
-        return powers_product(self.exponents, theta)
-
-    def jacobian(self, theta: FloatArray) -> FloatArray:
-        """Derivatives (q, n) of the combinations by the parameters."""
-        out = powers_slopes(self.exponents, theta)
-        slopes = self.matrix @ out
-        if self.below is not None:
-            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
-        return np.asarray(slopes / self._bottom(theta)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +173,7 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
 def _misfit(system: System, theta: FloatArray) -> float:
     """Largest error of a combination in units of what rounding and four standard deviations allow."""
     mu = system.monomials(theta)
-    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system._bottom(theta))
+    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system.bottom(theta))
     size += np.abs(system.values) + 1e-300
     error = np.abs(system.combinations(theta) - system.values) / size
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -127,6 +127,10 @@ class Identification(Uncertain):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
         names, correlation, influence = self.parameters, self.correlation, self.influence
+
+        def by_name(values: Sequence[Any]) -> dict[str, Any]:
+            return dict(zip(names, values, strict=True))
+
         return plain(
             {
                 "method": self.method,
@@ -141,16 +145,12 @@ class Identification(Uncertain):
                 "residual_rms": self.residual_rms,
                 "left_out": self.left_out,
                 "warnings": self.warnings,
-                "correlation": None
-                if correlation is None
-                else {
-                    a: dict(zip(names, row, strict=True)) for a, row in zip(names, correlation, strict=True)
-                },
+                "correlation": None if correlation is None else by_name([*map(by_name, correlation)]),
                 "residuals": rows(_residual_columns(self)),
                 "influence": None
                 if influence is None
                 else [
-                    {"experiment": experiment, "change": dict(zip(names, row, strict=True))}
+                    {"experiment": experiment, "change": by_name(row)}
                     for experiment, row in zip(self.experiments.names, influence, strict=True)
                 ],
             }
