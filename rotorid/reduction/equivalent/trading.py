@@ -14,7 +14,7 @@ from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
 from rotorid.base.json import finite, floats
 from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
-from rotorid.reduction.equivalent.matching import match
+from rotorid.reduction.equivalent.matching import MOST, matching_masses
 from rotorid.reduction.equivalent.plane import plane_at_rest
 from rotorid.reduction.equivalent.vibration import mac, natural_frequencies
 from rotorid.reduction.placement_result import ALIKE
@@ -46,7 +46,7 @@ class TradeOff:
     condition
         Condition number of each regression, shape (r,); NaN for matching sets.
     complete
-        Whether the matching sets are proven to be all (up to three masses).
+        Whether matching sets were searched: up to three masses, and then these are all.
     rotor_frequencies, rotor_shapes
         Of the rotor's plane at rest: rad/s (n,), and at the nodes (n, n).
     rotor
@@ -124,9 +124,10 @@ class TradeOff:
         n, count = len(self.nodes), int(self.matching.sum())
         if n == 1:
             return "One mass has no shape to compare: its MAC is always 1."
-        if not count:
-            which = "" if self.complete else " was found; there may be one"
-            text = f"No set of positive masses at these nodes has all {n} frequencies{which}. "
+        if not self.complete:
+            text = f"Masses that match all frequencies are searched for up to {MOST} masses only. "
+        elif not count:
+            text = f"No set of positive masses at these nodes has all {n} frequencies. "
         else:
             text = (
                 f"{counted(count, 'different set')} of masses {'has' if count == 1 else 'have'} the rotor's "
@@ -191,10 +192,10 @@ def trade_off(
     full = fem.critical_speeds(plane, n)
     shapes = full.shapes[np.array(places) - 1]
     names, masses, condition, lost = _regressions(alpha, full.frequencies, shapes, normalise)
-    sets = match(alpha, full.frequencies)
-    names += [f"matching set {i + 1}" for i in range(len(sets.masses))]
+    sets = matching_masses(alpha, full.frequencies) if n <= MOST else np.empty((0, n))
+    names += [f"matching set {i + 1}" for i in range(len(sets))]
     matching = np.arange(len(names)) >= len(masses)
-    m = np.concatenate((np.array(masses).reshape(-1, n), sets.masses))
+    m = np.concatenate((np.array(masses).reshape(-1, n), sets))
     pairs = [natural_frequencies(alpha, row) for row in m]
     frequencies = np.array([omega for omega, _ in pairs]).reshape(-1, n)
     agreement = np.array([_paired(model, shapes) for _, model in pairs]).reshape(-1, n)
@@ -207,12 +208,12 @@ def trade_off(
         frequencies=frequencies,
         relative_error=frequencies / full.frequencies - 1.0,
         mac=agreement,
-        condition=np.concatenate((condition, np.full(len(sets.masses), np.nan))),
-        complete=sets.complete,
+        condition=np.concatenate((condition, np.full(len(sets), np.nan))),
+        complete=n <= MOST,
         rotor_frequencies=full.frequencies,
         rotor_shapes=shapes,
         rotor=rotor,
-        warnings=(*said, *full.warnings, *lost, *sets.warnings, *_unphysical(names, m)),
+        warnings=(*said, *full.warnings, *lost, *_unphysical(names, m)),
     )
 
 
