@@ -77,8 +77,8 @@ def matching_masses(compliance: ArrayLike, frequencies: ArrayLike) -> FloatArray
         if matches and not any(np.abs(np.log(m / known)).max() < SAME for known in sets):
             sets.append(m)
     # rounded: equal first masses are equal only to rounding
-    order = np.lexsort(np.round(np.log(sets), 7).T[::-1]) if sets else []
-    return np.array([sets[i] for i in order]).reshape(-1, len(omega))
+    sets.sort(key=lambda m: np.round(np.log(m), 7).tolist())
+    return np.array(sets).reshape(-1, len(omega))
 
 
 def _checked(compliance: ArrayLike, frequencies: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -22,6 +22,8 @@ from numpy.typing import ArrayLike
 import fem
 from fem.matrices.bands import assemble, rounding_error
 from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,25 +78,22 @@ class Separated:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return {
-            "nodes": list(self.nodes),
-            "positions_m": self.positions.tolist(),
-            "supports": list(self.supports),
-            "span_m": self.span,
-            "delta_m_per_N": self.delta.tolist(),
-            "fractions": self.fractions.tolist(),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "positions_m": self.positions,
+                "supports": self.supports,
+                "span_m": self.span,
+                "delta_m_per_N": self.delta,
+                "fractions": self.fractions,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """A row per mass: node, position from the left support, shares of both supports, row of δ."""
-        import pandas as pd
-
-        frame = pd.DataFrame({"node": self.nodes, "position_m": self.positions})
-        for s, node in enumerate(self.supports):
-            frame[f"share_{node}"] = self.fractions[:, s]
-        for j, node in enumerate(self.nodes):
-            frame[f"delta_{node}_m_per_N"] = self.delta[:, j]
-        return frame
+        shares = (Column(f"share_{node}", self.fractions[:, s]) for s, node in enumerate(self.supports))
+        delta = (Column(f"delta_{node}_m_per_N", self.delta[:, j]) for j, node in enumerate(self.nodes))
+        return frame((Column("node", self.nodes), Column("position_m", self.positions), *shares, *delta))
 
 
 def separate(rotor: fem.Rotor, nodes: Sequence[int]) -> Separated:

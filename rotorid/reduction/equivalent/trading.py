@@ -11,7 +11,8 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
-from rotorid.base.json import finite, floats
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, numbered, rows
 from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
 from rotorid.reduction.equivalent.matching import MOST, matching_masses
@@ -76,36 +77,44 @@ class TradeOff:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per alternative: masses, frequencies, errors, MAC, condition number."""
-        import pandas as pd
-
-        columns: dict[str, Any] = {"model": self.names, "matching": self.matching}
-        columns |= {f"mass_{node}_kg": self.masses[:, i] for i, node in enumerate(self.nodes)}
-        for k in range(len(self.nodes)):
-            columns[f"frequency_{k + 1}_rad_s"] = self.frequencies[:, k]
-            columns[f"relative_error_{k + 1}"] = self.relative_error[:, k]
-            columns[f"mac_{k + 1}"] = self.mac[:, k]
-        return pd.DataFrame({**columns, "condition_number": self.condition})
+        masses = [Column(f"mass_{node}_kg", self.masses[:, i]) for i, node in enumerate(self.nodes)]
+        modes = zip(
+            numbered("frequency_{}_rad_s", self.frequencies),
+            numbered("relative_error_{}", self.relative_error),
+            numbered("mac_{}", self.mac),
+            strict=True,
+        )
+        return frame(
+            (
+                Column("model", self.names),
+                Column("matching", self.matching),
+                *masses,
+                *(column for mode in modes for column in mode),
+                Column("condition_number", self.condition),
+            )
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: the nodes, the rotor's frequencies, and a document per alternative."""
-        return {
-            "nodes": list(self.nodes),
-            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
-            "matching_sets_complete": self.complete,
-            "alternatives": [
-                {
-                    "model": name,
-                    "matching": bool(self.matching[r]),
-                    "masses_kg": self.masses[r].tolist(),
-                    "natural_frequencies_rad_s": floats(self.frequencies[r]),
-                    "relative_error": floats(self.relative_error[r]),
-                    "mac": floats(self.mac[r]),
-                    "condition_number": finite(self.condition[r]),
-                }
-                for r, name in enumerate(self.names)
-            ],
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "rotor_frequencies_rad_s": self.rotor_frequencies,
+                "matching_sets_complete": self.complete,
+                "alternatives": rows(
+                    (
+                        Column("model", self.names),
+                        Column("matching", self.matching),
+                        Column("masses_kg", self.masses),
+                        Column("natural_frequencies_rad_s", self.frequencies),
+                        Column("relative_error", self.relative_error),
+                        Column("mac", self.mac),
+                        Column("condition_number", self.condition),
+                    )
+                ),
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """Text for an engineer: two lines per alternative, and the trap in words."""
@@ -227,10 +236,10 @@ def _regressions(
     lost: list[str] = []
     choices: tuple[Literal["equal", "relative"], ...] = ("equal", "relative")
     for k in range(1, len(omega) + 1):
-        for rows in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
-            name = f"regression, {counted(k, 'mode')}" + (f", {rows} rows" if k > 1 else "")
+        for weights in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
+            name = f"regression, {counted(k, 'mode')}" + (f", {weights} rows" if k > 1 else "")
             try:
-                fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=rows)
+                fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=weights)
             except ValueError as problem:
                 lost.append(f"{name}: left out, {problem}")
                 continue
