@@ -16,7 +16,7 @@ from rotorid.base.result import Column, frame, numbered, rows
 from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
 from rotorid.reduction.equivalent.matching import MOST, matching_masses
-from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.plane import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.vibration import mac, natural_frequencies
 from rotorid.reduction.placement_result import ALIKE
 
@@ -192,14 +192,12 @@ def trade_off(
     -----
     Regressions that these modes do not determine are left out and named in `warnings`. [S] 1.10.
     """
-    places = tuple(rotor.node(node) for node in nodes)
-    n = len(places)
-    if n == 0 or len(set(places)) != n:
-        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    at = mass_nodes(rotor, nodes)
+    n = len(at)
     plane, said = plane_at_rest(rotor, speed)
-    alpha = fem.compliance(plane, places)
+    alpha = fem.compliance(plane, at)
     full = fem.critical_speeds(plane, n)
-    shapes = full.shapes[np.array(places) - 1]
+    shapes = full.shapes[np.array(at) - 1]
     names, masses, condition, lost = _regressions(alpha, full.frequencies, shapes, normalise)
     sets = matching_masses(alpha, full.frequencies) if n <= MOST else np.empty((0, n))
     names += [f"matching set {i + 1}" for i in range(len(sets))]
@@ -210,7 +208,7 @@ def trade_off(
     agreement = np.array([_paired(model, shapes) for _, model in pairs]).reshape(-1, n)
     agreement[np.isnan(frequencies)] = np.nan
     return TradeOff(
-        nodes=places,
+        nodes=at,
         names=tuple(names),
         matching=matching,
         masses=m,
