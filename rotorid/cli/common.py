@@ -54,11 +54,6 @@ RotorArgument = Annotated[
         metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml).", show_default=False
     ),
 ]
-OperatingOption = Annotated[
-    str | None,
-    typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
-]
-
 PhaseOption = Annotated[
     str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
 ]
