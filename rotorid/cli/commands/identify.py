@@ -20,7 +20,6 @@ DataArgument = Annotated[
     typer.Argument(
         metavar="DATA",
         help="Measured amplitudes, .csv or .xlsx; only --design does without.",
-        show_default=False,
     ),
 ]
 say = options_of(IdentifyOptions)
