@@ -165,7 +165,9 @@ def _aliases(problem: Problem, theta: FloatArray) -> list[str]:
         steps = np.diff(record.t)
         if not model.linear_driven or len(steps) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
             continue
-        fastest = float(np.abs(np.linalg.eigvals(model.matrices(theta)[0]).imag).max())
+        fastest = float(
+            np.abs(np.linalg.eigvals(model.matrices(theta)[0, :, : len(model.states)]).imag).max()
+        )
         if fastest * steps.mean() > np.pi:
             return [
                 f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "

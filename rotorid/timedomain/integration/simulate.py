@@ -168,25 +168,14 @@ def _exact(
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
             "or auto"
         )
-    a, b, da, db = model.matrices(system.theta)
-    n, k = len(x0), s0.shape[1]
-    if not (model.driven or b.any() or db.any()):
-        return *propagation.propagate(t, x0, s0, a, da[:k]), "expm"
-    # more states: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
-    nu = u.shape[1] if model.driven else 0
-    size = n + 1 + 2 * nu
-    matrix, derivatives = np.zeros((size, size)), np.zeros((k, size, size))
-    matrix[:n, :n], matrix[:n, n] = a, b
-    derivatives[:, :n, :n], derivatives[:, :n, n] = da[:k], db[:k]
-    if not nu:
-        z, s = propagation.propagate(t, np.append(x0, 1.0), np.vstack([s0, np.zeros(k)]), matrix, derivatives)
-        return z[:, :n], s[:, :n], "expm"
-    inputs, slopes = model.input_matrices(system.theta)
-    matrix[:n, n + 1 : n + 1 + nu], derivatives[:, :n, n + 1 : n + 1 + nu] = inputs, slopes[:k]
-    matrix[n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
-    growth = np.diff(u, axis=0) / np.diff(t)[:, None]
-    drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1], growth], axis=1)
-    return *propagation.propagate_driven(t, x0, s0, matrix, derivatives, drive), "expm"
+    n, k, nu = len(x0), s0.shape[1], u.shape[1] if model.driven else 0
+    # behind x: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
+    matrix = np.zeros((1 + k, n + 1 + 2 * nu, n + 1 + 2 * nu))
+    matrix[:, :n, : n + 1 + nu] = model.matrices(system.theta)[: 1 + k, :, : n + 1 + nu]
+    matrix[0, n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
+    growth = np.diff(u[:, :nu], axis=0) / np.diff(t)[:, None]
+    drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1, :nu], growth], axis=1)
+    return *propagation.propagate(t, x0, s0, matrix[0], matrix[1:], drive), "expm"
 
 
 def _heun(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:

@@ -145,7 +145,7 @@ def _collocated(
     model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray
 ) -> tuple[FloatArray, Curve]:
     u = inputs_of(model, record)
-    constant = model.matrices(theta)[0] if model.linear_driven else None
+    constant = model.matrices(theta)[0, :, : len(model.states)] if model.linear_driven else None
 
     def equations(t: FloatArray) -> tuple[FloatArray, FloatArray]:
         x = curve(t)

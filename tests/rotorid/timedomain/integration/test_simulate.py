@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.timedomain import Record, SimulationError, ode_model, simulate
-from rotorid.timedomain.integration.matrix_exponential import expm_and_derivatives
+from rotorid.timedomain.integration.propagation import expm_and_derivatives
 
 CHAIN_START = {"y1": 0.5, "v1": 0.1, "y2": -0.2, "v2": -0.1, "y3": 0.3, "v3": 0.1}
 
