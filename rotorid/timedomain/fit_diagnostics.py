@@ -20,6 +20,8 @@ from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
 
 PROBES = 100_001
 """Times at which pulses are looked for."""
+ROUNDING = 1e-14
+"""Difference of two integrations, relative to the record, that is none."""
 INSENSITIVE = 1e-7
 """Change of the outputs, relative to their size, by a parameter changing by all of itself."""
 
@@ -128,7 +130,10 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     else:
         finer = problem.again(problem.integrator, max(problem.rtol / 100, 1e-13))
     exact = finer.evaluate(found.solution)[0]
-    change: FloatArray = solution(J, r - exact, rcond=RCOND)
+    missed = r - exact
+    if np.linalg.norm(missed) <= ROUNDING * np.linalg.norm(problem.data):
+        return np.zeros(len(found.names))
+    change: FloatArray = solution(J, missed, rcond=RCOND)
     return change
 
 
