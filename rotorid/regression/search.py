@@ -60,6 +60,7 @@ def drive(
     loss: str,
     stated: bool,
     limit: int,
+    tolerance: float = TOLERANCE,
 ) -> tuple[FloatArray, bool, str]:
     """Scipy's trust-region search; a robust loss without stated errors finds its own scale first."""
     from scipy.optimize import least_squares as driver
@@ -84,9 +85,9 @@ def drive(
                 x_scale=x_scale,
                 loss=name,
                 f_scale=search.f_scale,
-                ftol=TOLERANCE,
-                xtol=TOLERANCE,
-                gtol=TOLERANCE,
+                ftol=tolerance,
+                xtol=tolerance,
+                gtol=tolerance,
                 max_nfev=limit,
             )
         x, ok = np.asarray(found.x), found.status > 0

@@ -73,6 +73,7 @@ def propagate(
         x (n, n_x) and S = ∂x/∂θ (n, n_x, k); not finite where they overflow.
     """
     n, nx, k, m = len(times), len(x0), s0.shape[1], len(system)
+    moving = np.flatnonzero(derivatives.any(axis=(1, 2)))  # others act by the initial values alone
     x, s = np.empty((n, nx, 1)), np.empty((n, nx, k))
     x[0, :, 0], s[0] = x0, s0
     kinds, which = _distinct(np.diff(times), SAME_STEP * float(np.abs(times).max()))
@@ -82,13 +83,16 @@ def propagate(
             part, now = slice(low + 1, low + 1 + size), slice(low, low + size)
             used, place = np.unique(which[now], return_inverse=True)
             h = kinds[used]
-            P, D = expm_and_derivatives(h[:, None, None] * system, h[:, None, None, None] * derivatives)
+            P, D = expm_and_derivatives(
+                h[:, None, None] * system, h[:, None, None, None] * derivatives[moving]
+            )
             if len(h) > 1:
                 P, D = P[place], D[place]
             w = drive[now, :, None]
             x[part] = _recurrence(P[:, :nx, :nx], x[low], P[:, :nx, nx:] @ w)
             z = np.concatenate([x[low : low + len(w)], w], axis=1)
-            bend = (D[:, :, :nx] @ z[:, None])[..., 0].swapaxes(1, 2)
+            bend = np.zeros((len(w), nx, k))
+            bend[:, :, moving] = (D[:, :, :nx] @ z[:, None])[..., 0].swapaxes(1, 2)
             s[part] = _recurrence(P[:, :nx, :nx], s[low], bend)
     return x[:, :, 0], s
 

@@ -20,10 +20,8 @@ from rotorid.timedomain.models.record import Record, from_t0
 
 __all__ = ["INTEGRATORS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
 
-Integrate = Callable[
-    [Augmented, FloatArray, FloatArray, float, float | None], tuple[FloatArray, FloatArray, str]
-]
-"""System, initial states and sensitivities, rtol, atol → both at all times, and the method used."""
+Integrate = Callable[[Augmented, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray, str]]
+"""System, initial states and sensitivities, rtol → both at all times, and the method used."""
 Step = Callable[[Augmented, float, float, FloatArray], FloatArray]
 """System, time now and then, states → states then."""
 
@@ -59,7 +57,6 @@ def simulate(
     *,
     method: str = "auto",
     rtol: float = 1e-10,
-    atol: float | None = None,
     sensitivities: bool = True,
     x0: ArrayLike | None = None,
 ) -> Trajectory:
@@ -76,8 +73,8 @@ def simulate(
     method
         One of `INTEGRATORS`; "auto" with the extra `rotorid[fast]` takes "taylor" for a model that has
         needed many steps.
-    rtol, atol
-        Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
+    rtol
+        Relative tolerance of "dop853" and "lsoda"; the absolute one follows the size of each state.
     sensitivities
         Whether to solve for the derivatives too.
     x0
@@ -100,9 +97,7 @@ def simulate(
         )
     longer = record if x0 is not None else from_t0(model, record)
     if longer is not record:
-        run = simulate(
-            model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities
-        )
+        run = simulate(model, values, longer, method=method, rtol=rtol, sensitivities=sensitivities)
         return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
     t = record.t
@@ -112,7 +107,7 @@ def simulate(
         system = Augmented(model, values, t, u, sensitivities)
         x_0, s_0 = _start(model, values, x0, sensitivities)
         check_finite(model, t[:1], x_0[None], s_0[None])
-        x, s, used = integrate(system, x_0, s_0, rtol, atol)
+        x, s, used = integrate(system, x_0, s_0, rtol)
         check_finite(model, t, x, s)
     y = model.h(t, x, values, u)
     y_theta = np.zeros((*y.shape, len(values)))
@@ -153,14 +148,14 @@ def _start(
 
 
 def _auto(
-    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
 ) -> tuple[FloatArray, FloatArray, str]:
     exact = system.model.linear_driven
-    return (_exact if exact else adaptive.integrate)(system, x0, s0, rtol, atol)
+    return (_exact if exact else adaptive.integrate)(system, x0, s0, rtol)
 
 
 def _exact(
-    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
 ) -> tuple[FloatArray, FloatArray, str]:
     model, t, u = system.model, system.t, system.u
     if not model.linear_driven:
@@ -195,7 +190,7 @@ def _stepwise(name: str, step: Step) -> Integrate:
     """One step from sample to sample."""
 
     def integrate(
-        system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+        system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
     ) -> tuple[FloatArray, FloatArray, str]:
         table = np.empty((len(system.t), system.size))
         table[0] = z = system.pack(x0, s0)
