@@ -27,8 +27,11 @@ RCOND = 1e-10
 class Search:
     """Residuals and Jacobian of one search, with the accepted points it passed."""
 
-    def __init__(self, residual: Function, jacobian: Function, loss: str) -> None:
+    def __init__(
+        self, residual: Function, jacobian: Function, loss: str, tolerance: float = TOLERANCE
+    ) -> None:
         self.residual = residual
+        self.tolerance = tolerance
         self.slopes = jacobian
         self.loss = loss
         self.f_scale = 1.0
@@ -60,7 +63,6 @@ def drive(
     loss: str,
     stated: bool,
     limit: int,
-    tolerance: float = TOLERANCE,
 ) -> tuple[FloatArray, bool, str]:
     """Scipy's trust-region search; a robust loss without stated errors finds its own scale first."""
     from scipy.optimize import least_squares as driver
@@ -85,9 +87,9 @@ def drive(
                 x_scale=x_scale,
                 loss=name,
                 f_scale=search.f_scale,
-                ftol=tolerance,
-                xtol=tolerance,
-                gtol=tolerance,
+                ftol=search.tolerance,
+                xtol=search.tolerance,
+                gtol=search.tolerance,
                 max_nfev=limit,
             )
         x, ok = np.asarray(found.x), found.status > 0

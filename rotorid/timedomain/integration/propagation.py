@@ -74,6 +74,7 @@ def propagate(
     """
     n, nx, k, m = len(times), len(x0), s0.shape[1], len(system)
     moving = np.flatnonzero(derivatives.any(axis=(1, 2)))  # others act by the initial values alone
+    slopes = derivatives[moving]
     x, s = np.empty((n, nx, 1)), np.empty((n, nx, k))
     x[0, :, 0], s[0] = x0, s0
     kinds, which = _distinct(np.diff(times), SAME_STEP * float(np.abs(times).max()))

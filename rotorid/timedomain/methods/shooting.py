@@ -91,9 +91,7 @@ def shoot(
         search.weight = weight
         search.forget()
         way = Search(search.residual, search.jacobian, "linear")
-        z, _, _ = drive(
-            way, z, low, high, None, "linear", stated=True, limit=max_iterations, tolerance=TOLERANCE
-        )
+        z, _, _ = drive(way, z, low, high, None, "linear", stated=True, limit=max_iterations)
     return z[:n]
 
 
