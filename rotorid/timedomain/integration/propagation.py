@@ -84,9 +84,7 @@ def propagate(
             part, now = slice(low + 1, low + 1 + size), slice(low, low + size)
             used, place = np.unique(which[now], return_inverse=True)
             h = kinds[used]
-            P, D = expm_and_derivatives(
-                h[:, None, None] * system, h[:, None, None, None] * derivatives[moving]
-            )
+            P, D = expm_and_derivatives(h[:, None, None] * system, h[:, None, None, None] * slopes)
             if len(h) > 1:
                 P, D = P[place], D[place]
             w = drive[now, :, None]

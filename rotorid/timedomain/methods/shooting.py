@@ -90,7 +90,7 @@ def shoot(
     for weight in STRICTNESS:
         search.weight = weight
         search.forget()
-        way = Search(search.residual, search.jacobian, "linear")
+        way = Search(search.residual, search.jacobian, "linear", TOLERANCE)
         z, _, _ = drive(way, z, low, high, None, "linear", stated=True, limit=max_iterations)
     return z[:n]
 
