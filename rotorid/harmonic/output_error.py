@@ -150,8 +150,6 @@ def _joined(rounds: Sequence[NonlinearEstimate]) -> NonlinearEstimate:
     last = rounds[-1]
     return replace(
         last,
-        start=rounds[0].start,
-        iterations=iterations,
         message=f"converged in {counted(iterations, 'iteration')}" if last.converged else last.message,
         history=np.concatenate([rounds[0].history, *(fit.history[1:] for fit in rounds[1:])]),
         costs=np.concatenate([rounds[0].costs, *(fit.costs[1:] for fit in rounds[1:])]),
@@ -197,5 +195,5 @@ def _result(fit: NonlinearEstimate, comparison: Comparison) -> OutputError:
         experiment=comparison.experiment,
         relative=dict(zip(outputs, relative.T, strict=True)),
         left_out=comparison.left_out,
-        warnings=(*comparison.warnings, *fit.warnings),
+        warnings=(*comparison.warnings, *fit.end_warnings),
     )

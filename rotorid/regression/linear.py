@@ -226,21 +226,24 @@ def least_squares(  # noqa: PLR0915
     )
 
 
-def gain(A: ArrayLike) -> ComplexArray:
+def gain(A: ArrayLike, *, rcond: float = 1e-14) -> Any:  # noqa: ANN401
     """Matrix G with the least-squares solution x = G y of A x = y, for many matrices at once.
 
     Parameters
     ----------
     A
-        Of full column rank, (…, m, n); columns are scaled before its SVD.
+        Real or complex, (…, m, n); columns are scaled before its SVD.
+    rcond
+        Scaled singular values below `rcond` times the largest count as zero.
 
     Returns
     -------
-    (…, n, m), complex.
+    (…, n, m), real where A is.
     """
-    K = np.asarray(A, dtype=complex)
-    scale = np.linalg.norm(K, axis=-2, keepdims=True)
-    return np.asarray(np.linalg.pinv(K / scale, rcond=1e-14) / np.swapaxes(scale, -1, -2))
+    K = np.asarray(A)
+    size = np.linalg.norm(K, axis=-2, keepdims=True)
+    scale = np.where(size > 0, size, 1.0)
+    return np.asarray(np.linalg.pinv(K / scale, rcond=rcond) / np.swapaxes(scale, -1, -2))
 
 
 def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noqa: ANN401

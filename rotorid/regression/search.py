@@ -28,8 +28,11 @@ RCOND = 1e-10
 class Search:
     """Residuals and Jacobian of one search, with the accepted points it passed."""
 
-    def __init__(self, residual: Function, jacobian: Function, loss: str) -> None:
+    def __init__(
+        self, residual: Function, jacobian: Function, loss: str, tolerance: float = TOLERANCE
+    ) -> None:
         self.residual = residual
+        self.tolerance = tolerance
         self.slopes = jacobian
         self.loss = loss
         self.f_scale = 1.0
@@ -85,9 +88,9 @@ def drive(
                 x_scale=x_scale,
                 loss=name,
                 f_scale=search.f_scale,
-                ftol=TOLERANCE,
-                xtol=TOLERANCE,
-                gtol=TOLERANCE,
+                ftol=search.tolerance,
+                xtol=search.tolerance,
+                gtol=search.tolerance,
                 max_nfev=limit,
             )
         x, ok = np.asarray(found.x), found.status > 0
