@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.data.limits import Limits
+from balancing.mounting.attainable import Attainable, nearest
 from balancing.mounting.discrete_relax import best_form, form, project_out, relax
-from balancing.mounting.discrete_search import Found, Leaves, nearest, polish, search
-from balancing.mounting.discrete_sets import LONGEST, Attainable
-from balancing.mounting.discrete_steps import StepSums, attainable
+from balancing.mounting.discrete_search import Found, Leaves, polish, search
+from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.piece_sums import LONGEST, PieceSums
 from balancing.solvers.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -168,9 +169,12 @@ class _Joint:
                 raise ValueError(
                     f"the readings do not tell how much plane {names[p]} needs: state its largest weight"
                 )
-            one = attainable(holes, own, heaviest, float(reach[p]), LONGEST // len(planes))
-            free = isinstance(one, StepSums) and not holes.step and one.surround and np.isinf(heaviest)
-            self.sets.append(None if free else one)
+            if not holes.free_amounts:
+                self.sets.append(PieceSums(holes, own, heaviest, longest=LONGEST // len(planes)))
+                continue
+            one = FreeAmounts(holes, own, heaviest, float(reach[p]))
+            continuous = not holes.step and one.surround and np.isinf(heaviest)
+            self.sets.append(None if continuous else one)
         self.fixed = np.array([p for p, s in enumerate(self.sets) if s is not None], dtype=np.int64)
         self.free = np.array([p for p, s in enumerate(self.sets) if s is None], dtype=np.int64)
         self.own = [s for s in self.sets if s is not None]
@@ -197,6 +201,8 @@ class _Joint:
             return self._result(minmax, continuous, np.zeros((0, 3), dtype=np.int64), None, np.inf)
         simple = not minmax and not len(self.limited) and np.isinf(self.max_weight[self.free]).all()
         relaxed, prices = relax(A, y, self.sets, minmax=minmax)
+        for s, z in zip(self.own, relaxed[self.fixed], strict=True):
+            s.aim(complex(z))
         if simple:  # continuous planes cancel what they can
             Af, yf = project_out(A[:, self.free], A[:, self.fixed], y)
         else:
@@ -212,7 +218,7 @@ class _Joint:
         rounded = None
         for target in (continuous, relaxed, np.zeros_like(continuous)):
             picks = [nearest(s, complex(z)) for s, z in zip(self.own, target[self.fixed], strict=True)]
-            D, keys = np.array([d for d, _ in picks]), np.array([k for _, k in picks])
+            D, keys = (np.array([part[0] for part in parts]) for parts in zip(*picks, strict=True))
             rounded = D if rounded is None else rounded
             square = float(leaves(D[None], np.zeros(1), found.square)[0])
             if square < found.square or not len(found.keys):
@@ -259,7 +265,8 @@ class _Joint:
                 "no mounting that keeps every limit was found in time: allow more time, or relax a limit"
             )
         D = answer.weights[self.fixed]
-        keys = np.array([nearest(s, complex(d))[1] for s, d in zip(self.own, D, strict=True)])
+        self.own = other.own  # where not all vectors are listed these are near what keeps the limits
+        keys = np.array([nearest(s, complex(d))[1][0] for s, d in zip(self.own, D, strict=True)])
         return Found(float(leaves(D[None], np.zeros(1), np.inf)[0]), D, keys)
 
     def _squares(self, A: ComplexArray, y: ComplexArray, D: ComplexArray, minmax: bool) -> FloatArray:
@@ -329,7 +336,7 @@ class _Joint:
         for p in self.free:
             holes, usable = self.planes[p], self.usable[p]
             if holes is not None and usable is not None:
-                mountings[p] = StepSums(holes, usable, np.inf, max(abs(weights[p]), 1e-300)).place(weights[p])
+                mountings[p] = FreeAmounts(holes, usable, np.inf, np.inf).place(complex(weights[p]))
         return Discrete(
             mountings=tuple(mountings),
             weights=weights,

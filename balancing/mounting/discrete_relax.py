@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from balancing.mounting.discrete_sets import Attainable
+from balancing.mounting.attainable import Attainable
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 __all__ = ["Form", "best_form", "form", "project_out", "relax"]

@@ -15,16 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from balancing.mounting.attainable import MOST, Attainable, apart
 from balancing.mounting.discrete_relax import Form
-from balancing.mounting.discrete_sets import Attainable
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-__all__ = ["Found", "Leaves", "nearest", "polish", "search"]
+__all__ = ["Found", "Leaves", "polish", "search"]
 
 Leaves = Callable[[ComplexArray, FloatArray, float], FloatArray]
 """Squared objectives (M,) of vectors (M, P), given lower bounds (M,) and the best known square."""
 
-_MOST = 1_500_000
 _FIRST = 24.0
 _ROUNDING = 1e-9
 _NEAR = 400
@@ -39,31 +38,6 @@ class Found:
     D: ComplexArray
     keys: IntArray
     unexplored: float = np.inf
-
-
-def nearest(one: Attainable, z: complex) -> tuple[complex, IntArray]:
-    """The vector nearest to z and its key."""
-    low = _apart(one, z)
-    radius = max(low, 0.0) + one.spacing
-    while radius < 4 * (abs(z) + one.reach):
-        hit = one.near(z, low, radius, _MOST)
-        if hit is None:
-            radius = max(low, 0.0) + (radius - max(low, 0.0)) / 8
-            continue
-        if len(hit[0]):
-            return complex(hit[0][0]), hit[1][0]
-        low, radius = radius, radius + 2 * (radius - max(low, 0.0))
-    raise ValueError("nothing can be mounted within the largest weight of a plane")
-
-
-def _apart(one: Attainable, z: complex) -> float:
-    """A distance from z (or −1) within which there are no vectors."""
-    far = -1.0
-    for towards in (z, z + one.mounted):
-        if towards != 0:
-            n = towards / abs(towards)
-            far = max(far, float((np.conj(n) * z).real) + one.lowest(-n))
-    return far - 1e-9 * (abs(z) + one.spacing) if far > 0 else -1.0
 
 
 def polish(sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float) -> None:
@@ -97,7 +71,7 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
     """About `count` vectors near z."""
     radius = one.spacing * float(np.sqrt(count / np.pi))
     for _ in range(60):
-        hit = one.near(z, -1.0, radius, _MOST)
+        hit = one.near(z, -1.0, radius, MOST)
         if hit is None:
             radius /= 2
         elif len(hit[0]) < count / 8 and radius < 4 * one.reach:
@@ -162,7 +136,7 @@ class _Run:
         # |R|²|d − c|² + linear(d) = |R|²|d − z|² + shift
         base = bound - self.form.m[k] + shift
         everything = 2 * self.sets[k].reach + abs(c)
-        low, left = _apart(self.sets[k], c), np.inf
+        low, left = apart(self.sets[k], c), np.inf
         known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST))
         while True:
             needed = everything
@@ -178,7 +152,7 @@ class _Run:
             if time.perf_counter() > self.until:
                 return min(left, float(max(bound, base + size * inner**2)))
             radius = min(max(known, 1e-9 * everything), needed)
-            hit = self.sets[k].near(c, low, radius, _MOST)
+            hit = self.sets[k].near(c, low, radius, MOST)
             if hit is None:
                 thinner = inner + (radius - inner) / 4
                 if thinner - inner < 1e-9 * everything or not thinner < radius:

@@ -20,12 +20,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.data.conventions import Labels
-from balancing.mounting.holes import Holes, Mounting, mounting
-from balancing.mounting.split_amounts import nearest_amounts
-from balancing.mounting.split_pieces import nearest_pieces
+from balancing.mounting.attainable import Attainable, nearest
+from balancing.mounting.free_amounts import FreeAmounts
+from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.piece_sums import PieceSums
 from rotorid.base.text import percent
 
 _PROVEN = 1e-9
+_TIE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,12 +228,7 @@ def split(
 
 
 def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
-    if holes.free_amounts:
-        amounts = nearest_amounts(target, holes)
-        mounted, bound = mounting(holes, amounts=amounts), np.inf
-    else:
-        counts, bound = nearest_pieces(target, holes, most_pieces)
-        mounted = mounting(holes, counts=counts)
+    mounted, bound = _mounted(target, holes, most_pieces)
     error = mounted.vector - target
     size = abs(error)
     bound = min(bound, size)
@@ -246,6 +243,30 @@ def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
         bound=bound,
         proven=bool(size - bound <= _PROVEN * scale),
     )
+
+
+def _mounted(target: complex, holes: Holes, most_pieces: int | None) -> tuple[Mounting, float]:
+    """The nearest vector, and a distance within which there is nothing else."""
+    scale = max(abs(target), holes.step, float(holes.pieces.max(initial=0.0)))
+    if not holes.free_amounts:
+        sums = PieceSums(holes, holes.free, holes.max_weight, most_pieces)
+        sums.aim(target)
+        return _fewest(sums, target, scale), np.inf if sums.complete else sums.bound(target)
+    needed = np.inf if np.isfinite(holes.max_weight) else 2 * scale
+    amounts = FreeAmounts(holes, holes.free, holes.max_weight, needed)
+    return _fewest(amounts, target, scale) if holes.step else amounts.place_nearest(target), np.inf
+
+
+def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
+    """Of the nearest vectors that of the fewest pieces (or holes in use), then of the least weight."""
+    toward = np.conj(target) / (abs(target) or 1.0)
+
+    def cost(found: Mounting) -> tuple[float, ...]:
+        number = found.counts.sum() if found.counts.size else np.count_nonzero(found.amounts)
+        along = (toward * found.vector).real  # of equal weights that nearest to the direction of the target
+        return float(number), round(found.amounts.sum() / scale, 9), round(-along / scale, 9)
+
+    return min((one.mount(key) for key in nearest(one, target, _TIE * scale)[1]), key=cost)
 
 
 def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
