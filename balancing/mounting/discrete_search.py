@@ -19,9 +19,9 @@ from balancing.mounting.attainable import MOST, Attainable, apart
 from balancing.mounting.discrete_relax import Form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-__all__ = ["Found", "Leaves", "polish", "search"]
+__all__ = ["Found", "Squares", "polish", "search"]
 
-Leaves = Callable[[ComplexArray, FloatArray, float], FloatArray]
+Squares = Callable[[ComplexArray, FloatArray, float], FloatArray]
 """Squared objectives (M,) of vectors (M, P), given lower bounds (M,) and the best known square."""
 
 _FIRST = 24.0
@@ -37,10 +37,9 @@ class Found:
     square: float
     D: ComplexArray
     keys: IntArray
-    unexplored: float = np.inf
 
 
-def polish(sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float) -> None:
+def polish(sets: Sequence[Attainable], squares: Squares, best: Found, until: float) -> None:
     """Improve a mounting by exchanging vectors of one plane, and of two planes, for near ones."""
     P, gain = len(sets), True
     while gain and time.perf_counter() < until:
@@ -59,10 +58,10 @@ def polish(sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float
                     )
                 D = np.repeat(best.D[None], len(i), axis=0)
                 D[:, p], D[:, q] = own[0][i], other[0][j]
-                squares = leaves(D, np.zeros(len(i)), best.square)
-                n = int(np.argmin(squares))
-                if squares[n] < best.square:
-                    best.square, best.D = float(squares[n]), D[n]
+                found = squares(D, np.zeros(len(i)), best.square)
+                n = int(np.argmin(found))
+                if found[n] < best.square:
+                    best.square, best.D = float(found[n]), D[n]
                     best.keys[p], best.keys[q] = own[1][i[n]], other[1][j[n]]
         gain = best.square < before * (1 - _ROUNDING)
 
@@ -82,8 +81,8 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
 
 
 def search(
-    form: Form, sets: Sequence[Attainable], leaves: Leaves, start: Found, until: float, chunk: int = 4096
-) -> Found:
+    form: Form, sets: Sequence[Attainable], squares: Squares, start: Found, until: float, chunk: int = 4096
+) -> float:
     """Improve `start` until nothing better can exist, or the time (`time.perf_counter`) is `until`.
 
     Parameters
@@ -92,7 +91,7 @@ def search(
         Lower bound of the squared objective.
     sets
         Attainable vectors of each plane, in the order of the planes.
-    leaves
+    squares
         Squared objectives; infinite where a limit is broken.
     start
         Best mounting known; its square may be infinite.
@@ -103,20 +102,18 @@ def search(
 
     Returns
     -------
-    Found
-        With `unexplored` the lowest bound of what was not looked at, infinite if nothing was left out.
+    The lowest bound of what was not looked at, infinite if nothing was left out.
     """
-    run = _Run(form, sets, leaves, start, until, chunk)
-    start.unexplored = run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
-    return start
+    run = _Run(form, sets, squares, start, until, chunk)
+    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
 
 
 class _Run:
     def __init__(
-        self, form: Form, sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float, chunk: int
+        self, form: Form, sets: Sequence[Attainable], squares: Squares, best: Found, until: float, chunk: int
     ) -> None:
         self.chunk = chunk
-        self.form, self.leaves, self.best, self.until = form, leaves, best, until
+        self.form, self.squares, self.best, self.until = form, squares, best, until
         self.sets = [sets[p] for p in form.order]
         self.size = np.abs(np.diagonal(form.R)) ** 2
         self.keys = np.zeros((len(form.order), 3), dtype=np.int64)
@@ -212,7 +209,7 @@ class _Run:
         points, keys, bounds = points[good], keys[good], bounds[good]
         vectors = np.repeat(D[None], len(points), axis=0)
         vectors[:, 0] = points
-        squares = self.leaves(vectors[:, self.back], bounds, self.best.square)
+        squares = self.squares(vectors[:, self.back], bounds, self.best.square)
         n = int(np.argmin(squares))
         if squares[n] < self.best.square:
             self.keys[0] = keys[n]

@@ -1,7 +1,7 @@
 """Vectors that free amounts make in one hole of a plane or in two neighbouring ones, of any size or in steps.
 
-In neighbouring holes less than half a turn apart, amounts a e^{iα} + b e^{iβ}, a, b ≥ 0, fill the sector between
-them; with a step they are a lattice in it.
+In neighbouring holes less than half a turn apart, amounts a e^{iα} + b e^{iβ}, a, b ≥ 0, fill the sector
+between them; with a step they are a lattice in it.
 """
 
 from __future__ import annotations
@@ -116,8 +116,9 @@ class FreeAmounts:
         """Any amounts whose vector is d; None: it does not lie between two neighbours."""
         amounts = np.zeros(len(self.holes.angles))
         for p, q in self.pairs[self.pairs[:, 1] >= 0]:
-            e, f = np.exp(1j * self.holes.angles[[p, q]])
-            both = np.array([(np.conj(d) * f).imag, (np.conj(e) * d).imag]) / (np.conj(e) * f).imag
+            alpha, beta = self.holes.angles[[p, q]]
+            across = np.array([-(d * np.exp(-1j * beta)).imag, (d * np.exp(-1j * alpha)).imag])
+            both = across / np.sin(beta - alpha)
             both[np.abs(both) <= _ROUNDING * abs(d)] = 0.0
             if (both >= 0).all():
                 amounts[[p, q]] = both
@@ -127,8 +128,8 @@ class FreeAmounts:
     def place_nearest(self, z: complex) -> Mounting:
         """Any amounts whose vector is the nearest to z within the largest weight.
 
-        Between two neighbours it is the nearest vector of the plane's disc, otherwise it stands in one hole: the
-        amounts a there with |m + a e| ≤ R, m what is mounted, are an interval, from a quadratic equation.
+        Between two neighbours it is the nearest vector of the plane's disc, otherwise it stands in one hole:
+        the amounts a there with |m + a e| ≤ R, m what is mounted, are an interval, from a quadratic equation.
 
         Raises
         ------

@@ -1,13 +1,13 @@
 """Vectors that pieces in the holes of one plane can make, found near a point by meeting in the middle.
 
 The holes are divided in two halves whose sums are listed (equal sums that use the same once, with the fewest
-pieces, then the lightest); every vector is a sum a + b. Those in a disc around z are found by looking, for every
-a, for the b near z − a in a grid. What is limited (a stock, the number of pieces) is counted along, and only sums
-that fit together are joined. Holes that cancel or add up to each other (180°, 120°, 72° apart) go into the same
-half, whose list is so much shorter.
+pieces, then the lightest); every vector is a sum a + b. Those in a disc around z are found by looking, for
+every a, for the b near z − a in a grid. What is limited (a stock, the number of pieces) is counted along, and
+only sums that fit together are joined. Holes that cancel or add up to each other (180°, 120°, 60° apart) go
+into the same half, whose list is so much shorter.
 
-Where even the halves are too many (some thirty holes at odd angles with several sizes of pieces), only so many
-holes vary about the rounded answer of the continuous problem.
+Where even the halves are too many (some thirty holes at odd angles with several sizes of pieces), only so
+many holes vary about the rounded answer of the continuous problem.
 """
 
 from __future__ import annotations
@@ -124,8 +124,10 @@ class PieceSums:
         def listed(part: IndexArray) -> _Half | None:
             return _listed(self.ways[part], self.contents, self.limits, self.longest)
 
-        order = self._order(varying)
-        parts = _two(order)
+        turned = np.mod(np.angle(self.ways[varying]) + 1e-7, np.pi / 3)
+        order = varying[np.argsort(np.round(turned, 5), kind="stable")]
+        middle = (len(order) + 1) // 2
+        parts = [order[:middle], order[middle:]]
         first = listed(parts[0])
         second = None if first is None else listed(parts[1])
         if first is None or second is None:
@@ -136,24 +138,8 @@ class PieceSums:
                 return [order, order[:0]], (whole, none)
         return parts, (_sorted(first), second)
 
-    def _order(self, varying: IndexArray) -> IndexArray:
-        """The order of holes whose halves make the fewest sums, of one piece in a hole."""
-        turned = np.mod(np.angle(self.ways[varying]), 2 * np.pi)
-        found: list[tuple[float, IndexArray]] = []
-        for period in (np.pi / 3, np.pi / 5, np.pi):
-            rest = np.round(np.mod(turned + 1e-7, period), 5)
-            order = varying[np.lexsort((turned, rest))]
-            size = np.inf  # where all rests differ: no order is better than another
-            if len(np.unique(rest)) < len(rest):
-                halves = [
-                    _listed(self.ways[part], _ONE_PIECE, _ONE_PIECE.limits, LONGEST) for part in _two(order)
-                ]
-                size = sum(np.inf if half is None else float(len(half.sums)) for half in halves)
-            found.append((size, order))
-        return min(found, key=lambda pair: pair[0])[1]
-
     def _fix(self, z: complex) -> IndexArray:
-        """Which holes vary; the others hold what is nearest to the continuous answer and within the limits."""
+        """Which holes vary; the others hold what is nearest to the continuous answer within the limits."""
         contents, count = self.contents, len(self.where)
         amounts = self._relaxed(nearest_allowed(z, self.mounted, self.max_weight))[1]
         # partly filled holes vary, then holes evenly around the disc
@@ -211,7 +197,7 @@ class PieceSums:
     def _lines(self, z: ComplexArray, radius: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
         """Where, and how many, sums of the second half may be within a radius of points, on three lines each.
 
-        The sums are sorted by lines of a height h ≥ radius and by their real part within them; `order` is that.
+        They are sorted by lines of a height h ≥ radius and by their real part within them; `order` is that.
         """
         order, keys, h, origin, width = self._grid(float(radius.max(initial=0.0)))
         z = z - origin
@@ -277,8 +263,8 @@ def _contents(holes: Holes, count: int, most_pieces: int | None, reach: float) -
     top = min(holes.per_hole, most)
     if comb(K + top, K) > _MOST_CONTENTS:
         raise ValueError(
-            f"{holes.per_hole} pieces of {K} sizes in one hole make too many combinations: allow fewer in one "
-            "hole, or free amounts with a step"
+            f"{holes.per_hole} pieces of {K} sizes in one hole make too many combinations: allow fewer in "
+            "one hole, or free amounts with a step"
         )
     counts = np.zeros((1, 0), dtype=np.int64)
     for _ in range(K):
@@ -298,20 +284,6 @@ def _contents(holes: Holes, count: int, most_pieces: int | None, reach: float) -
     kept = distinct(cost, [np.rint(weights / (reach * SAME)).astype(np.int64), *used.T])
     kept = kept[np.argsort(cost[kept], kind="stable")]
     return _Contents(counts[kept], weights[kept], cost[kept], used[kept], limits)
-
-
-_ONE_PIECE = _Contents(
-    counts=np.zeros((2, 1), dtype=np.int64),
-    weights=np.array([0.0, 1.0]),
-    cost=np.zeros(2),
-    used=np.zeros((2, 0), dtype=np.int64),
-    limits=np.zeros(0, dtype=np.int64),
-)
-
-
-def _two(order: IndexArray) -> list[IndexArray]:
-    middle = (len(order) + 1) // 2
-    return [order[:middle], order[middle:]]
 
 
 def _listed(ways: ComplexArray, contents: _Contents, limits: IntArray, most: int) -> _Half | None:
