@@ -38,6 +38,8 @@ LONGEST = 600_000
 _RAW = 12
 """So many times more before equal ones are put together."""
 _MOST_CONTENTS = 20_000
+_WIDE = 0.3
+"""Discs larger than this, by a half's size, are cut down to what they have in common with it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +134,6 @@ class PieceSums:
         second = None if first is None else listed(parts[1])
         if first is None or second is None:
             return None
-        if len(first.sums) * len(second.sums) <= self.longest:
-            whole, none = listed(order), listed(order[:0])
-            if whole is not None and none is not None:
-                return [order, order[:0]], (whole, none)
         return parts, (_sorted(first), second)
 
     def _fix(self, z: complex) -> IndexArray:
@@ -176,7 +174,9 @@ class PieceSums:
         ahead = (along * (first.sums + self.fixed)).real + float((along * second.sums).real.max())
         close = np.abs(middle - self.fixed - first.sums - self._centre) <= self._radius + radius
         rows = np.flatnonzero(close & (ahead >= (abs(z) - high) * (1 - 1e-12)))
-        to, reach = lens(middle - self.fixed - first.sums[rows], float(radius), self._centre, self._radius)
+        to, reach = middle - self.fixed - first.sums[rows], np.full(len(rows), float(radius))
+        if radius > _WIDE * self._radius:
+            to, reach = lens(to, float(radius), self._centre, self._radius)
         start, count, order = self._lines(to, reach)
         total = int(count.sum())
         if total > most:
@@ -204,9 +204,9 @@ class PieceSums:
         pad = 1e-14 * (abs(keys[-1]) + width)
         lowest = np.floor((z.imag - radius) / h)
         starts, counts = [], []
+        x0 = np.clip(z.real - radius - pad, -pad, width)
+        x1 = np.clip(z.real + radius + pad, -pad, width)
         for line in (lowest, lowest + 1, lowest + 2):
-            x0 = np.clip(z.real - radius - pad, -pad, width)
-            x1 = np.clip(z.real + radius + pad, -pad, width)
             start = np.searchsorted(keys, line * 2 * width + x0, side="left")
             end = np.searchsorted(keys, line * 2 * width + x1, side="right")
             starts.append(start)

@@ -135,7 +135,8 @@ class Drill:
         from scipy.optimize import brentq
 
         area = self.density * np.pi * self.diameter**2 / 4
-        deepest = self.radius if self.way == "radial" else unbalance / (area * self.radius) + self.tip_height
+        flat = unbalance / (area * self.radius)
+        deepest = self.radius if self.way == "radial" else 2 * flat + self.tip_height
 
         def missing(depth: float) -> float:
             return self.removed(depth)[1] - unbalance

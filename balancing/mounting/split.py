@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from balancing.data.conventions import Labels
 from balancing.mounting.attainable import Attainable, nearest
@@ -70,7 +69,7 @@ class Split:
         """What goes where, hole by hole, such as "2 × 10 g in hole 7 (at 120°)"."""
         out = []
         for h in np.flatnonzero(self.mounting.amounts):
-            angle = float(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            (angle,) = labels.directions(self.holes.angles[[h]])
             out.append(
                 f"{self._content(int(h), labels)} in hole {self.holes.names[h]} (at {_degrees(angle)})"
             )
@@ -90,15 +89,15 @@ class Split:
         """As JSON types, in the labels' unit and angles."""
         rows = []
         for h in np.flatnonzero(self.mounting.amounts):
-            angle = _plain(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            entry = labels.weight_entry(self.mounting.amounts[h] * np.exp(1j * self.holes.angles[h]))
             counts = self.mounting.counts[h]
             rows.append(
                 {
                     "hole": self.holes.names[h],
-                    "angle_deg": angle,
-                    "mass": _plain(self.mounting.amounts[h] * labels.weight_scale),
+                    "angle_deg": entry["angle_deg"],
+                    "mass": entry["mass"],
                     "pieces": [
-                        {"count": int(n), "mass": _plain(piece * labels.weight_scale)}
+                        {"count": int(n), "mass": labels.weight_entry(piece)["mass"]}
                         for n, piece in zip(counts, self.holes.pieces, strict=bool(counts.size))
                         if n
                     ],
@@ -286,8 +285,3 @@ def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
 
 def _degrees(angle: float) -> str:
     return f"{round(angle, 2) % 360:g}°"
-
-
-def _plain(value: ArrayLike) -> float:
-    """Without the last digits, in which conversions of units and angles show."""
-    return float(f"{float(np.asarray(value)):.12g}")
