@@ -1,5 +1,6 @@
 """Joint discrete problem: the same as trying everything, never worse than rounding, limits, bad input."""
 
+import time
 from itertools import product
 
 import numpy as np
@@ -205,6 +206,21 @@ def test_forbidden_arcs_and_largest_weights():
     every = everything(holes)
     best = np.abs(every[np.abs(every) <= 0.45] - 0.5).min()
     assert abs(vector - 0.5) == pytest.approx(best, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_plane_limited_far_below_what_the_readings_ask_for(method):
+    angles = np.random.default_rng(7).uniform(0, 2 * np.pi, 16)
+    W, Y = np.array([[1.0], [0.5j]]), np.array([-3.0, 1.0j])
+    few = from_list(angles[:9], [0.3, 0.2], max_weight=0.5)
+    found = solve_discrete(W, Y, [few], method=method)
+    assert found.proven
+    best = objectives(method, W, Y, np.ones(2), everything(few)[:, None]).min()
+    assert found.objective == pytest.approx(best, rel=1e-9)
+    many = from_list(angles, [0.1, 0.2], max_weight=0.3)
+    start = time.perf_counter()
+    assert abs(solve_discrete(W, Y, [many], method=method).weights[0]) <= 0.3 * (1 + 1e-9)
+    assert time.perf_counter() - start < 20
 
 
 @pytest.mark.parametrize("method", METHODS)
