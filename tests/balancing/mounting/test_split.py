@@ -63,6 +63,16 @@ def test_equal_to_trying_everything(seed):
     assert not found.mounting.amounts[~holes.free].any()
 
 
+@pytest.mark.parametrize("reach", [0.5, 1.0, 5.0])
+def test_a_scarce_stock_out_of_reach_equals_trying_everything(reach):
+    angles = np.sort(np.random.default_rng(3).uniform(0, 2 * np.pi, 7))
+    holes = from_list(angles, [0.003, 0.005], per_hole=1, stock=[2, 1])
+    target = 0.011 * reach * np.exp(0.7j)
+    found = split(target, holes)
+    assert (round(abs(found.error), 11), found.pieces) == exhaustive(target, holes, None)
+    assert found.proven
+
+
 def test_regular_holes_beat_every_random_choice_and_agree_with_one_hole_more():
     rng = np.random.default_rng(1)
     target = 0.035 * np.exp(2j)
