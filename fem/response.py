@@ -17,7 +17,7 @@ from fem.solvers.banded import rounding_warning
 from fem.solvers.eigen import fine_mesh_warning
 from fem.solvers.receptance import Receptance, prepare
 from fem.vibration import BearingForces, InfluenceCoefficients, Response
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, read_only
 
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "response_peaks"]
 __all__ += ["unbalance_response"]
@@ -83,8 +83,7 @@ def unbalance_response(
             largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
             doubts.append(found.doubt)
         said = (*_model_warnings(ready), *rounding_warning(doubts))
-        for array in (F, b, largest, where):
-            array.flags.writeable = False
+        read_only(F, b, largest, where)
         return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve)
 
     return judged(solve(speeds))
@@ -220,7 +219,8 @@ def influence(
         doubts.append(found.doubt)
     windows, said = judge(rotor, speeds)
     warnings = (*_model_warnings(ready), *rounding_warning(doubts), *said)
-    return InfluenceCoefficients(speeds, sensors, planes, _frozen(W), warnings, windows)
+    read_only(W)
+    return InfluenceCoefficients(speeds, sensors, planes, W, warnings, windows)
 
 
 def _model_warnings(ready: Receptance) -> tuple[str, ...]:
@@ -236,10 +236,5 @@ def _checked_speeds(speeds: ArrayLike) -> FloatArray:
         raise ValueError("speeds must be one number or a list of at least one")
     if not (np.isfinite(array) & (array >= 0)).all():
         raise ValueError("speeds must be finite and not negative, in rad/s")
-    array.flags.writeable = False
-    return array
-
-
-def _frozen(array: AnyArray) -> AnyArray:
-    array.flags.writeable = False
+    read_only(array)
     return array

@@ -11,7 +11,7 @@ import numpy as np
 from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.windows import Window, within
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
@@ -125,7 +125,7 @@ class Response:
             motion = np.stack((X[:, i], Y[:, i]), axis=1)
             D = support.dynamic_stiffness(self.speeds)
             forces[:, :, k] = np.einsum("sij,sj->is", D, motion)
-        forces.flags.writeable = False
+        read_only(forces)
         return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
