@@ -195,7 +195,7 @@ def _solve(rotor: Rotor, A: Matrices, forces: FloatArray, speed: float, spin: bo
     scatter = np.zeros(size)
     for plane in (0, 1):
         part = np.abs(X[plane::2])
-        scatter += np.einsum("ij,ij->j", part, multiply(np.abs(A.stiffness), part))
+        scatter += np.einsum("ij,ij->j", part, multiply(np.abs(A.shaft), part))
     loaded = np.abs(rhs).max(axis=0) > 0
     if info != 0 or not np.isfinite(X).all() or (np.finfo(float).eps * scatter > 1e-3 * work)[loaded].any():
         raise _lost(rotor)
