@@ -46,8 +46,9 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     reference: dict[int, float] = {}
     for support in rotor.supports:
         D = FROM_XY @ support.dynamic_stiffness(speeds) @ TO_XY
-        # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
-        k = max(float(np.median(D[:, 0, 0].real)), 0.0)
+        k = float(np.median(D[:, 0, 0].real))
+        if not support.plain:
+            k = max(k, 0.0)  # a pedestal may be beyond its resonance at most speeds
         total[support.node] = total[support.node] + D if support.node in total else D
         reference[support.node] = reference.get(support.node, 0.0) + k
     planes = 1 if rotor.symmetric else 2
