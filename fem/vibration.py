@@ -215,7 +215,7 @@ class BearingForces:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: one list over speed for each support."""
-        forces = {column.name: np.reshape(column.values, self.x.shape).T for column in self._forces()}
+        forces = {column.name: np.asarray(column.values).reshape(self.x.shape).T for column in self._forces()}
         nodes = [support.node for support in self.supports]
         return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
 

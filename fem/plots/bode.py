@@ -128,8 +128,9 @@ def draw_bode(
             # The middle of the curve between -360 and 0: a lag, as engineers read it.
             phase -= 360 * np.ceil(np.median(phase) / 360)
         shown = seen | ~steady
-        below.plot(omega[shown], _with_gaps(phase, seen)[shown], linewidth=1.6, **look(k))
+        below.plot(omega[shown], _with_gaps(phase, seen)[shown], linewidth=1.6, **look(k, len(labels)))
     plain(below)
+    below.margins(x=0.01)
     below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
     below.yaxis.set_major_locator(_right_angles(below))
     above.set_xlabel("")
@@ -249,7 +250,9 @@ def _over_speed(
     order = np.argsort(speeds, kind="stable")
     marker = "o" if speeds.size < 12 else None
     for k, (curve, named) in enumerate(zip(curves.T, labels, strict=True)):
-        ax.plot(speeds[order], curve[order], marker=marker, linewidth=1.6, label=named, **look(k))
+        ax.plot(
+            speeds[order], curve[order], marker=marker, linewidth=1.6, label=named, **look(k, len(labels))
+        )
     positive = curves[curves > 0]
     if positive.size and positive.max() > 30 * positive.min():
         ax.set_yscale("log")

@@ -168,14 +168,23 @@ def _supports(rotor: Rotor, supports: Sequence[Support], kind: str, ax: Axes, sc
         if standing:
             text += " on pedestals" if len(nodes) > 1 else " on a pedestal"
         if kind == "seal":
-            style = {"s": 170, "facecolor": COLORS[5], "linewidth": 0.8}
-            ax.scatter(x, y, marker=_comb(1), edgecolor=SUPPORT, zorder=4, **style)
-            marker = _comb(-1)
+            size, face, width = 170, COLORS[5], 0.8
+            marks = [(-y, _comb(-1), text), (y, _comb(1), None)]
         else:
-            face = COLORS[4] if damped else SUPPORT
-            style = {"s": 760 if standing else 260, "facecolor": face, "linewidth": 1.2}
-            marker = _on_pedestal() if standing else _triangle()
-        ax.scatter(x, -y, marker=marker, edgecolor=SUPPORT, zorder=4, label=text, **style)
+            size, face, width = 760 if standing else 260, COLORS[4] if damped else SUPPORT, 1.2
+            marks = [(-y, _on_pedestal() if standing else _triangle(), text)]
+        for height, marker, named in marks:
+            ax.scatter(
+                x,
+                height,
+                marker=marker,
+                s=size,
+                facecolor=face,
+                edgecolor=SUPPORT,
+                linewidth=width,
+                zorder=4,
+                label=named,
+            )
 
 
 def radii(rotor: Rotor) -> FloatArray:

@@ -43,9 +43,10 @@ def on_figure(draw: Callable[[Axes], object], width: float = 9.0, height: float 
     return figure
 
 
-def look(k: int) -> dict[str, Any]:
-    """Colour and style of curve k: without colour styles tell a few of them apart."""
-    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[k % len(STYLES)]}
+def look(k: int, of: int = 1) -> dict[str, Any]:
+    """Colour and style of curve k of so many: a few differ by their style too, in black and white."""
+    style = k if of <= len(STYLES) else k // len(COLORS)
+    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[style % len(STYLES)]}
 
 
 def note(
