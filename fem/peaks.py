@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
@@ -134,8 +133,8 @@ class Peaks:
 
 
 def find_peaks(
-    speeds: ArrayLike,
-    amplitudes: ArrayLike,
+    omega: FloatArray,
+    A: FloatArray,
     evaluate: Callable[[float], float],
     *,
     operating: tuple[float, float] | None = None,
@@ -144,8 +143,8 @@ def find_peaks(
 
     Parameters
     ----------
-    speeds, amplitudes
-        rad/s, ascending, and the response (absolute values are taken), shape (S,): they show the peaks.
+    omega, A
+        Speeds, rad/s, ascending, and the amplitude there, shape (S,): they show the peaks.
     evaluate
         The amplitude at any speed between: it says where the peaks and their half-power points are.
     operating
@@ -154,9 +153,8 @@ def find_peaks(
     Raises
     ------
     ValueError
-        For fewer than three speeds, speeds that do not ascend, or an impossible range.
+        For an impossible range of operating speeds.
     """
-    omega, A = _checked(speeds, amplitudes)
     if operating is not None:
         low, high = (float(v) for v in operating)
         if not 0 < low <= high:
@@ -191,22 +189,6 @@ def required_margin(amplification: float, *, above: bool) -> float:
         return 0.0
     margin = 17 * (1 - 1 / (AF - 1.5))
     return min(26.0, 10 + margin) if above else min(16.0, margin)
-
-
-def _checked(speeds: ArrayLike, amplitudes: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    try:
-        omega, A = np.array(speeds, dtype=float), np.abs(np.asarray(amplitudes, dtype=complex))
-    except (TypeError, ValueError):
-        raise ValueError("speeds and amplitudes must be numbers") from None
-    if omega.ndim != 1 or omega.shape != A.shape or omega.size < 3:
-        raise ValueError("give at least three speeds, and one amplitude for each")
-    if (
-        not np.isfinite(A).all()
-        or not (np.isfinite(omega) & (omega >= 0)).all()
-        or (np.diff(omega) <= 0).any()
-    ):
-        raise ValueError("speeds must be finite, not negative and ascending, amplitudes finite")
-    return omega, A
 
 
 def _peak(

@@ -107,17 +107,8 @@ def _discs(rotor: Rotor, discs: Sequence[Disc], ax: Axes, scale: float) -> None:
     shape = np.array([_solid(disc) for disc in discs])
     x = rotor.positions[[disc.node - 1 for disc in discs]]
     radius, width = scale * shape[:, 0], np.maximum(shape[:, 1], thinnest)
-    ax.bar(
-        x,
-        2 * radius,
-        width,
-        -radius,
-        color=DISC,
-        edgecolor=MASS,
-        linewidth=0.9,
-        zorder=0.8,
-        label=f"{'discs' if len(discs) > 1 else 'disc'}, {_masses_text(discs)}",
-    )
+    text = f"{'discs' if len(discs) > 1 else 'disc'}, {_masses_text(discs)}"
+    ax.bar(x, 2 * radius, width, -radius, color=DISC, edgecolor=MASS, linewidth=0.9, zorder=0.8, label=text)
 
 
 def _shaft(rotor: Rotor, ax: Axes, scale: float) -> None:

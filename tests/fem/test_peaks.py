@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import fem
+from fem.peaks import find_peaks
 
 
 def jeffcott(speeds, zeta, critical=100.0):
@@ -11,7 +12,9 @@ def jeffcott(speeds, zeta, critical=100.0):
 
 
 def peaks_of(speeds, curve, **options):
-    return fem.find_peaks(speeds, curve(speeds), lambda speed: float(curve(np.float64(speed))), **options)
+    return find_peaks(
+        speeds, np.abs(curve(speeds)), lambda speed: float(np.abs(curve(np.float64(speed)))), **options
+    )
 
 
 def damped(zeta):
@@ -151,16 +154,6 @@ def test_results_speak():
     assert found.to_dict()["peaks"][0]["enough"] is False
 
 
-@pytest.mark.parametrize(
-    ("speeds", "amplitudes", "options", "message"),
-    [
-        ([1, 2], [1, 2], {}, "at least three"),
-        ([1, 3, 2], [1, 2, 1], {}, "ascending"),
-        ([1, 2, 3], [1, math.nan, 1], {}, "finite"),
-        ([1, 2, 3], [1, 2, 1], {"operating": (5, 2)}, "lowest and a highest"),
-        (["a", "b", "c"], [1, 2, 1], {}, "numbers"),
-    ],
-)
-def test_bad_input(speeds, amplitudes, options, message):
-    with pytest.raises(ValueError, match=message):
-        fem.find_peaks(speeds, amplitudes, float, **options)
+def test_an_impossible_range_of_operating_speeds():
+    with pytest.raises(ValueError, match="lowest and a highest"):
+        peaks_of(np.array([1.0, 2.0, 3.0]), damped(0.1), operating=(5.0, 2.0))
