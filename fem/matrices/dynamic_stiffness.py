@@ -45,10 +45,11 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     total: dict[int, ComplexArray] = {}
     reference: dict[int, float] = {}
     for support in rotor.supports:
-        D = FROM_XY @ support.dynamic_stiffness(speeds) @ TO_XY
+        D = support.dynamic_stiffness(speeds)
         k = float(np.median(D[:, 0, 0].real))
         if not support.plain:
-            k = max(k, 0.0)  # a pedestal may be beyond its resonance at most speeds
+            D = FROM_XY @ D @ TO_XY
+            k = max(float(np.median(D[:, 0, 0].real)), 0.0)  # a pedestal may be beyond its resonance
         total[support.node] = total[support.node] + D if support.node in total else D
         reference[support.node] = reference.get(support.node, 0.0) + k
     planes = 1 if rotor.symmetric else 2
