@@ -45,11 +45,14 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     total: dict[int, ComplexArray] = {}
     reference: dict[int, float] = {}
     for support in rotor.supports:
-        D = support.dynamic_stiffness(speeds)
-        k = float(np.median(D[:, 0, 0].real))
-        if not support.plain:
-            D = FROM_XY @ D @ TO_XY
-            k = max(float(np.median(D[:, 0, 0].real)), 0.0)  # a pedestal may be beyond its resonance
+        if support.plain:  # many have no others, and this is where a response begins
+            k = float(support.stiffness)
+            D = np.zeros((speeds.size, 2, 2), dtype=complex)
+            D[:, 0, 0] = D[:, 1, 1] = k + 1j * speeds * support.damping
+        else:
+            D = FROM_XY @ support.dynamic_stiffness(speeds) @ TO_XY
+            # A pedestal may be beyond its resonance at most speeds: a negative spring holds nothing.
+            k = max(float(np.median(D[:, 0, 0].real)), 0.0)
         total[support.node] = total[support.node] + D if support.node in total else D
         reference[support.node] = reference.get(support.node, 0.0) + k
     planes = 1 if rotor.symmetric else 2

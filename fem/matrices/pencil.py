@@ -140,7 +140,7 @@ def _pencil(rotor: Rotor, A: Matrices, whirls: Sequence[Whirl], springs: list[_S
                 total = total + shaft_energy(rotor, Y.imag)
         for unknowns, form in forms:
             Y = X[unknowns]
-            total = total + np.einsum("im,ij,jm->m", Y.conj(), form, Y).real
+            total = total + (Y.conj() * (form @ Y)).real.sum(axis=0)
         return np.asarray(total)
 
     motions = _whirling_rigid(rotor, A, springs, dtype, planes)
@@ -173,6 +173,9 @@ def _places(A: Matrices, pedestals: list[int], planes: int) -> tuple[IndexArray,
 
 def _add_band(band: AnyArray, source: FloatArray, places: IndexArray) -> None:
     """Add the band of one plane where its unknowns stand."""
+    if band.shape == source.shape:  # there are no others
+        band += source
+        return
     width, own, size = len(band) - 1, len(source) - 1, len(places)
     for above in range(own + 1):
         rows, columns = places[: size - above], places[above:]
