@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 HEAVY = 1.28  # log decrement at an amplification factor of 2.5: critically damped after API 684
 _ROUNDS = 8  # of looking for crossings between the speeds
+_EQUAL = 1e-10  # relative difference of speeds below which rounding alone would sort two modes
 _PARTS = 20  # into which a range over tables is divided at least
 _SWINGS = 0.4  # |Im λ| / |λ| below which a mode hardly oscillates: log decrement above 14
 _NARROW = 1e-3  # of a speed: steps that are not divided for a mode that ceases to oscillate
@@ -249,6 +250,8 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
     log_decrements = -2 * np.pi * lam.real / frequencies
     crossings = synchronous(whirl, values, X)
     crossings = crossings.only(_swings(crossings.values))
+    apart = np.diff(crossings.speeds, prepend=0.0) > _EQUAL * crossings.speeds
+    crossings = crossings.only(np.lexsort((crossings.modes, np.cumsum(apart))))
     at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
     unstable = growing(whirl, values, X)
     windows, said = _windows(whirl, asked, values, unstable) or judge(rotor, speeds)

@@ -54,7 +54,7 @@ class Crossings:
     values: ComplexArray
     shapes: ComplexArray
 
-    def only(self, which: BoolArray) -> Crossings:
+    def only(self, which: BoolArray | IndexArray) -> Crossings:
         """Some of them."""
         return Crossings(self.speeds[which], self.modes[which], self.values[which], self.shapes[which])
 
