@@ -15,7 +15,7 @@ from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import ROUNDED
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.solvers.crossing import off_synchronous, synchronous, turns
+from fem.solvers.crossing import crossings, off_synchronous, turns
 from fem.solvers.quadratic import Solutions
 from fem.solvers.reduced_whirl import Whirl, solve_whirl, with_speeds
 from fem.solvers.stable_speeds import GROWTH
@@ -247,9 +247,9 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
     direction = np.where(gone, 0.0, whirl_direction(np.nan_to_num(x), np.nan_to_num(y)))
     frequencies = np.where(gone, np.nan, lam.imag)
     log_decrements = -2 * np.pi * lam.real / frequencies
-    crossings = synchronous(whirl, values, X)
-    crossings = crossings.only(_swings(crossings.values))
-    at, cx, cy = in_both_planes(crossings.values, crossings.shapes)
+    met = crossings(whirl, values, X, off_synchronous)
+    met = met.only(_swings(met.values))
+    at, cx, cy = in_both_planes(met.values, met.shapes)
     unstable = growing(whirl, values, X)
     windows, said = _windows(whirl, asked, values, unstable) or judge(rotor, speeds)
     shown = np.zeros(speeds.size, dtype=bool)
@@ -261,15 +261,15 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         if window.mode is None or (within((window,), speeds) & ~shown).any()
     ]
     hidden += said[len(windows) :]
-    for array in (frequencies, log_decrements, direction, crossings.speeds):
+    for array in (frequencies, log_decrements, direction, met.speeds):
         array.flags.writeable = False
     return Campbell(
         speeds=speeds,
         frequencies=frequencies,
         log_decrements=log_decrements,
         direction=direction,
-        critical_speeds=crossings.speeds,
-        critical_modes=crossings.modes + 1,
+        critical_speeds=met.speeds,
+        critical_modes=met.modes + 1,
         critical_log_decrements=-2 * np.pi * at.real / at.imag,
         critical_direction=whirl_direction(cx, cy),
         error=whirl.error,
