@@ -30,9 +30,8 @@ from typing import Any, Literal
 import numpy as np
 
 from balancing.coefficients.baseline import Start
-from balancing.coefficients.identifiability import acting_alike
+from balancing.coefficients.identifiability import acting_alike, resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.resolution import resolution
 from balancing.coefficients.significance import CLEAR
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
@@ -428,8 +427,7 @@ def _separating(stakes: Stakes) -> str:
         covariance = part.covariance[..., 2:, 2:].reshape(-1, 2 * n, 2 * n)
         if not covariance.any():
             return 0.0
-        found = resolution(part.W.reshape(-1, n), covariance)
-        return float(np.sqrt(found.chi_square / found.n))
+        return resolution(part.W.reshape(-1, n), covariance).ratio
 
     now = apart(stakes.used)
     others = {s: apart([s]) for s in range(len(influence.speeds)) if s not in stakes.used}

@@ -25,7 +25,7 @@ from balancing.mounting.discrete_search import Found, Leaves, nearest, polish, s
 from balancing.mounting.discrete_sets import LONGEST, Attainable
 from balancing.mounting.discrete_steps import StepSums, attainable
 from balancing.mounting.holes import Holes, Mounting
-from balancing.solvers.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
+from balancing.solvers.cone import InfeasibleError, problem, solve_cone
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["Discrete", "solve_discrete"]
@@ -302,8 +302,7 @@ class _Joint:
     ) -> ComplexArray:
         if not minmax and np.isinf(most).all() and np.isinf(residual).all():
             return np.asarray(np.linalg.lstsq(self.w[:, None] * W, -self.w * Y, rcond=None)[0])
-        solver = minmax_cone if minmax else least_squares_cone
-        return solver(W, Y, row_weights=self.w, max_weight=most, residual=residual).weights
+        return solve_cone(problem(W, Y, self.w, most, residual, minmax=minmax)).weights
 
     def _value(self, weights: ComplexArray, minmax: bool) -> float:
         left = self.Y + self.W @ weights

@@ -19,7 +19,7 @@ import numpy as np
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem, project
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import RCOND, gain, stretch, unstretch
+from rotorid.regression import gain, solution, stretch, unstretch
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -67,7 +67,7 @@ class Program:
         self.unit = float(np.abs(known).max())
         kept = bool((np.abs(self.residual) <= problem.residual).all())
         if not kept and self.unit <= _NOTHING * float(np.abs(w * problem.Y).max()):  # what do limits cost?
-            needed = np.linalg.lstsq(limit_rows, -self.residual[self.limited] / self.own, rcond=RCOND)[0]
+            needed = solution(limit_rows, -self.residual[self.limited] / self.own)
             self.unit = float(np.abs(rows @ needed).max())
         self.unit = self.unit or float(np.abs(rows).max()) or 1.0
         self.transform = self._orthogonal(np.concatenate((rows / self.unit, limit_rows)))
@@ -260,13 +260,10 @@ def within_limits(problem: Problem, weights: ComplexArray) -> ComplexArray:
 
 def _start(problem: Problem, rows: ComplexArray) -> ComplexArray:
     """Least-squares weights within the limits of weights, or none where that is better; rows are w W."""
-    scale = np.linalg.norm(rows, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
     on = problem.row_weights > 0
     known = problem.row_weights[on] * problem.Y[on]
     none = np.zeros(rows.shape[1], dtype=complex)
-    free = np.linalg.lstsq(rows / scale, -known, rcond=RCOND)[0] / scale
-    start = within_limits(problem, free)
+    start = within_limits(problem, solution(rows, -known))
     return start if problem.objective(start) < problem.objective(none) else none
 
 

@@ -29,6 +29,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
+from balancing.coefficients.repeatability import tail
+from balancing.solvers.conditioning import check_channels, check_stack
 from balancing.solvers.likelihood import (
     Problem,
     State,
@@ -42,7 +44,7 @@ from balancing.solvers.likelihood import (
     problem_of,
 )
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import gain, stretch, unstretch
+from rotorid.regression import gain, solution, stretch, unstretch
 
 FLOOR = 1e-4
 """Every residual gets a further error of this share of the root mean square error of all residuals."""
@@ -150,7 +152,8 @@ def effective_variance(
     If the cause is errors of the trial runs that are larger than stated, the covariance is too small: times
     `inflation`² it holds the truth for either cause.
     """
-    w, y, C, weight = _checked(W, Y, channels, row_weights)
+    w, y, weight = check_stack(W, Y, row_weights)
+    C = check_channels(channels, w)
     used = weight > 0
     P = w.shape[1]
     w_used, y_used, weight = w[used], y[used], weight[used]
@@ -171,7 +174,7 @@ def effective_variance(
     unexplained = dof > 0 and chi_square > dof
     if unexplained:
         within = explained is not None and best.converged and explained(unstretch(best.d))
-        unexplained = not within if explained is not None else chi_square > _quantile(dof)
+        unexplained = not within if explained is not None else tail(chi_square, dof) < 1 - UNEXPLAINED
     if unexplained:
         best, share, more = _explained(fit, first, chi_square / dof, dof)
         steps += more
@@ -190,31 +193,6 @@ def effective_variance(
         converged=best.converged,
         derivatives=moved,
     )
-
-
-def _checked(
-    W: ArrayLike, Y: ArrayLike, channels: ArrayLike, row_weights: ArrayLike | None
-) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
-    w, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    C = np.asarray(channels, dtype=np.float64)
-    if w.ndim != 2 or 0 in w.shape:
-        raise ValueError(f"the influence coefficients must have shape (readings, planes); got {w.shape}")
-    N, P = w.shape
-    weight = np.ones(N) if row_weights is None else np.asarray(row_weights, dtype=np.float64)
-    for name, array, shape in (
-        ("vibration", y, (N,)),
-        ("covariance of the readings", C, (N, 2 * P + 2, 2 * P + 2)),
-        ("weights of the readings", weight, (N,)),
-    ):
-        if array.shape != shape:
-            raise ValueError(f"the {name} must have shape {shape}; got {array.shape}")
-    if not all(np.isfinite(a).all() for a in (w, y, C, weight)):
-        raise ValueError(
-            "coefficients, vibration, covariances and weights must be finite; found NaN or infinity"
-        )
-    if (weight < 0).any() or not weight.any():
-        raise ValueError("the weights of the readings must not be negative, and not all of them zero")
-    return w, y, C, weight
 
 
 def _variance(C: FloatArray, d: FloatArray) -> float:
@@ -299,14 +277,5 @@ def _step(problem: Problem, at: State) -> tuple[FloatArray, float, bool]:
     H = hessian(problem, at) / np.outer(scale, scale)
     curvatures = np.linalg.eigvalsh(H)
     convex = bool(curvatures[0] > len(H) * np.finfo(float).eps * curvatures[-1])
-    if convex:
-        step = -np.linalg.solve(H, g / scale) / scale
-    else:
-        step = -np.linalg.lstsq(J / scale, r, rcond=None)[0] / scale
+    step = -np.linalg.solve(H, g / scale) / scale if convex else -solution(J, r)
     return step, max(float(-g @ step), 0.0), convex
-
-
-def _quantile(dof: int) -> float:
-    from scipy.special import chdtri
-
-    return float(chdtri(dof, 1 - UNEXPLAINED))

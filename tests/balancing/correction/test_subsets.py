@@ -6,11 +6,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from helpers.cones import minmax_cone
 
 from balancing import Labels, ReadingErrors, UndeterminedError
 from balancing.correction.subsets import best_subsets
 from balancing.data.errors import reading_covariance
-from balancing.solvers.cone import minmax_cone
 from balancing.solvers.error_propagation import prediction_covariance
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"

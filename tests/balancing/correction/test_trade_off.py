@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from helpers.cones import minmax_cone, weight_budget_cone
 
 from balancing import Labels, UndeterminedError
 from balancing.correction.trade_off import knee, trade_off
-from balancing.solvers.cone import minmax_cone, weight_budget_cone
 from rotorid.plots import plot
 
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)

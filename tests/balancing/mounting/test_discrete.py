@@ -4,12 +4,13 @@ from itertools import product
 
 import numpy as np
 import pytest
+from helpers.cones import minmax_cone
 
 from balancing.data.limits import Limits
 from balancing.mounting.discrete import solve_discrete
 from balancing.mounting.discrete_sets import PieceSums
 from balancing.mounting.holes import equal_holes, from_list
-from balancing.solvers.cone import InfeasibleError, minmax_cone
+from balancing.solvers.cone import InfeasibleError
 
 METHODS = ("least-squares", "minmax")
 

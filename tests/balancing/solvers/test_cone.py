@@ -7,17 +7,12 @@ import minmax_problems
 import numpy as np
 import pytest
 from cases import each_of
+from helpers.cones import least_squares_cone, minmax_cone, weight_budget_cone
 from hypothesis import given
 from hypothesis import strategies as st
 
 from balancing.solvers.certificate import lower_bound, project
-from balancing.solvers.cone import (
-    InfeasibleError,
-    least_squares_cone,
-    minmax_cone,
-    problem,
-    weight_budget_cone,
-)
+from balancing.solvers.cone import InfeasibleError, problem
 
 FILE = Path(__file__).resolve().parents[2] / "data" / "minmax_reference.json"
 ANSWERS = json.loads(FILE.read_text(encoding="utf-8"))["answers"]
