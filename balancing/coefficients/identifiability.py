@@ -246,7 +246,7 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
 def check_effect(told: Separation, planes: Sequence[str]) -> None:
     """Refuse planes without any effect (`UndeterminedError`)."""
     for p in np.flatnonzero(told.lengths == 0):
-        raise UndeterminedError(f"plane {planes[p]!r} has no effect on any reading: leave it out")
+        raise UndeterminedError(f"plane {planes[int(p)]!r} has no effect on any reading: leave it out")
 
 
 def refusal(

@@ -49,7 +49,7 @@ def correction_jacobian(W: ComplexArray, D: ComplexArray, r: ComplexArray) -> Fl
 
 def real_jacobian(along: ComplexArray, across: ComplexArray) -> FloatArray:
     """Real matrices (…, 2m, 2n) of the changes δ ↦ along δ + across δ̄, both (…, m, n)."""
-    return stretch(along) + stretch(across) * np.tile([1.0, -1.0], across.shape[-1])
+    return np.asarray(stretch(along) + stretch(across) * np.tile([1.0, -1.0], across.shape[-1]))
 
 
 def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray:

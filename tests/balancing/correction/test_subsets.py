@@ -160,7 +160,7 @@ def test_tables_speak_the_units_of_the_job():
         (2, 4, 3, {}, "3 planes need at least 3 readings"),
         (9, 3, 2, {"criterion": "mean"}, "not by 'mean'"),
         (9, 3, 2, {"show": 0}, "at least one choice"),
-        (9, 3, 2, {"row_weights": [1, 2]}, "one weight per reading"),
+        (9, 3, 2, {"row_weights": [1, 2]}, "row weights must be"),
     ],
 )
 def test_what_is_refused(N, P, k, more, words):

@@ -205,7 +205,7 @@ def test_the_picture_in_given_axes_without_units_or_knee():
         ([[1, 0], [0, 1]], {"criterion": "mean"}, "not of 'mean'"),
         ([[1, np.inf], [0, 1]], {}, "NaN or infinity"),
         ([[1], [0]], {}, "1 different names"),
-        ([[1, 0], [0, 1]], {"row_weights": [1, np.nan]}, "one weight per reading"),
+        ([[1, 0], [0, 1]], {"row_weights": [1, np.nan]}, "row weights must be"),
     ],
 )
 def test_what_is_refused(W, more, words):

@@ -270,7 +270,7 @@ def test_bad_input_is_refused():
         effective_variance(W, Y[:5], C)
     with pytest.raises(ValueError, match=r"must have shape \(readings, planes"):
         effective_variance(W[:, 0], Y, C)
-    with pytest.raises(ValueError, match="must not be negative"):
+    with pytest.raises(ValueError, match="row weights must be"):
         effective_variance(W, Y, C, row_weights=[1, 1, 1, 1, 1, -1])
     with pytest.raises(ValueError, match="no reading has any error"):
         effective_variance(W, Y, 0 * C)
