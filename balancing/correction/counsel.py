@@ -40,6 +40,7 @@ from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import figures, listing
 from rotorid.base.units import rpm_text
+from rotorid.regression import solution
 
 Word = Literal["mount", "do not mount", "measure again"]
 
@@ -206,7 +207,7 @@ class Stakes:
         """Some of the planes, by least squares or with given weights."""
         R, F = self.forms
         columns = [p + 1 for p in planes]
-        found = -np.linalg.lstsq(R[:, columns], R[:, 0], rcond=None)[0] if weights is None else weights
+        found = -solution(R[:, columns], R[:, 0]) if weights is None else weights
         z = np.zeros(R.shape[1], dtype=complex)
         z[[0, *columns]] = [1.0, *found]
         error = float(np.sqrt(max(float(np.vdot(z, F @ z).real), 0.0)))

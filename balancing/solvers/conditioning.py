@@ -180,7 +180,9 @@ def check_stack(
     """
     K, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
     if K.ndim != 2 or 0 in K.shape:
-        raise ValueError(f"the influence coefficients must have shape (readings, planes), not empty; got {K.shape}")
+        raise ValueError(
+            f"the influence coefficients must have shape (readings, planes), not empty; got {K.shape}"
+        )
     if y.shape != K.shape[:1]:
         raise ValueError(f"the vibration must have shape {K.shape[:1]}; got {y.shape}")
     if not (np.isfinite(K).all() and np.isfinite(y).all()):

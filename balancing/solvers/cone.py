@@ -174,18 +174,23 @@ def _result(problem: Problem, weights: ComplexArray, bound: Bound) -> Cone:
     if problem.minmax:
         w = problem.row_weights
         limit = np.minimum(limit, np.divide(objective, w, out=np.full(len(w), np.inf), where=w > 0))
-    without = problem.objective(np.zeros_like(weights))
     lower = min(bound.value, objective)
     return Cone(
         weights=weights,
         objective=objective,
         bound=lower,
-        gap=(objective - lower) / (max(objective, NEGLIGIBLE * without) or 1.0),
+        gap=relative_gap(problem, objective, lower),
         active_weights=_active(np.abs(weights), problem.max_weight, bound.weight_prices / (objective or 1.0)),
         active_residuals=_active(size, limit, bound.residual_prices / (objective or 1.0)),
         residual_prices=bound.residual_prices,
         weight_prices=bound.weight_prices,
     )
+
+
+def relative_gap(problem: Problem, objective: float, lower: float) -> float:
+    """Distance of an objective from a bound, relative to it; see `Cone.gap`."""
+    without = problem.objective(np.zeros(problem.W.shape[1], dtype=complex))
+    return (objective - lower) / (max(objective, NEGLIGIBLE * without) or 1.0)
 
 
 def _active(size: FloatArray, limit: FloatArray, price: FloatArray) -> BoolArray:
@@ -217,18 +222,17 @@ def _optimum(problem: Problem) -> tuple[ComplexArray, Bound]:
                 continue
             bound = lower_bound(problem, a, u)
             objective = problem.objective(weights)
-            gap = objective - bound.value
+            gap = relative_gap(problem, objective, bound.value)
             if best is None or gap < best[0]:
                 best = gap, weights, bound
-            if gap <= _ACCEPTED_GAP * max(objective, NEGLIGIBLE * without):
+            if gap <= _ACCEPTED_GAP:
                 return weights, bound
             break
     if best is None:
         raise InfeasibleError(
             "the limits can be met only to within rounding: relax a limit of the amplitudes a little"
         )
-    largest = max(problem.objective(best[1]), NEGLIGIBLE * without)
-    if best[0] > _POOR_GAP * largest:
+    if best[0] > _POOR_GAP:
         raise SolverError(
             "the solver did not come near the best weights: leave out a plane that acts like another, "
             "or relax the limits"

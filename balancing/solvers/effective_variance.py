@@ -23,21 +23,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
 from balancing.coefficients.repeatability import tail
+from balancing.data.errors import mean_variance
 from balancing.solvers.conditioning import check_channels, check_stack
+from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.likelihood import (
+    Minimum,
     Problem,
     State,
-    constraint,
     covariance,
     derivatives,
-    evaluate,
+    descend,
     gradient,
     hessian,
     jacobian,
@@ -52,7 +53,7 @@ FLOOR = 1e-4
 UNEXPLAINED = 0.95
 """Level of the χ² test beyond which the residuals are larger than the errors explain."""
 
-_STEPS, _HALVINGS = 100, 40
+_STEPS = 100
 _DONE = 1e-13  # predicted decrease: a step of 3e-7 standard deviations, after which Newton is at rounding
 _NO_SHARE, _SEARCHED = 1e-9, 1e-13  # of the mean variance
 _STUCK = 1e-10  # above it, no way down means lost and not rounding
@@ -66,8 +67,6 @@ class Effective:
     ----------
     weights
         Corrections, shape (P,).
-    residual
-        Y + W D with the coefficients as measured, shape (N,).
     covariance
         Of (Re D₁, Im D₁, …), shape (2P, 2P), for the stated errors and `model_error`.
     chi_square
@@ -79,21 +78,17 @@ class Effective:
     model_error
         Where it is beyond: standard deviation of what else stands in both parts of every reading, in the unit
         of Y, as large as the residuals say; weights and covariance allow for it. Else 0.
-    iterations
-        Newton steps.
     converged
         False where no minimum is in reach: the trial runs tell too little, and the weights grow without
         bound. They are not to be used then.
     """
 
     weights: ComplexArray
-    residual: ComplexArray
     covariance: FloatArray
     chi_square: float
     dof: int
     inflation: float
     model_error: float
-    iterations: int
     converged: bool
     derivatives: FloatArray
     """Of (Re D₁, …) by (Re Y, Im Y, Re W₁, …) of each reading of weight > 0, else 0; (N, 2P, 2P + 2)."""
@@ -159,82 +154,61 @@ def effective_variance(
     w_used, y_used, weight = w[used], y[used], weight[used]
     check_planes(w_used, [str(p + 1) for p in range(P)])
     first = stretch(-(gain(weight[:, None] * w_used) @ (weight * y_used)))
-    variance = _variance(C[used], first)
+    variance = float(mean_variance(prediction_covariance(unstretch(first), C[used])).mean())
+    if not variance > 0:
+        raise ValueError("no reading has any error: a fit by errors needs some; use least squares instead")
     given = first if start is None else stretch(start)
     if given.shape != (2 * P,) or not np.isfinite(given).all():
         raise ValueError(f"the corrections to begin with must be {P} finite numbers")
 
-    def fit(share: float, d: FloatArray) -> _Minimum:
-        wider = _widened(C[used], (FLOOR**2 + share) * variance)
-        return _minimise(problem_of(w_used, y_used, wider, weight), d)
+    def fit(share: float, d: FloatArray) -> Minimum:
+        wider = widened(C[used], (FLOOR**2 + share) * variance)
+        problem = problem_of(w_used, y_used, wider, weight)
+        return descend(
+            problem, d, lambda _, at: _step(problem, at), most=_STEPS, settled=_DONE, rounding=_STUCK
+        )
 
     best = fit(0.0, given)
-    chi_square, dof = best.chi_square, 2 * (len(weight) - P)
-    share, steps = 0.0, best.steps
+    chi_square, dof, share = float(best.at.each.sum()), 2 * (len(weight) - P), 0.0
     unexplained = dof > 0 and chi_square > dof
     if unexplained:
-        within = explained is not None and best.converged and explained(unstretch(best.d))
+        within = explained is not None and best.settled and explained(unstretch(best.d))
         unexplained = not within if explained is not None else tail(chi_square, dof) < 1 - UNEXPLAINED
     if unexplained:
-        best, share, more = _explained(fit, first, chi_square / dof, dof)
-        steps += more
-    D = unstretch(best.d)
+        best, share = _explained(fit, first, chi_square / dof, dof)
     moved = np.zeros((len(y), 2 * P, 2 * P + 2))
     moved[used] = derivatives(best.problem, best.at, best.d)
     return Effective(
-        weights=D,
-        residual=y + w @ D,
+        weights=unstretch(best.d),
         covariance=covariance(best.problem, best.at),
         chi_square=chi_square,
         dof=dof,
         inflation=float(np.sqrt(chi_square / dof)) if unexplained else 1.0,
         model_error=float(np.sqrt(share * variance)),
-        iterations=steps,
-        converged=best.converged,
+        converged=best.settled,
         derivatives=moved,
     )
 
 
-def _variance(C: FloatArray, d: FloatArray) -> float:
-    """Mean variance of both parts of all residuals at the stretched D."""
-    B = constraint(d)
-    variance = float(np.mean(np.einsum("nij,ij->n", B @ C, B))) / 2
-    if not variance > 0:
-        raise ValueError("no reading has any error: a fit by errors needs some; use least squares instead")
-    return variance
-
-
-def _widened(C: FloatArray, variance: float) -> FloatArray:
-    """C with a further variance of both parts of Y."""
+def widened(C: FloatArray, variance: float) -> FloatArray:
+    """Covariances (N, 2P + 2, 2P + 2) with a further variance of both parts of Y."""
     out = C.copy()
     out[:, [0, 1], [0, 1]] += variance
     return out
 
 
-class _Minimum(NamedTuple):
-    d: FloatArray
-    problem: Problem
-    at: State
-    steps: int
-    converged: bool
-
-    @property
-    def chi_square(self) -> float:
-        return float(self.at.each.sum())
-
-
 def _explained(
-    fit: Callable[[float, FloatArray], _Minimum], first: FloatArray, ratio: float, dof: int
-) -> tuple[_Minimum, float, int]:
-    """The fit with a further share of the mean variance such that χ² = dof; the share; steps taken."""
+    fit: Callable[[float, FloatArray], Minimum], first: FloatArray, ratio: float, dof: int
+) -> tuple[Minimum, float]:
+    """The fit with a further share of the mean variance such that χ² = dof, and the share."""
     from scipy.optimize import brentq
 
-    tried: dict[float, _Minimum] = {}
+    tried: dict[float, Minimum] = {}
 
     def excess(share: float) -> float:
         near = min(tried, key=lambda other: abs(other - share), default=None)
         tried[share] = fit(share, first if near is None else tried[near].d)
-        return tried[share].chi_square / dof - 1
+        return float(tried[share].at.each.sum()) / dof - 1
 
     low = high = ratio - 1  # χ² falls with the share
     if excess(high) > 0:
@@ -245,28 +219,7 @@ def _explained(
             high = low
     share = brentq(excess, low, high, xtol=_SEARCHED * low, rtol=_SEARCHED) if low > _NO_SHARE else 0.0
     excess(share)
-    return tried[share], share, sum(one.steps for one in tried.values())
-
-
-def _minimise(problem: Problem, d: FloatArray) -> _Minimum:
-    at = evaluate(problem, d)
-    for k in range(1, _STEPS + 1):
-        step, decrease, convex = _step(problem, at)
-        small = decrease <= _DONE * (1 + at.objective)
-        t = 1.0
-        for _ in range(_HALVINGS):
-            new = evaluate(problem, d + t * step)
-            # rounding of Q says nothing of so small a step: it is taken whole
-            if small or new.objective <= at.objective - 1e-4 * t * decrease:
-                break
-            t /= 2
-        if new.objective >= at.objective and not small:
-            rounding = decrease <= _STUCK * (1 + at.objective)
-            return _Minimum(d, problem, at, k, rounding and convex)
-        d, at = d + t * step, new
-        if small:
-            return _Minimum(d, problem, at, k, convex)
-    return _Minimum(d, problem, at, _STEPS, False)
+    return tried[share], share
 
 
 def _step(problem: Problem, at: State) -> tuple[FloatArray, float, bool]:

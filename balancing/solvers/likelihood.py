@@ -25,6 +25,7 @@ chapters 2 and 3.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from balancing.data.errors import inverse_root, symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
+_HALVINGS = 40
 LEAST_INFORMATION = 0.1
 """Share of M that is left to A in any direction; smaller ones count as this much."""
 
@@ -68,6 +70,9 @@ class State(NamedTuple):
     U: FloatArray
     A: FloatArray
     L: FloatArray
+
+
+Step = Callable[[FloatArray, State], tuple[FloatArray, float, bool]]
 
 
 def constraint(d: FloatArray) -> FloatArray:
@@ -139,6 +144,48 @@ def _corrected_inverse(problem: Problem, at: State) -> FloatArray:
     share, vectors = np.linalg.eigh(symmetric(root.T @ _noise(problem, at) @ root))
     X = root @ vectors
     return np.asarray((X / np.maximum(1 - share, LEAST_INFORMATION)) @ X.T)
+
+
+class Minimum(NamedTuple):
+    """Where steps ended: stretched weights, the problem, what is known there, whether Q falls no further."""
+
+    d: FloatArray
+    problem: Problem
+    at: State
+    settled: bool
+
+
+def descend(
+    problem: Problem, d: FloatArray, step: Step, *, most: int, settled: float, rounding: float
+) -> Minimum:
+    """Steps down from the stretched D, each shortened until Q falls.
+
+    Parameters
+    ----------
+    problem, d
+        What is minimised, and where to start.
+    step
+        At some D: a step, how far it should lead down, and whether Q is convex enough to end there.
+    most
+        Number of steps.
+    settled
+        Share of 1 + Q below which a step is the last one, and taken whole: rounding of Q says nothing of it.
+    rounding
+        The same where no part of a step leads down: above it the search is stuck.
+    """
+    at = evaluate(problem, d)
+    for _ in range(most):
+        move, expected, sound = step(d, at)
+        new, t = evaluate(problem, d + move), 1.0
+        if expected <= settled * (1 + at.objective):
+            return Minimum(d + move, problem, new, sound)
+        while not new.objective <= at.objective - 1e-4 * t * expected and t > 0.5**_HALVINGS:
+            t /= 2
+            new = evaluate(problem, d + t * move)
+        if new.objective >= at.objective:
+            return Minimum(d, problem, at, sound and expected <= rounding * (1 + at.objective))
+        d, at = d + t * move, new
+    return Minimum(d, problem, at, False)
 
 
 def _blocks(C: FloatArray) -> FloatArray:

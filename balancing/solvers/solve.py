@@ -15,7 +15,7 @@ from balancing.solvers.certificate import Problem
 from balancing.solvers.conditioning import check_stack
 from balancing.solvers.cone import Cone, InfeasibleError, problem
 from balancing.solvers.infeasible import explain
-from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
+from balancing.solvers.sectors import allowed_sectors, meets, solve_sectors
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.regression import solution_and_rank
 
@@ -122,7 +122,7 @@ def solve(  # noqa: PLR0913
         start[may] = _closed_form(A[:, may], y, w, own)
         reached = whole.objective(start)
         exact = reached <= _ROUNDING * whole.objective(np.zeros(P, dtype=complex))  # no reading stays
-        if (method == "least-squares" or exact) and _meets(whole, sectors, start):
+        if (method == "least-squares" or exact) and meets(whole, sectors, start):
             none = np.zeros(N, dtype=bool)
             left_out = whole.max_weight == 0
             return Solution(start, y + A @ start, method, reached, None, left_out, none)
@@ -171,14 +171,3 @@ def _within(
         )
     whole = problem(W, Y, w, limits.max_weight, limits.residual.reshape(N), minmax=minmax)
     return whole, [allowed_sectors(arcs) for arcs in limits.forbidden]
-
-
-def _meets(
-    whole: Problem, sectors: Sequence[tuple[tuple[float, float], ...] | None], weights: ComplexArray
-) -> bool:
-    """Whether weights are within every limit."""
-    return bool(
-        (np.abs(weights) <= whole.max_weight).all()
-        and (np.abs(whole.Y + whole.W @ weights) <= whole.residual).all()
-        and all(stands_in(complex(v), s) for v, s in zip(weights, sectors, strict=True))
-    )
