@@ -78,8 +78,9 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     for s, c in np.ndindex(S, C):
         a = _place(measured, ours[s], sensors[c])
         b = _place(computed, theirs[s], sensors[c])
-        lacking = _lacking(measured.planes if a else (), computed.planes if b else (), planes)
-        if lacking:
+        there = (*(measured.planes if a else ()), *(computed.planes if b else ()))
+        lacking = next((plane for plane in planes if plane not in there), None)
+        if lacking is not None:
             raise ValueError(
                 f"there is neither a measured nor a computed coefficient of plane {lacking!r} at sensor "
                 f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
@@ -155,10 +156,6 @@ def _place(side: Influence, speed: int | None, sensor: str) -> tuple[int, int] |
     if speed is None or sensor not in side.sensors:
         return None
     return speed, side.sensors.index(sensor)
-
-
-def _lacking(a: tuple[str, ...], b: tuple[str, ...], planes: tuple[str, ...]) -> str | None:
-    return next((plane for plane in planes if plane not in a and plane not in b), None)
 
 
 def _reading(

@@ -14,12 +14,12 @@ bound needs no trust in the solver that proposed a and u; it holds up to the rou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from balancing.data.limits import Arc
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.regression import gain
 
 _ROUNDING = 1e-11
@@ -59,6 +59,15 @@ class Problem:
         """What is minimised."""
         size = self.row_weights * np.abs(self.Y + self.W @ weights)
         return float(size.max() if self.minmax else np.linalg.norm(size))
+
+    def of_planes(self, chosen: BoolArray) -> Problem:
+        """The same of some planes (P,) only."""
+        return replace(
+            self,
+            W=self.W[:, chosen],
+            max_weight=self.max_weight[chosen],
+            sectors=tuple(s for s, c in zip(self.sectors, chosen, strict=True) if c),
+        )
 
 
 @dataclass(frozen=True, eq=False)

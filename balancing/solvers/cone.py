@@ -143,14 +143,8 @@ def solve_cone(problem: Problem) -> Cone:
     else:
         weights = np.zeros(len(free), dtype=complex)
         prices = np.zeros(len(free))
-        part = replace(
-            problem,
-            W=problem.W[:, free],
-            max_weight=problem.max_weight[free],
-            sectors=tuple(s for s, f in zip(problem.sectors, free, strict=True) if f),
-        )
         if free.any():
-            weights[free], bound = _optimum(part)
+            weights[free], bound = _optimum(problem.of_planes(free))
             prices[free] = bound.weight_prices
         else:
             bound = _empty(problem)

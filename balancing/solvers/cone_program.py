@@ -10,7 +10,6 @@ same for micrometres and grams as for metres and kilograms.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -205,11 +204,8 @@ def quadratic_minimum(
     if not free.all():
         found, both = np.zeros_like(start), np.repeat(free, 2)
         if free.any():
-            sectors = tuple(s for s, f in zip(problem.sectors, free, strict=True) if f)
-            part = replace(
-                problem, W=problem.W[:, free], max_weight=problem.max_weight[free], sectors=sectors
-            )
-            found[free] = quadratic_minimum(part, start[free], gradient[both], hessian[np.ix_(both, both)])
+            inner = hessian[np.ix_(both, both)]
+            found[free] = quadratic_minimum(problem.of_planes(free), start[free], gradient[both], inner)
         return found
     n, M, newton = len(gradient), problem.max_weight, unstretch(np.linalg.solve(hessian, -gradient))
     size = np.abs(start)  # a start may be beyond the limits, even where the gradient is 0
