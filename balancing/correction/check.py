@@ -39,7 +39,7 @@ from balancing.data.errors import error_model, reading_covariance, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.regression import stretch
+from rotorid.regression import solution, stretch, unstretch
 
 if TYPE_CHECKING:
     pass
@@ -223,13 +223,11 @@ def _change(
         return None
     A = np.repeat(stretch(W.reshape(-1, P)).reshape(S, C, 1, 2, 2 * P), target.size // (2 * S * C), axis=2)
     matrix = white(A.reshape(S, -1, 2 * P)).reshape(-1, 2 * P)
-    size = np.linalg.norm(matrix, axis=0)
-    size[size == 0] = 1.0
-    solution = np.linalg.lstsq(matrix / size, target.ravel(), rcond=1e-10)[0] / size
-    chi_square = float(np.sum((target.ravel() - matrix @ solution) ** 2)) / scale
+    delta = solution(matrix, target.ravel(), rcond=1e-10)
+    chi_square = float(np.sum((target.ravel() - matrix @ delta) ** 2)) / scale
     if tail(chi_square, rows, dof) < 1 - LEVEL:
         return None
-    return np.asarray(solution[::2] + 1j * solution[1::2])
+    return unstretch(delta)
 
 
 def _vectors(z: ComplexArray) -> FloatArray:

@@ -95,9 +95,9 @@ def correct(  # noqa: PLR0913
     ------
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
-        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.resolution`). Errors that are
-        assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do, or,
-        without an end of them, a condition number above 1000, which no instrument supports.
+        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.identifiability`). Errors that
+        are assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do,
+        or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
-from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.identifiability import UndeterminedError, scaled_columns
 from balancing.coefficients.influence import Influence
 from balancing.correction.choice import plane_indices, rows_of
 from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
-from balancing.solvers.conditioning import check_stack, scaled_columns
+from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import counted, figures, table
@@ -345,7 +345,7 @@ def _by_maximum(
     F: ComplexArray,
 ) -> tuple[IntArray, ComplexArray]:
     """The best choices by the largest weighted reading and the errors; weights (M, k), theirs replaced."""
-    from balancing.solvers.cone import minmax_cone
+    from balancing.solvers.cone import problem, solve_cone
 
     K, y, w = readings
     D = D.copy()
@@ -353,7 +353,7 @@ def _by_maximum(
     for m in order:
         if len(best) == show and bound[m] >= best[-1][0]:
             break
-        found = minmax_cone(K[:, chosen[m]], y, row_weights=w)
+        found = solve_cone(problem(K[:, chosen[m]], y, w, minmax=True))
         D[m] = found.weights
         errors = float(_errors(F, chosen[[m]], D[[m]])[0])
         best = sorted([*best, (float(np.hypot(found.objective, np.sqrt(errors))), int(m))])[:show]

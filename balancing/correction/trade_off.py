@@ -182,9 +182,9 @@ def trade_off(
 
     Notes
     -----
-    Each point is a cone program (`balancing.solvers.cone.weight_budget_cone`). The curve is convex.
+    Each point is a cone program (`balancing.solvers.cone`). The curve is convex.
     """
-    from balancing.solvers.cone import minmax_cone, weight_budget_cone
+    from balancing.solvers.cone import problem, solve_cone
 
     K, y, w = check_stack(W, Y, row_weights)
     if len(planes) != K.shape[1] or len(set(planes)) != K.shape[1]:
@@ -200,14 +200,14 @@ def trade_off(
         size = np.abs(w * (y + K @ D))
         return float(size.max() if criterion == "max" else np.sqrt(np.mean(size**2)))
 
-    best = minmax_cone(K, y, row_weights=w).weights if criterion == "max" else -gain(A) @ (w * y)
+    best = solve_cone(problem(K, y, w, minmax=True)).weights if criterion == "max" else -gain(A) @ (w * y)
     found = [(0.0, objective(np.zeros_like(best)), np.zeros_like(best))]
     total = float(np.abs(best).sum())
     if total > 0:
         found.append((total, objective(best), best))
     while 1 < len(found) < points:
         place, budget = _longest([t for t, _, _ in found], [v for _, v, _ in found])
-        D = weight_budget_cone(K, y, budget, minmax=criterion == "max", row_weights=w).weights
+        D = solve_cone(problem(K, y, w, minmax=criterion == "max", budget=budget)).weights
         D = np.where(np.abs(D) > DUST * budget, D, 0.0)
         found.insert(place, (budget, objective(D), D))
     return _result(planes, K, y, found, criterion, labels or Labels(), weighted=bool(np.ptp(w) > 0))

@@ -5,13 +5,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from helpers.cones import minmax_cone
 
 from balancing.data.limits import Limits
 from balancing.mounting.attainable import nearest
 from balancing.mounting.discrete import solve_discrete
 from balancing.mounting.holes import equal_holes, from_list
 from balancing.mounting.piece_sums import PieceSums
-from balancing.solvers.cone import InfeasibleError, minmax_cone
+from balancing.solvers.cone import InfeasibleError
 
 METHODS = ("least-squares", "minmax")
 
