@@ -533,17 +533,11 @@ def _limits(c: Correction) -> dict[str, Any] | None:
         "max_weight": {p: finite(w) for p, w in zip(c.planes, weight, strict=True)},
         "amplitude": [finite(a) for a in amplitude],
         "forbidden_deg": {
-            p: [_degrees_of(c, arc, 180.0 if p in c.remove else 0.0) for arc in arcs]
+            p: [c.labels.arc(*arc, opposite=p in c.remove) for arc in arcs]
             for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
             if arcs
         },
     }
-
-
-def _degrees_of(c: Correction, arc: tuple[float, float], turn: float) -> list[float]:
-    """From and to of an arc, in the job's direction; turned to where material is taken away."""
-    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign + turn
-    return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
 
 
 def small(value: float, scale: float) -> str:

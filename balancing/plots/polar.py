@@ -79,7 +79,7 @@ def overview(c: Correction) -> Figure:
 
 def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     """Polar picture of the correction weights, one arrow per plane, with 95 % regions and largest weights."""
-    polar = _polar(ax, c.labels.angle_sign * c.labels.drawn_sign)
+    polar = _polar(ax, c.labels.angles_on_paper)
     mass, angle = c.labels.weight(c.weights)
     regions = _regions(c)
     for p, plane in enumerate(c.planes):
@@ -171,7 +171,7 @@ def _amplitude_limits(ax: Axes, c: Correction, x: FloatArray) -> None:
 
 def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: bool = True) -> Axes:
     """Polar picture of the vibration vectors at one speed (index), before and after, one per sensor."""
-    polar = _polar(ax, c.labels.phase_sign)
+    polar = _polar(ax, c.labels.phases_on_paper)
     old, old_phase = (v[speed] for v in c.labels.vibration(c.before))
     new, new_phase = (v[speed] for v in c.labels.vibration(c.after))
     for k, sensor in enumerate(c.sensors):

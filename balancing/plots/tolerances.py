@@ -70,7 +70,7 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
     rows = [row for row in v.rows if row.kind == "plane"]
     if not rows:
         raise ValueError("this verdict has no planes to draw: give a tolerance")
-    polar = _axes(ax, v.labels.angle_sign * v.labels.drawn_sign)
+    polar = _axes(ax, v.labels.angles_on_paper)
     scale = v.labels.weight_scale
     largest = max(max(row.limit, row.size) for row in rows) * scale
     for k, row in enumerate(rows):
@@ -109,7 +109,7 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
         raise ValueError(
             "this trial weight has no angle to draw: give the phase of the initial reading and the lag"
         )
-    polar = _axes(ax, t.labels.angle_sign * t.labels.drawn_sign)
+    polar = _axes(ax, t.labels.angles_on_paper)
     size, angle = t.labels.weight(t.amount * np.exp(1j * t.angle))
     theta, radius = np.deg2rad(float(angle)), float(size)
     polar.plot([theta, theta], [0, radius], color=COLORS[0], lw=2.2)

@@ -150,9 +150,7 @@ def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any])
 
 def _turn(result: Correction) -> str:
     """What the angle of a weight does to the phase of its vibration."""
-    labels = result.labels
-    same = labels.phase_sign == labels.angle_sign
-    return "is added to" if same else "is taken from"
+    return "is added to" if result.labels.counted_alike else "is taken from"
 
 
 def _discs(

@@ -141,7 +141,7 @@ def _influence(f: Influence) -> dict[str, Any]:
     """Vibration caused by a weight of one at 0°, phase as the job counts it; half widths of 95 %."""
     scale = f.labels.vibration_scale / f.labels.weight_scale
     size = np.abs(f.W) * scale
-    phase = np.mod(f.labels.phase_sign * np.degrees(np.angle(f.W)), 360.0)
+    phase = f.labels.vibration(f.W)[1]
     along, across = _widths(f)
     return {
         "unit": f.unit,
