@@ -19,7 +19,6 @@ in the correction planes explains is found by fitting d = W δ.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,11 +38,7 @@ from balancing.data.errors import error_model, reading_covariance, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.regression import stretch
-
-if TYPE_CHECKING:
-    pass
-
+from rotorid.regression import solution, stretch
 
 LEVEL = 0.95
 """A difference whose χ² would be exceeded by errors alone in less than 5 % of all jobs is not explained."""
@@ -223,13 +218,11 @@ def _change(
         return None
     A = np.repeat(stretch(W.reshape(-1, P)).reshape(S, C, 1, 2, 2 * P), target.size // (2 * S * C), axis=2)
     matrix = white(A.reshape(S, -1, 2 * P)).reshape(-1, 2 * P)
-    size = np.linalg.norm(matrix, axis=0)
-    size[size == 0] = 1.0
-    solution = np.linalg.lstsq(matrix / size, target.ravel(), rcond=1e-10)[0] / size
-    chi_square = float(np.sum((target.ravel() - matrix @ solution) ** 2)) / scale
+    found = solution(matrix, target.ravel(), rcond=1e-10)
+    chi_square = float(np.sum((target.ravel() - matrix @ found) ** 2)) / scale
     if tail(chi_square, rows, dof) < 1 - LEVEL:
         return None
-    return np.asarray(solution[::2] + 1j * solution[1::2])
+    return np.asarray(found[::2] + 1j * found[1::2])
 
 
 def _vectors(z: ComplexArray) -> FloatArray:

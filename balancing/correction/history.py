@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.coefficients.baseline import match_speeds
-from balancing.correction.refine import different, mounted_in
+from balancing.correction.refine import runs_and_weights
 from balancing.data.columns import known, mounted_rows
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
@@ -178,15 +178,9 @@ def history(
     ValueError
         For check runs of other sensors or speeds, and where nobody says what was mounted in them.
     """
-    mounted = [mounted_in(check, corrections) for check in checks]
-    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names, blocks = list(trials.runs), [trials.mean]
-    weights = [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
-    weights[0][:, : len(trials.planes)] = trials.weights
-    for check, own in zip(checks, mounted, strict=True):
-        for name in check.runs:
-            names.append(different(name, names))
+    names, planes, weights = runs_and_weights(trials, checks, corrections)
+    blocks = [trials.mean]
+    for check in checks:
         for name in check.sensors:
             if name not in trials.sensors:
                 known = ", ".join(map(repr, trials.sensors))
@@ -197,21 +191,15 @@ def history(
         block = np.full(shape, complex(np.nan, np.nan))
         block[np.ix_(range(shape[0]), rows, columns)] = check.mean
         blocks.append(block)
-        empty = np.zeros(shape[0], dtype=complex)
-        weights.append(
-            np.column_stack([own.get(plane, empty) for plane in planes])
-            if planes
-            else np.zeros((shape[0], 0), dtype=complex)
-        )
     largest = None if limits is None or not np.isfinite(limits.residual).any() else limits.residual
     first = len(trials.runs)
     return History(
-        runs=tuple(names),
+        runs=names,
         speeds=trials.speeds,
         sensors=trials.sensors,
         planes=planes,
         checks=tuple(r >= first for r in range(len(names))),
-        weights=np.concatenate(weights),
+        weights=weights,
         readings=np.concatenate(blocks),
         limits=largest,
         labels=trials.labels,

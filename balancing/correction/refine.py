@@ -151,6 +151,34 @@ def mounted_in(
     return {plane: np.full(R, weight, dtype=complex) for plane, weight in pairs}
 
 
+def runs_and_weights(
+    trials: Trials, checks: Sequence[Trials], corrections: Correction | Mapping[str, complex] | None
+) -> tuple[tuple[str, ...], tuple[str, ...], ComplexArray]:
+    """Names of all runs (R), of the planes with a weight in any (P), and the weights (R, P).
+
+    Raises
+    ------
+    ValueError
+        As of `mounted_in`.
+    """
+    mounted = [mounted_in(check, corrections) for check in checks]
+    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
+    planes = tuple(dict.fromkeys((*trials.planes, *later)))
+    names = list(trials.runs)
+    for check in checks:
+        for name in check.runs:
+            names.append(different(name, names))
+    weights = np.zeros((len(names), len(planes)), dtype=complex)
+    weights[: len(trials.runs), : len(trials.planes)] = trials.weights
+    first = len(trials.runs)
+    for check, own in zip(checks, mounted, strict=True):
+        last = first + len(check.runs)
+        for p, plane in enumerate(planes):
+            weights[first:last, p] = own.get(plane, 0.0)
+        first = last
+    return tuple(names), planes, weights
+
+
 def different(name: str, names: Sequence[str]) -> str:
     """The name, marked where there is such a run already."""
     new, k = name, 1
@@ -200,18 +228,10 @@ def _joined(
     columns: list[int],
 ) -> Trials:
     """Trial and check runs as one table, at speeds and sensors (indices of the trial runs') that all have."""
-    mounted = [mounted_in(check, corrections) for check in checks]
-    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names, weights = list(trials.runs), [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
-    weights[0][:, : len(trials.planes)] = trials.weights
+    names, planes, weights = runs_and_weights(trials, checks, corrections)
     blocks = [trials.readings[:, :, rows][..., columns]]
     steps = [_steps(trials)[:, :, :, rows][..., columns]]
-    for check, own in zip(checks, mounted, strict=True):
-        for name in check.runs:
-            names.append(different(name, names))
-        empty = np.zeros(len(check.runs), dtype=complex)
-        weights.append(np.column_stack([own.get(plane, empty) for plane in planes]))
+    for check in checks:
         speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
         sensors = _sensors(check, trials)
         at, of = [speeds.index(s) for s in rows], [sensors.index(c) for c in columns]
@@ -219,12 +239,12 @@ def _joined(
         steps.append(_steps(check)[:, :, :, at][..., of])
     rounded = any(each.steps is not None for each in (trials, *checks))
     return Trials(
-        runs=tuple(names),
+        runs=names,
         speeds=trials.speeds[rows],
         sensors=tuple(trials.sensors[c] for c in columns),
         planes=planes,
         readings=_side_by_side(blocks),
-        weights=np.concatenate(weights),
+        weights=weights,
         errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
         run_errors=next((each.run_errors for each in (trials, *checks) if each.run_errors is not None), None),
         labels=trials.labels,
