@@ -15,7 +15,7 @@ of the total hold.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,28 +44,6 @@ _REGION = 5.991464547107979
 """χ² of two degrees of freedom that errors alone exceed with 5 %."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trim:
-    """What to add to what is mounted.
-
-    Attributes
-    ----------
-    planes
-        Names (P,), of the correction and of what is mounted.
-    mounted, target, add
-        Weights in the last run, wanted on the bare rotor, and the difference to mount; angle with the
-        rotation, kg or kg·m, shape (P,).
-    run
-        Name of the last run; None where nothing is mounted.
-    """
-
-    planes: tuple[str, ...]
-    mounted: ComplexArray
-    target: ComplexArray
-    add: ComplexArray
-    run: str | None
-
-
 def refine(
     trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
 ) -> Influence:
@@ -84,7 +62,7 @@ def refine(
     Returns
     -------
     Influence
-        Its last run is the last check run, so that `correct` proposes what to add to it (`trim`). Where
+        Its last run is the last check run, so that `Correction.to_add` is what to add to it. Where
         check runs do not cover a sensor or speed, its coefficients are those of the trial runs alone.
         Warnings name every coefficient that moved by more than 50 % or 45°.
 
@@ -107,24 +85,6 @@ def refine(
         refined = _partly(trials, checks, corrections, rows, columns, alone)
     words = notes if alone is None else _moved(alone, refined)
     return replace(refined, warnings=refined.warnings + words)
-
-
-def trim(correction: Correction) -> Trim:
-    """What to add to the weights mounted in the last run, so that they become the correction.
-
-    Parameters
-    ----------
-    correction
-        By refined coefficients: `correct(refine(trials, check))`. Planes that it does not use but that hold
-        a weight are emptied.
-    """
-    if correction.mounted is None:
-        nothing = np.zeros(len(correction.planes), dtype=complex)
-        return Trim(correction.planes, nothing, correction.weights, correction.weights, None)
-    run, planes, mounted = correction.mounted
-    total = dict(zip(correction.planes, correction.weights.tolist(), strict=True))
-    target = np.array([total.get(plane, 0j) for plane in planes], dtype=complex)
-    return Trim(planes, mounted, target, target - mounted, run)
 
 
 def mounted_in(
