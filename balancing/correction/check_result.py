@@ -110,7 +110,7 @@ class CheckComparison:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
         labels, readings = self.labels, self._columns()
-        sizes = {column.name: column.values for column in readings}
+        sizes = {column.name: list(column.values) for column in readings}
         mounted = [
             {"run": run, "weights": weight_rows(labels, self.planes, weights)}
             for run, weights in zip(self.runs, self.weights, strict=True)
@@ -172,7 +172,7 @@ class CheckComparison:
         return (
             Column("run", np.repeat(self.runs, S * C)),
             *(
-                replace(column, values=np.tile(column.values, R))
+                replace(column, values=list(column.values) * R)
                 for column in reading_columns(self.speeds, self.sensors)
             ),
             *vector_columns(labels, "before", before, dust),

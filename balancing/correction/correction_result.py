@@ -218,7 +218,7 @@ class Correction:
         scale = self.labels.vibration_scale
         old = np.abs(self.before) * scale
         residuals = self._residual_columns()
-        new = residuals[4].values
+        new = np.array(residuals[4].values)
         return plain(
             {
                 "judgement": self.counsel.to_dict(self.labels),

@@ -116,7 +116,7 @@ def _influence(f: Influence) -> dict[str, Any]:
     share = 100 * along / np.where(np.abs(f.W) > 0, np.abs(f.W), np.nan)
     readings = reading_columns(f.speeds, f.sensors)
     table = (
-        *(replace(column, values=np.repeat(column.values, len(f.planes))) for column in readings),
+        *(replace(column, values=np.repeat(list(column.values), len(f.planes))) for column in readings),
         Column("plane", f.planes * (len(f.speeds) * len(f.sensors))),
         Column("influence", size.ravel()),
         Column("phase_deg", f.labels.vibration(f.W)[1].ravel()),
