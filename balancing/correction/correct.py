@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,9 +32,6 @@ from balancing.solvers.conditioning import conditioning
 from balancing.solvers.error_propagation import region_radius as region_radius
 from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray
-
-if TYPE_CHECKING:
-    pass
 
 
 def correct(  # noqa: PLR0913

@@ -33,6 +33,7 @@ from balancing.coefficients.baseline import Start
 from balancing.coefficients.identifiability import acting_alike, resolution
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.significance import CLEAR
+from balancing.data.columns import rms
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.solvers.error_propagation import error_form, region_radius
@@ -319,7 +320,7 @@ def coarse(influence: Influence) -> tuple[str, ...]:
     if trials is None or trials.steps is None:
         return ()
     step = float(np.nanmedian(trials.steps[0]))
-    size = float(np.sqrt(np.mean(np.abs(trials.mean) ** 2)))
+    size = rms(trials.mean)
     if step < COARSE * size:
         return ()
     steps, readings = _shown(labels, step, 2), _shown(labels, size, 2)

@@ -132,3 +132,12 @@ def region_radius(dof: float | None) -> float:
     from scipy.special import chdtri, fdtri
 
     return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
+
+
+def region_edge(values: ComplexArray, covariance: FloatArray, dof: float | None, points: int) -> ComplexArray:
+    """Points (…, points + 1) on the edge of the 95 % region of values (…) of covariance (…, 2, 2)."""
+    variances, axes = np.linalg.eigh(covariance)
+    turn = np.linspace(0.0, 2 * np.pi, points + 1)
+    reach = region_radius(dof) * np.sqrt(np.maximum(variances, 0.0))
+    edge = (axes * reach[..., None, :]) @ np.stack((np.cos(turn), np.sin(turn)))
+    return np.asarray(values[..., None] + edge[..., 0, :] + 1j * edge[..., 1, :])

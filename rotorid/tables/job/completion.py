@@ -92,7 +92,7 @@ def completed(
         plane_nodes=model.plane_nodes,
         sensor_places=model.sensor_places,
         sensor_angles={
-            name: job.conventions.angle_sign * keys.angle_deg + 0.0
+            name: job.conventions.labels.with_rotation(keys.angle_deg)
             for name, keys in sensor_keys.items()
             if keys.angle_deg is not None
         },
@@ -105,7 +105,7 @@ def completed(
             if name in planes and keys.trial_radius is not None
         },
         slow_roll=None if roll is None else roll.vectors,
-        key_phasor=job.conventions.angle_sign * extra.key_phasor + 0.0,
+        key_phasor=job.conventions.labels.with_rotation(extra.key_phasor),
     )
 
 

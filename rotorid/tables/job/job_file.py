@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from balancing.data.conventions import Labels
 from rotorid.base.text import counted
 from rotorid.tables.job.assumed import with_assumed
 from rotorid.tables.job.completion import completed
@@ -119,8 +120,8 @@ def _read(
         problems.stop()
         raise AssertionError
     job = _read_tables(path, runs, weights, influence, settings, problems, unclear=unclear)
-    sign = 1 if job is None else job.conventions.angle_sign
-    model = read_model(extra.rotor, planes, sensors, sign, problems, named="rotor" in top)
+    labels = Labels() if job is None else job.conventions.labels
+    model = read_model(extra.rotor, planes, sensors, labels, problems, named="rotor" in top)
     if job is not None:
         job = completed(job, model, extra, settings, top, planes, sensors, problems)
     problems.stop()

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.data.limits import Arc, Limits
+from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
-from rotorid.tables.job.keys import Pair, PlaneKeys, SensorKeys
+from rotorid.tables.job.keys import PlaneKeys, SensorKeys
 from rotorid.tables.job.quantity import Quantity, to_job_weight
 from rotorid.tables.reader import units
 from rotorid.tables.reader.number import parse_number
@@ -47,7 +47,7 @@ def make_limits(
             else:
                 amount[name] = value
         if plane.forbidden:
-            arcs[name] = tuple(arc(pair, labels.angle_sign, remove=plane.remove) for pair in plane.forbidden)
+            arcs[name] = tuple(labels.arc_from(*pair, opposite=plane.remove) for pair in plane.forbidden)
     residual: dict[str, float | FloatArray] = {}
     for name, sensor in sensor_keys.items():
         if name in trials.sensors and sensor.limits:
@@ -104,18 +104,6 @@ def at_speeds(
             seen[near] = word
             out[near] = number
     return out
-
-
-def arc(pair: Pair, sign: int, *, remove: bool = False) -> Arc:
-    """A pair of degrees, from → to in the job's direction, as first angle and width in rad with the rotation.
-
-    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material is
-    removed the arc says where nothing can be taken away; the weight that would have to be added instead
-    stands opposite, and so does the arc of the correction (`remove`).
-    """
-    first, last = pair
-    start = (first if sign > 0 else -last) + (180.0 if remove else 0.0)
-    return math.radians(start % 360.0), math.radians((last - first) % 360.0)
 
 
 def _other_kind(weight_unit: str) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
 from fem.model.sensors import Sensor
 from rotorid.base.suggestions import did_you_mean
@@ -40,7 +41,7 @@ def read_model(
     path: Path | None,
     planes: Mapping[str, PlaneKeys],
     sensors: Mapping[str, SensorKeys],
-    angle_sign: int,
+    labels: Labels,
     problems: Problems,
     *,
     named: bool,
@@ -53,8 +54,8 @@ def read_model(
         Of the rotor table or file, or None.
     planes, sensors
         As the job says.
-    angle_sign
-        +1 where the job's angles count with the rotation, −1 against it: `angle_deg` of a sensor counts so.
+    labels
+        How the job counts angles: `angle_deg` of a sensor, too.
     problems
         Collects the complaints, those about the rotor's files too.
     named
@@ -76,7 +77,7 @@ def read_model(
         return Model()
     plane_nodes = {name: node for name, keys in planes.items() if (node := _node(keys, rotor)) is not None}
     places = {
-        name: Sensor(node, angle_sign * (keys.angle_deg or 0.0) + 0.0)
+        name: Sensor(node, labels.with_rotation(keys.angle_deg or 0.0))
         for name, keys in sensors.items()
         if (node := _node(keys, rotor)) is not None
     }

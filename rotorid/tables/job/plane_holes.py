@@ -58,7 +58,7 @@ def _make(
         return None
     known = [size for size in sizes if size is not None]
     turn = 180.0 if remove else 0.0
-    angles = [math.radians((labels.angle_sign * angle + turn) % TURN) for angle in keys.degrees]
+    angles = [math.radians((labels.with_rotation(angle) + turn) % TURN) for angle in keys.degrees]
     taken = [keys.taken.get(name, 0.0) / labels.weight_scale for name in keys.names]
     kept = [k for k, angle in enumerate(angles) if taken[k] > 0 or not inside(angle, arcs)]
     if not any(taken[k] == 0 for k in kept):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from balancing.data.conventions import Angles, Phase
+from balancing.data.conventions import Angles, Labels, Phase
 from rotorid.tables.job.job_data import Source
 from rotorid.tables.job.keys import by_speed
 from rotorid.tables.reader.grid import Grid
@@ -57,7 +57,7 @@ class Overrides:
     run_error_percent: float | None = None
 
     def __post_init__(self) -> None:
-        Conventions(as_phase(self.phase or "lead"))
+        Labels(phase=as_phase(self.phase or "lead"))
         if self.angles is not None:
             check_angles(self.angles)
         self.errors(None)
@@ -210,7 +210,8 @@ def settle_conventions(
     t = settings.turning
     own = {"phase": settings.phase, "angles": settings.angles}
     unstated = tuple(name for name, word in own.items() if word is None)
+    labels = Labels(phase=phase, angles=angles, rotation=t.rotation, view=t.view, clock=t.clock)
     return (
-        Conventions(phase, angles, settings.speed_tolerance_percent, t.rotation, t.view, t.clock, unstated),
+        Conventions(labels, settings.speed_tolerance_percent, unstated),
         tuple(notes),
     )

@@ -30,7 +30,7 @@ from rotorid.tables.reader.grid import Grid
 from rotorid.tables.reader.problems import InputError, Problems
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import Unit, UnitError
-from rotorid.tables.runs.conventions import Conventions, polar
+from rotorid.tables.runs.conventions import Conventions
 from rotorid.tables.runs.speeds import same_speed, show_speed
 from rotorid.tables.runs.trials import make_trials
 
@@ -207,7 +207,7 @@ def _from_vectors(keys: SlowRollKeys, trials: Trials, conventions: Conventions) 
             continue
         size = np.array([unit.to_si(vector.amplitude)])
         angle = np.array([np.radians(vector.phase_deg)])
-        vectors[trials.sensors.index(name)] = polar(size, angle, conventions.phase_sign)[0]
+        vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]
     return _Found(vectors, None, tuple(keys.vectors))
 
 

@@ -42,7 +42,7 @@ def case(seed):
     planes = []
     for _ in range(P):
         H, K = int(rng.integers(2, 6 if P < 3 else 4)), int(rng.integers(1, 3))
-        angles = equal_holes(H, rng.uniform(0, 6), int(rng.choice([-1, 1])))
+        angles = int(rng.choice([-1, 1])) * equal_holes(H, rng.uniform(0, 6))
         if rng.random() < 0.4:
             angles = rng.uniform(0, 2 * np.pi, H)
         taken = np.zeros(H)

@@ -177,7 +177,7 @@ def test_what_is_mounted_counts_for_the_largest_weight():
 
 def test_words_follow_the_angles_of_the_job():
     against = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
-    holes = from_list(equal_holes(12, 0.0, -1), [0.01], per_hole=2)
+    holes = from_list(-equal_holes(12), [0.01], per_hole=2)
     found = split(0.02 * np.exp(-1j * np.radians(120)), holes)
     assert found.lines(against) == ["2 × 10 g in hole 5 (at 120°)"]
     document = found.to_dict(against)
