@@ -57,12 +57,12 @@ def _rotors() -> Pictures:
 
 def _balancing() -> Pictures:
     import balancing
-    from balancing.plots import polar, tolerances, trade_off_curve
+    from balancing.plots import correction_polar, tolerances, trade_off_curve
     from balancing.plots.unbalance_bars import unbalance_bars
-    from balancing.trial_result import TrialWeight
+    from balancing.trial_weight_result import TrialWeight
 
     return {
-        balancing.Correction: polar.draw_correction,
+        balancing.Correction: correction_polar.draw_correction,
         balancing.TradeOff: trade_off_curve.draw_trade_off,
         balancing.Verdict: tolerances.residuals,
         balancing.Tolerance: tolerances.tolerance_circles,

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.coefficients.alike_planes import check_resolution
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import UndeterminedError, check_planes
 from balancing.coefficients.influence import Influence
-from balancing.correction.choice import plane_indices, rows_of
+from balancing.coefficients.unresolved_planes import check_resolution
+from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
 from balancing.correction.correction_warnings import (
     EMPTY,
@@ -23,14 +23,14 @@ from balancing.correction.correction_warnings import (
     notes,
     reading_names,
 )
-from balancing.correction.counsel import Stakes, coarse, judged, remedies
+from balancing.correction.mount_decision import Stakes, coarse, judged, remedies
 from balancing.correction.region_coverage import optimism, uncertain
-from balancing.correction.stack_errors import stack_errors
+from balancing.correction.selected_planes import plane_indices, rows_of
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.solvers.conditioning import conditioning
+from balancing.solvers.correction_methods import Fitted, Stack, fit_weights
 from balancing.solvers.error_propagation import region_radius as region_radius
-from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray
 
 

@@ -10,10 +10,13 @@ import numpy as np
 
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
+from balancing.correction.convention_assumptions import OtherReading, assumptions, contradiction
 from balancing.correction.correction_words import error_document, error_words, method_words
-from balancing.correction.counsel import Counsel
-from balancing.correction.other_readings import OtherReading, assumptions, contradiction
-from balancing.data.columns import (
+from balancing.correction.mount_decision import Counsel
+from balancing.data.conventions import Labels
+from balancing.data.limits import Limits
+from balancing.data.reading_errors import Source
+from balancing.data.result_columns import (
     degrees,
     known,
     reading_columns,
@@ -23,9 +26,6 @@ from balancing.data.columns import (
     weight_columns,
     weight_rows,
 )
-from balancing.data.conventions import Labels
-from balancing.data.errors import Source
-from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -76,7 +76,7 @@ class Correction:
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
-        Of `balancing.solvers.methods`: one of `METHODS` or `VARIANTS`.
+        Of `balancing.solvers.correction_methods`: one of `METHODS` or `VARIANTS`.
     mounted
         Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
     labels

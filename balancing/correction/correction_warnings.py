@@ -15,7 +15,7 @@ from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
-    from balancing.solvers.methods import Fitted, Stack
+    from balancing.solvers.correction_methods import Fitted, Stack
 
 
 ILL_CONDITIONED = 30.0

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
-from balancing.correction.subsets import Criterion, criterion_words
-from balancing.data.columns import three_figures, weight_rows
+from balancing.correction.best_planes import Criterion, criterion_words
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import three_figures, weight_rows
 from balancing.solvers.conditioning import check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from balancing.plots.polar import MARKERS
+from balancing.plots.correction_polar import MARKERS
 from rotorid.base.style import COLORS
 from rotorid.base.text import figures
 

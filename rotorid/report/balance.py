@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 
 RUNS_ABREAST = 4

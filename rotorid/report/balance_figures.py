@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction
     from balancing.mounting.holes import Holes
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
 
 ROWS_SHOWN = 60
 """Readings in one figure; beyond that the largest ones are shown."""

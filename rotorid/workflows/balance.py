@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
     """What `method` chooses from."""
-    from balancing.solvers.methods import METHODS
+    from balancing.solvers.correction_methods import METHODS
 
     return {"method": METHODS}
 
@@ -188,13 +188,17 @@ class Balance(Outcome):
 
     def figure(self) -> Figure:
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
-        from balancing.plots import discs, polar, tolerances, trade_off_curve
+        from balancing.plots import correction_polar, discs, tolerances, trade_off_curve
 
         if self.mounted is not None:
             return discs.mounted_discs(self.mounted)
         if self.verdict is not None and any(row.kind == "plane" for row in self.verdict.rows):
             return tolerances.overview(self.result, self.verdict)
-        return polar.overview(self.result) if self.curve is None else trade_off_curve.overview(self.curve)
+        return (
+            correction_polar.overview(self.result)
+            if self.curve is None
+            else trade_off_curve.overview(self.curve)
+        )
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -334,7 +338,7 @@ def _choose(job: Job, options: BalanceOptions) -> Known:
 
 def _planes(job: Job, known: Known, options: BalanceOptions) -> tuple[Sequence[str], Subsets | None]:
     """Those to use, and the choices among which they are the best."""
-    from balancing.correction.subsets import compare_planes
+    from balancing.correction.best_planes import compare_planes
 
     planes = names(options.planes) or used_planes(job, known[0])
     if options.best_planes is None:
@@ -391,7 +395,7 @@ def _again(
 
 
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
-    from balancing.mounting.mounted import mount
+    from balancing.mounting.mount import mount
 
     return mount(
         result,
@@ -435,7 +439,7 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
 def _trade_off(result: Correction, influence: Influence, job: Job) -> TradeOff:
     """Residual against total weight, in the planes and at the speeds used."""
     from balancing.coefficients.baseline import match_speeds
-    from balancing.correction.choice import plane_indices
+    from balancing.correction.selected_planes import plane_indices
     from balancing.correction.trade_off import trade_off
 
     at = match_speeds(result.speeds, influence.speeds)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def with_contradiction(job: Job) -> Job:
     """The job with the warning, before all others, where its runs contradict its conventions."""
-    from balancing.correction.other_readings import contradiction
+    from balancing.correction.convention_assumptions import contradiction
 
     words = contradiction(_ask(job), job.trials.labels)
     return replace(job, trials=replace(job.trials, warnings=words + job.trials.warnings))
@@ -43,7 +43,7 @@ def with_other_readings(
         Whether the check runs took part: what was mounted in them as proposed, before it was refined, was
         proposed by these conventions and by no others.
     """
-    from balancing.correction.other_readings import OtherReading, contradiction
+    from balancing.correction.convention_assumptions import OtherReading, contradiction
 
     if refined and not job.check_mounted:
         again, test = None, _ask(job)
@@ -76,7 +76,7 @@ def with_other_readings(
 def _ask(job: Job, mounted: Correction | None = None) -> ConventionTest:
     """What trial runs, and check runs of which is known what was mounted, say about conventions."""
     from balancing.coefficients.convention_test import convention_test
-    from balancing.correction.refine import together
+    from balancing.correction.refine_coefficients import together
 
     if job.check is None or not (mounted or job.check_mounted):
         return convention_test(job.trials)

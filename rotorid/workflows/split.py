@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.data.conventions import Labels
-    from balancing.mounting.hand_mounting import Rounded, TwoPositions
+    from balancing.mounting.combine_trim_round import Rounded, TwoPositions
     from balancing.mounting.holes import Holes
-    from balancing.mounting.removal import Drilling, Grinding
+    from balancing.mounting.material_removal import Drilling, Grinding
     from balancing.mounting.split import OnHoles
     from rotorid.workflows.quantities import Amount, Vector
 
@@ -139,8 +139,8 @@ class SplitWeight(Outcome):
 
     def figure(self) -> Figure:
         """A disc for each solution."""
-        from balancing.mounting.hand_mounting import Rounded, TwoPositions
-        from balancing.mounting.removal import Drilling
+        from balancing.mounting.combine_trim_round import Rounded, TwoPositions
+        from balancing.mounting.material_removal import Drilling
         from balancing.mounting.split import OnHoles
         from balancing.plots.discs import placed
 
@@ -171,7 +171,7 @@ def split(weight: Vector, options: SplitOptions | None = None) -> SplitWeight:
     ValueError
         For a weight or an option that cannot be, or that means nothing with the way that was chosen.
     """
-    from balancing.mounting.hand_mounting import combine, trim
+    from balancing.mounting.combine_trim_round import combine, trim
     from rotorid.workflows.quantities import size, vectors
 
     options = options or SplitOptions()
@@ -236,7 +236,7 @@ def _on_holes(target: complex, labels: Labels, radius: float | None, options: Sp
 def _at_two_angles(
     target: complex, labels: Labels, radius: float | None, options: SplitOptions
 ) -> TwoPositions:
-    from balancing.mounting.hand_mounting import two_positions
+    from balancing.mounting.combine_trim_round import two_positions
     from rotorid.workflows.quantities import weights
 
     assert options.two is not None
@@ -263,7 +263,7 @@ def _unbalance(target: complex, labels: Labels, radius: float | None, why: str) 
 def _drilled(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Drilling:
     import numpy as np
 
-    from balancing.mounting.removal import Drill, drill_holes
+    from balancing.mounting.material_removal import Drill, drill_holes
     from rotorid.workflows.quantities import size
 
     unbalance, at = _unbalance(target, labels, radius, "--drill")
@@ -284,7 +284,7 @@ def _drilled(target: complex, labels: Labels, radius: float | None, options: Spl
 
 
 def _ground(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Grinding:
-    from balancing.mounting.removal import grind
+    from balancing.mounting.material_removal import grind
 
     return grind(*_unbalance(target, labels, radius, "--grind"))
 
@@ -292,7 +292,7 @@ def _ground(target: complex, labels: Labels, radius: float | None, options: Spli
 def _rounded(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Rounded:
     import numpy as np
 
-    from balancing.mounting.hand_mounting import rounded
+    from balancing.mounting.combine_trim_round import rounded
     from rotorid.workflows.quantities import weight
 
     angle = options.angle_step or 0.0

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.trial_angle import Lag, Quantity
-    from balancing.trial_result import TrialWeight
+    from balancing.trial_weight_result import TrialWeight
     from rotorid.tables import Job
     from rotorid.workflows.quantities import Amount
 

@@ -72,7 +72,7 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     ValueError
         For a job without a rotor, and an option that cannot be.
     """
-    from balancing.coefficients.from_model import modal_shapes
+    from balancing.coefficients.coefficients_from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
     from rotorid.base.registry import find
     from rotorid.workflows.coefficients import computed

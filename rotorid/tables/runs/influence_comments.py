@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import Origin, RunErrors
 from balancing.data.conventions import Labels
-from balancing.data.errors import Source
+from balancing.data.reading_errors import Source
 from balancing.data.trials import ReadingErrors
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing

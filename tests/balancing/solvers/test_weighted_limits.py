@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from balancing import Limits
-from balancing.solvers import likelihood, methods, weighted_limits
-from balancing.solvers.methods import fit_weights
+from balancing.solvers import correction_methods, likelihood, weighted_limits
+from balancing.solvers.correction_methods import fit_weights
 from rotorid.regression import stretch
 from tests.helpers.limited_problems import global_search, problem
 from tests.helpers.repetitions import FULL
@@ -20,7 +20,7 @@ TRIES = 15 if FULL else 6
 @pytest.fixture
 def quick(monkeypatch):
     """No covariances."""
-    monkeypatch.setattr(methods, "sampled_covariance", lambda solver, W, Y, channels, common: None)
+    monkeypatch.setattr(correction_methods, "sampled_covariance", lambda solver, W, Y, channels, common: None)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -68,12 +68,12 @@ def test_steps_that_do_not_settle_are_told(quick, monkeypatch):
 
 def test_planes_that_must_stay_empty(quick):
     stack, _ = problem(15)
-    stack = methods.replace(stack, explained=lambda D: True)  # with three planes and with one
+    stack = correction_methods.replace(stack, explained=lambda D: True)  # with three planes and with one
     arcs = (((0.0, 2 * np.pi),), (), ())
     limits = Limits(np.array([np.inf, 0.0, np.inf]), np.full((1, 7), np.inf), arcs)
-    found = fit_weights(methods.replace(stack, limits=limits), "weighted")
+    found = fit_weights(correction_methods.replace(stack, limits=limits), "weighted")
     assert (found.weights[:2] == 0).all()
-    only = methods.replace(
+    only = correction_methods.replace(
         stack,
         W=stack.W[:, 2:],
         channels=stack.channels[:, [0, 1, 6, 7]][..., [0, 1, 6, 7]],

@@ -271,7 +271,12 @@ def unstretched(function):
             50,
         ),
         ("balancing.coefficients.influence.gain", lambda f: times(f, np.exp(0.05j)), "balancing", 4),
-        ("balancing.solvers.solve._closed_form", lambda f: times(f, np.exp(0.05j)), "balancing", 8),
+        (
+            "balancing.solvers.least_squares_minmax._closed_form",
+            lambda f: times(f, np.exp(0.05j)),
+            "balancing",
+            8,
+        ),
     ],
 )
 def test_a_wrong_formula_makes_numbers_differ(monkeypatch, target, wrong, name, least):

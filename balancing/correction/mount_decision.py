@@ -32,10 +32,10 @@ import numpy as np
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.identifiability import acting_alike, resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.significance import CLEAR
-from balancing.data.columns import rms
+from balancing.coefficients.trial_effects import CLEAR
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
+from balancing.data.result_columns import rms
 from balancing.solvers.error_propagation import error_form, region_radius
 from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray

@@ -9,8 +9,8 @@ from cases import each_of
 
 from balancing import Influence, Limits, ReadingErrors, UndeterminedError, correct, estimate_influence
 from balancing.coefficients.baseline import starting_point
-from balancing.correction.counsel import Stakes, remedies
-from balancing.data.errors import reading_covariance
+from balancing.correction.mount_decision import Stakes, remedies
+from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import error_form, prediction_covariance
 
 ERRORS = ReadingErrors(0.02, 0.02)

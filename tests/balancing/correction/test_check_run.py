@@ -10,8 +10,8 @@ from fem_rotors import rotor23
 
 import fem
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.correction.check import compare_check
-from balancing.data.errors import reading_covariance
+from balancing.correction.check_run import compare_check
+from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import prediction_covariance
 
 ERRORS = ReadingErrors(amplitude=0.02, phase=np.deg2rad(1.0))

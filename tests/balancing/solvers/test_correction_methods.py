@@ -18,7 +18,7 @@ from balancing import (
     unbalance,
 )
 from balancing.correction import correction_result
-from balancing.solvers import methods
+from balancing.solvers import correction_methods
 from balancing.solvers.effective_variance import effective_variance
 from fem.model import supports
 from rotorid.base.registry import Method
@@ -262,10 +262,10 @@ def test_a_method_is_one_entry(monkeypatch):
     mine = Method(
         "mine",
         "the answer is that of least squares",
-        methods.find(methods.METHODS, "least-squares", "").function,
+        correction_methods.find(correction_methods.METHODS, "least-squares", "").function,
     )
-    for module in (methods, correction_result):
-        monkeypatch.setattr(module, "METHODS", (*methods.METHODS, mine))
+    for module in (correction_methods, correction_result):
+        monkeypatch.setattr(module, "METHODS", (*correction_methods.METHODS, mine))
     trials, _ = job()
     influence = estimate_influence(trials)
     found = correct(influence, method="mine")
@@ -275,7 +275,14 @@ def test_a_method_is_one_entry(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "known", [methods.METHODS, methods.VARIANTS, unbalance.METHODS, reduction.METHODS, supports.KINDS]
+    "known",
+    [
+        correction_methods.METHODS,
+        correction_methods.VARIANTS,
+        unbalance.METHODS,
+        reduction.METHODS,
+        supports.KINDS,
+    ],
 )
 def test_each_entry_of_a_registry_has_a_name_of_its_own_and_a_clause(known):
     assert len({each.name for each in known}) == len(known)

@@ -7,7 +7,7 @@ from fem_rotors import rotor23
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, correct
-from balancing.coefficients.from_model import modal_shapes, model_influence
+from balancing.coefficients.coefficients_from_model import modal_shapes, model_influence
 
 PLANES = {"left": 7, "right": 18}
 SENSORS = {"A": 4, "B": (20, 30.0), "C": fem.Sensor(12, -45.0)}

@@ -5,8 +5,8 @@ import pytest
 from cases import each_of
 from scipy.integrate import quad
 
-from balancing.mounting.hand_mounting import combine, round_to, rounded, trim, two_positions
-from balancing.mounting.removal import Drill, drill_holes, grind, opposite, row_factor
+from balancing.mounting.combine_trim_round import combine, round_to, rounded, trim, two_positions
+from balancing.mounting.material_removal import Drill, drill_holes, grind, opposite, row_factor
 
 STEEL = 7850.0
 

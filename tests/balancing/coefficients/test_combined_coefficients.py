@@ -7,7 +7,7 @@ import pytest
 from balancing_data import GRAM, complex_normal, job, synthetic
 
 from balancing import Influence, Labels, ReadingErrors, correct, estimate_influence
-from balancing.coefficients.combine import combine
+from balancing.coefficients.combined_coefficients import combine
 
 ERRORS = ReadingErrors(0.03, 0.03)
 

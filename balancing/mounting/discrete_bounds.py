@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from balancing.mounting.attainable import Attainable
+from balancing.mounting.mountable_vectors import Attainable
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import solution, stretch, unstretch
 

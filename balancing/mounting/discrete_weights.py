@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.data.limits import Limits
-from balancing.mounting.attainable import Attainable, nearest
-from balancing.mounting.discrete_relax import best_form, form, project_out, relax
+from balancing.mounting.discrete_bounds import best_form, form, project_out, relax
 from balancing.mounting.discrete_search import Found, polish, search
 from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.mountable_vectors import Attainable, nearest
 from balancing.mounting.piece_sums import LONGEST, PieceSums
 from balancing.solvers.certificate import Problem
 from balancing.solvers.cone import InfeasibleError, problem, solve_cone

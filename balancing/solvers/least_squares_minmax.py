@@ -14,8 +14,8 @@ from balancing.data.limits import Limits
 from balancing.solvers.certificate import Problem
 from balancing.solvers.conditioning import check_stack
 from balancing.solvers.cone import Cone, InfeasibleError, problem
-from balancing.solvers.infeasible import explain
-from balancing.solvers.sectors import allowed_sectors, meets, solve_sectors
+from balancing.solvers.conflicting_limits import explain
+from balancing.solvers.forbidden_angles import allowed_sectors, meets, solve_sectors
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.regression import solution_and_rank
 

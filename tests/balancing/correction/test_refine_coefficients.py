@@ -9,7 +9,7 @@ from balancing_data import GRAM, complex_normal, job, synthetic
 
 from balancing import ReadingErrors, UndeterminedError, correct, estimate_influence
 from balancing.coefficients.influence import estimate_like
-from balancing.correction.refine import refine
+from balancing.correction.refine_coefficients import refine
 from rotorid.tables import read_job
 
 SAMPLES = Path(__file__).parents[3] / "sample_data"

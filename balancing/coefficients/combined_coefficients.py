@@ -25,7 +25,7 @@ import numpy as np
 from balancing.coefficients.baseline import SPEED_TOLERANCE
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
-from balancing.data.errors import hermitian, symmetric
+from balancing.data.reading_errors import hermitian, symmetric
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
 from rotorid.regression import stretch

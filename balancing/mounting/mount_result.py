@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.correction.correction_result import Correction, small
-from balancing.mounting.discrete import Discrete
+from balancing.mounting.discrete_weights import Discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text

@@ -8,9 +8,9 @@ import pytest
 from helpers.cones import minmax_cone
 
 from balancing.data.limits import Limits
-from balancing.mounting.attainable import nearest
-from balancing.mounting.discrete import solve_discrete
+from balancing.mounting.discrete_weights import solve_discrete
 from balancing.mounting.holes import equal_holes, from_list
+from balancing.mounting.mountable_vectors import nearest
 from balancing.mounting.piece_sums import PieceSums
 from balancing.solvers.cone import InfeasibleError
 

@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.influence import Influence
+from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
-from balancing.correction.stack_errors import stack_errors
 from balancing.data.trials import Trials
-from balancing.mounting.discrete import solve_discrete
+from balancing.mounting.discrete_weights import solve_discrete
 from balancing.mounting.holes import Holes
-from balancing.mounting.mounted_result import Mounted
+from balancing.mounting.mount_result import Mounted
 from balancing.solvers.error_propagation import prediction_covariance
 from rotorid.base.arrays import FloatArray
 

@@ -32,10 +32,10 @@ from balancing.coefficients.run_errors import (
     run_columns,
     runs_of,
 )
-from balancing.correction.check_result import CheckComparison
+from balancing.correction.check_run_result import CheckComparison
 from balancing.correction.correction_result import Correction
-from balancing.correction.refine import mounted_in
-from balancing.data.errors import error_model, reading_covariance, symmetric
+from balancing.correction.refine_coefficients import mounted_in
+from balancing.data.reading_errors import error_model, reading_covariance, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray

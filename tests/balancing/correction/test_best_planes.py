@@ -9,8 +9,8 @@ from balancing_data import complex_normal
 from helpers.cones import minmax_cone
 
 from balancing import Labels, ReadingErrors, UndeterminedError
-from balancing.correction.subsets import best_subsets
-from balancing.data.errors import reading_covariance
+from balancing.correction.best_planes import best_subsets
+from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import prediction_covariance
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -105,7 +105,7 @@ def test_choices_with_planes_that_act_alike_are_left_out_and_counted():
 def test_many_choices_in_batches_are_the_same(monkeypatch):
     W, Y, _ = case(N=20, P=10)
     whole = best_subsets(W, Y, NAMES[:10], 4, show=210)
-    monkeypatch.setattr("balancing.correction.subsets._BATCH", 7 * 4 * 10)
+    monkeypatch.setattr("balancing.correction.best_planes._BATCH", 7 * 4 * 10)
     parts = best_subsets(W, Y, NAMES[:10], 4, show=210)
     assert whole.choices == 210
     assert parts.planes == whole.planes

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.data.errors import symmetric
+from balancing.data.reading_errors import symmetric
 from balancing.solvers.conditioning import check_channels, check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch

@@ -2,7 +2,7 @@
 
 `balancing.mounting.piece_sums` makes them of pieces in holes, `balancing.mounting.free_amounts` of free
 amounts in steps. One given weight (`balancing.mounting.split`) and the joint search over planes
-(`balancing.mounting.discrete`) look them up here.
+(`balancing.mounting.discrete_weights`) look them up here.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.correction.correction_result import DUST
-from balancing.data.columns import known, reading_columns, rms, vector_columns, weight_rows
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import known, reading_columns, rms, vector_columns, weight_rows
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text

@@ -16,7 +16,7 @@ import numpy as np
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem
 from balancing.solvers.cone_program import InfeasibleError, SolverError
-from balancing.solvers.sectors import solve_sectors
+from balancing.solvers.forbidden_angles import solve_sectors
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 
@@ -64,7 +64,7 @@ def relax(whole: Problem, sectors: Sequence[Sequence[Arc] | None]) -> Relaxation
     whole
         With finite limits of amplitudes; what it minimises does not matter.
     sectors
-        What `balancing.solvers.sectors.allowed_sectors` returns for each plane.
+        What `balancing.solvers.forbidden_angles.allowed_sectors` returns for each plane.
 
     Raises
     ------

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from balancing.data.limits import Limits
 from balancing.solvers.cone import InfeasibleError, problem
-from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
-from balancing.solvers.solve import solve
+from balancing.solvers.forbidden_angles import allowed_sectors, solve_sectors, stands_in
+from balancing.solvers.least_squares_minmax import solve
 
 TURN = 2 * np.pi
 seeds = st.integers(0, 2**32 - 1)

@@ -5,7 +5,7 @@ import pytest
 from balancing_data import complex_normal
 
 from balancing.solvers.error_propagation import correction_jacobian
-from balancing.solvers.sampling import sampled_covariance
+from balancing.solvers.monte_carlo import sampled_covariance
 from rotorid.regression import gain
 
 

@@ -8,16 +8,16 @@ import numpy as np
 
 from balancing.coefficients.baseline import Start
 from balancing.coefficients.influence import Influence
+from balancing.coefficients.run_error_estimate import seen_in
 from balancing.coefficients.run_errors import (
     RunErrors,
     run_columns,
     runs_of,
 )
-from balancing.coefficients.run_likelihood import seen_in
-from balancing.data.errors import reading_covariance
+from balancing.data.reading_errors import reading_covariance
+from balancing.solvers.correction_methods import Fitted
 from balancing.solvers.effective_variance import UNEXPLAINED
 from balancing.solvers.error_propagation import prediction_covariance
-from balancing.solvers.methods import Fitted
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import stretch
 

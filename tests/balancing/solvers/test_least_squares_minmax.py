@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.data.limits import Limits
 from balancing.solvers.cone import InfeasibleError, problem
-from balancing.solvers.infeasible import relax
-from balancing.solvers.sectors import allowed_sectors
-from balancing.solvers.solve import solve
+from balancing.solvers.conflicting_limits import relax
+from balancing.solvers.forbidden_angles import allowed_sectors
+from balancing.solvers.least_squares_minmax import solve
 
 METHODS = ("least-squares", "minmax")
 seeds = st.integers(0, 2**32 - 1)

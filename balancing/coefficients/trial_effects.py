@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from balancing.coefficients.identifiability import LEVEL, UndeterminedError, significant
+from balancing.coefficients.run_error_estimate import scatter, spare_rows
 from balancing.coefficients.run_errors import Runs
-from balancing.coefficients.run_likelihood import scatter, spare_rows
-from balancing.data.errors import mean_variance
+from balancing.data.reading_errors import mean_variance
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import solution, stretch

@@ -14,14 +14,14 @@ import numpy as np
 
 from balancing.coefficients.identifiability import HOPELESS, UndeterminedError
 from balancing.coefficients.run_errors import marginal
-from balancing.data.errors import mean_variance, symmetric
 from balancing.data.limits import Limits
+from balancing.data.reading_errors import mean_variance, symmetric
 from balancing.solvers.cone import AT_LIMIT
 from balancing.solvers.effective_variance import FLOOR, Effective, effective_variance, widened
 from balancing.solvers.error_propagation import common_covariance, correction_jacobian
+from balancing.solvers.least_squares_minmax import Criterion, Solution, solve
+from balancing.solvers.monte_carlo import sampled_covariance
 from balancing.solvers.regularised import ridge, truncated
-from balancing.solvers.sampling import sampled_covariance
-from balancing.solvers.solve import Criterion, Solution, solve
 from balancing.solvers.weighted_limits import (
     RIVAL,
     SETTLED_DRAWN,

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import UndeterminedError, scaled_columns
 from balancing.coefficients.influence import Influence
-from balancing.correction.choice import plane_indices, rows_of
-from balancing.data.columns import rms, three_figures, weight_rows
+from balancing.correction.selected_planes import plane_indices, rows_of
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import rms, three_figures, weight_rows
 from balancing.data.trials import Trials
 from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import error_form
