@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 from balancing.tolerance_allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import rpm, rpm_text
 from rotorid.base.text import wrap
-from rotorid.base.units import rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd

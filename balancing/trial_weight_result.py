@@ -13,8 +13,8 @@ from balancing.data.result_columns import reading_columns, vector_columns
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

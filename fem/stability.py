@@ -16,7 +16,7 @@ from fem.solvers.stable_speeds import Bases
 from fem.whirl import available_modes, checked_number, checked_speeds
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.json import finite
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 SMALLEST = 1e-9
 """Re λ / |λ| above which a mode grows here: an undamped one has rounding there."""

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.matrices.bands import assemble
+from fem.matrices.banded_matrices import assemble
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.eigen import finite_modes
 from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd

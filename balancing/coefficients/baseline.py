@@ -25,7 +25,7 @@ from balancing.data.reading_errors import (
 )
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.base.units import RPM, rpm_text
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.regression import stretch
 
 SPEED_TOLERANCE = 0.005

@@ -27,7 +27,7 @@ from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
 from balancing.data.reading_errors import hermitian, symmetric
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
-from rotorid.base.units import rpm_text
+from rotorid.base.rpm import rpm_text
 from rotorid.regression import stretch
 
 LEVEL = 0.99

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     import pandas as pd
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
-from rotorid.base.units import RPM
+from rotorid.base.rpm import RPM
 from rotorid.regression import gain, stretch
 
 

@@ -14,8 +14,8 @@ from balancing.data.result_columns import known, reading_columns, rms, vector_co
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import rpm
 from rotorid.base.text import figures, sentence, wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from balancing.coefficients.influence import Influence
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.units import rpm_text
+from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction

@@ -16,8 +16,8 @@ from balancing.data.result_columns import known, mounted_rows
 from balancing.data.trials import Trials
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import figures, table, wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -39,8 +39,8 @@ from balancing.data.result_columns import rms
 from balancing.solvers.error_propagation import error_form, region_radius
 from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.rpm import rpm_text
 from rotorid.base.text import figures, listing
-from rotorid.base.units import rpm_text
 from rotorid.regression import solution
 
 Word = Literal["mount", "do not mount", "measure again"]

@@ -25,7 +25,7 @@ from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence, estimate_like
 from balancing.data.trials import Trials
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
-from rotorid.base.units import rpm_text
+from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction

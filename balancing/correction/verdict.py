@@ -32,8 +32,8 @@ from balancing.iso21940 import Tolerance
 from balancing.solvers.correction_methods import Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import figures
-from rotorid.base.units import rpm
 
 
 def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:

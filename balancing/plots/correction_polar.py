@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.style import COLORS, VERMILION
+from rotorid.base.plot_style import COLORS, VERMILION
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import figures
-from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

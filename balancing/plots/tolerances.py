@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.plots.correction_polar import MARKERS, corrections, polar_axes
-from rotorid.base.style import COLORS
+from rotorid.base.plot_style import COLORS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

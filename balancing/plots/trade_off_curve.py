@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from balancing.plots.correction_polar import MARKERS
-from rotorid.base.style import COLORS
+from rotorid.base.plot_style import COLORS
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:

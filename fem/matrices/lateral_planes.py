@@ -1,6 +1,6 @@
 """The rotor in both planes: matrices of its equations of motion in any basis of the shaft.
 
-With single-plane matrices M, B, G, K of the shaft (see `fem.matrices.bands`) and the speed Ω,
+With single-plane matrices M, B, G, K of the shaft (see `fem.matrices.banded_matrices`) and the speed Ω,
 
     x:  M x'' + B x' + Ω G y' + K x + Ω B y + supports = 0
     y:  M y'' + B y' − Ω G x' + K y − Ω B x + supports = 0
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble, multiply
+from fem.matrices.banded_matrices import Matrices, assemble, multiply
 from fem.matrices.strain import strains
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray, IndexArray

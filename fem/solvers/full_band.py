@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.matrices.bands import multiply
+from fem.matrices.banded_matrices import multiply
 from fem.matrices.lateral_planes import Planes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from fem.matrices.lateral_planes import Planes, Quadratic, project
 from fem.solvers.full_band import WholeBand
-from fem.solvers.quadratic import Solutions, polish, solve
+from fem.solvers.quadratic_eigenvalues import Solutions, polish, solve
 from fem.solvers.whirl_basis import Reference, enlarge, reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble
-from fem.matrices.pencil import Pencil, static_stiffness, whole_rotor
+from fem.matrices.banded_matrices import Matrices, assemble
+from fem.matrices.undamped_matrices import Pencil, static_stiffness, whole_rotor
 from fem.model.rotor import Rotor
 from fem.solvers.eigen import finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, FloatArray

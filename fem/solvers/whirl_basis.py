@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.matrices.bands import assemble, multiply
+from fem.matrices.banded_matrices import assemble, multiply
 from fem.matrices.lateral_planes import Planes
 from fem.model.rotor import Rotor
 from fem.model.supports import Support

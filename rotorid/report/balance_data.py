@@ -13,7 +13,7 @@ from balancing.data.result_columns import known, mounted_rows, reading_columns, 
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
-from rotorid.base.units import rpm
+from rotorid.base.rpm import rpm
 from rotorid.regression import coverage_factor
 from rotorid.tables.reader import units
 

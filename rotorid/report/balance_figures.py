@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.report.conventions import plain, weight_words
+from rotorid.report.conventions_explained import plain, weight_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -181,12 +181,12 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
             raise ValueError(
                 f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
             )
-    from rotorid.validation import balancing, lessons, masses, rotor, time_records
+    from rotorid.validation import balancing, equivalent_masses, identification, rotor, time_records
 
     rows = {
         "rotor": rotor.rows,
-        "masses": masses.rows,
-        "lessons": lessons.rows,
+        "masses": equivalent_masses.rows,
+        "lessons": identification.rows,
         "time_records": time_records.rows,
         "balancing": balancing.rows,
     }

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
+from rotorid.workflows.balance_verdict import judge
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.given import file_of
-from rotorid.workflows.other_readings import with_contradiction, with_other_readings
+from rotorid.workflows.input_checks import file_of
+from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
+from rotorid.workflows.other_conventions import with_contradiction, with_other_readings
 from rotorid.workflows.outcome import Outcome, provenance, workflow
-from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
-from rotorid.workflows.verdict import judge
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from rotorid.base.registry import Method
     from rotorid.tables import Job
     from rotorid.tables.job.source import JobSource
-    from rotorid.workflows.quantities import Amount, Amplitudes, Positions, Weights
+    from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -320,7 +320,7 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
 def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
     from rotorid.tables import job_from_files, read_job
     from rotorid.tables.job.source import JobSource
-    from rotorid.workflows.quantities import limited
+    from rotorid.workflows.option_quantities import limited
 
     if isinstance(source, JobSource):
         files, said = source.files, asdict(source.overrides)
@@ -410,7 +410,7 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
     from balancing.iso21940 import tolerance
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.option_quantities import length, mass, positions, speed_with_unit, two_positions
 
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
     along = (options.positions, options.bearings, options.centre)
@@ -469,7 +469,7 @@ def _history(result: Correction, influence: Influence, job: Job) -> History:
 
 def _with_limits(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
     """What the job was read from, with the limits put in place of its own."""
-    from rotorid.workflows.quantities import largest_amplitudes, largest_weights
+    from rotorid.workflows.option_quantities import largest_amplitudes, largest_weights
 
     return replace(
         source,

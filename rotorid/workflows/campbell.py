@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
-from rotorid.workflows.given import rotor_source
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Band, Speeds, band, rising_speeds
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Band, Speeds, band, rising_speeds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +51,7 @@ class CampbellDiagram(Outcome):
 
     def summary(self) -> str:
         """For the terminal."""
-        from fem.separation import separation_text
+        from fem.api684_separation import separation_text
 
         beside = self._separation()
         return "\n".join([self.whirl.summary(), *([] if beside is None else [separation_text(beside)])])
@@ -69,8 +69,8 @@ class CampbellDiagram(Outcome):
 
     def _separation(self) -> dict[str, Any] | None:
         """Of the critical speeds that show a peak."""
+        from fem.api684_separation import separation
         from fem.campbell import HEAVY
-        from fem.separation import separation
 
         if self.operating is None:
             return None

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import rotor_source
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Band, band
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,7 +59,7 @@ class CriticalSpeeds(Outcome):
 
     def summary(self) -> str:
         """For the terminal."""
-        from fem.separation import separation_text
+        from fem.api684_separation import separation_text
 
         blocks = [self.modes.summary()]
         if self.operating is not None:
@@ -73,7 +73,7 @@ class CriticalSpeeds(Outcome):
     def figure(self) -> Figure:
         """The mode shapes, or the map."""
         from fem.plots import draw_modes, draw_speed_map
-        from rotorid.base.style import on_figure
+        from rotorid.base.plot_style import on_figure
 
         if self.chart is None:
             return on_figure(lambda ax: draw_modes(self.modes, ax), 10.0, 5.0)
@@ -99,7 +99,7 @@ class CriticalSpeeds(Outcome):
         )
 
     def _separation(self, operating: tuple[float, float]) -> dict[str, Any]:
-        from fem.separation import separation
+        from fem.api684_separation import separation
 
         return separation(self.modes.frequencies.tolist(), operating)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import one_of
 from rotorid.workflows.demo_samples import SAMPLES, Sample
-from rotorid.workflows.given import file_of
+from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 
 if TYPE_CHECKING:

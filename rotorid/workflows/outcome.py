@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from rotorid.workflows.given import changed, checked, plain
+from rotorid.workflows.input_checks import changed, checked, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,7 +88,7 @@ class Found(Outcome):
 
     def figure(self) -> Figure:
         """Its picture."""
-        from rotorid.base.style import on_figure
+        from rotorid.base.plot_style import on_figure
         from rotorid.plots import plot
 
         return on_figure(lambda ax: plot(self.found, ax))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import changed
+from rotorid.workflows.input_checks import changed
+from rotorid.workflows.option_values import degrees, option_name, pairs
 from rotorid.workflows.outcome import Outcome, provenance, workflow
-from rotorid.workflows.parameters import degrees, option_name, pairs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from balancing.mounting.holes import Holes
     from balancing.mounting.material_removal import Drilling, Grinding
     from balancing.mounting.split import OnHoles
-    from rotorid.workflows.quantities import Amount, Vector
+    from rotorid.workflows.option_quantities import Amount, Vector
 
     Found = OnHoles | TwoPositions | Drilling | Grinding | Rounded
     Mount = Callable[[complex, Labels, float | None, "SplitOptions"], Found]
@@ -172,7 +172,7 @@ def split(weight: Vector, options: SplitOptions | None = None) -> SplitWeight:
         For a weight or an option that cannot be, or that means nothing with the way that was chosen.
     """
     from balancing.mounting.combine_trim_round import combine, trim
-    from rotorid.workflows.quantities import size, vectors
+    from rotorid.workflows.option_quantities import size, vectors
 
     options = options or SplitOptions()
     labels, weights = vectors(weight, options.angles)
@@ -237,7 +237,7 @@ def _at_two_angles(
     target: complex, labels: Labels, radius: float | None, options: SplitOptions
 ) -> TwoPositions:
     from balancing.mounting.combine_trim_round import two_positions
-    from rotorid.workflows.quantities import weights
+    from rotorid.workflows.option_quantities import weights
 
     assert options.two is not None
     masses = weights(options.two, "--two", labels, radius)
@@ -264,7 +264,7 @@ def _drilled(target: complex, labels: Labels, radius: float | None, options: Spl
     import numpy as np
 
     from balancing.mounting.material_removal import Drill, drill_holes
-    from rotorid.workflows.quantities import size
+    from rotorid.workflows.option_quantities import size
 
     unbalance, at = _unbalance(target, labels, radius, "--drill")
     assert options.drill is not None
@@ -293,7 +293,7 @@ def _rounded(target: complex, labels: Labels, radius: float | None, options: Spl
     import numpy as np
 
     from balancing.mounting.combine_trim_round import rounded
-    from rotorid.workflows.quantities import weight
+    from rotorid.workflows.option_quantities import weight
 
     angle = options.angle_step or 0.0
     if not 0 <= angle <= 360:
@@ -314,7 +314,7 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
     import numpy as np
 
     from balancing.mounting.holes import equal_holes, from_list
-    from rotorid.workflows.quantities import weight, weights
+    from rotorid.workflows.option_quantities import weight, weights
 
     given = options.holes
     if given is None or isinstance(given, int) or (isinstance(given, str) and "," not in given):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.iso21940 import Tolerance
-    from rotorid.workflows.quantities import Amount, Positions
+    from rotorid.workflows.option_quantities import Amount, Positions
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
         For an option that cannot be.
     """
     from balancing.iso21940 import tolerance as permissible
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.option_quantities import length, mass, positions, speed_with_unit, two_positions
 
     found = permissible(
         mass(options.mass, "--mass"),

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import job_source
+from rotorid.workflows.input_checks import job_source
+from rotorid.workflows.option_values import Nodes, nodes
 from rotorid.workflows.outcome import Found, provenance, workflow
-from rotorid.workflows.parameters import Nodes, nodes
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance

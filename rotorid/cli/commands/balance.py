@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
+from rotorid.cli.common_options import (
     AmplitudeErrorOption,
     AnglesOption,
     JsonOption,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, RotorArgument, options_of
+from rotorid.cli.common_options import JsonOption, OutputOption, PlotOption, RotorArgument, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.campbell import CampbellOptions
 from rotorid.workflows.campbell import campbell as work

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, RotorArgument, options_of
+from rotorid.cli.common_options import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    ReportOption,
+    RotorArgument,
+    options_of,
+)
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.critical import CriticalOptions
 from rotorid.workflows.critical import critical as work

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption
+from rotorid.cli.common_options import JsonOption
 from rotorid.cli.output import chosen, deliver, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work

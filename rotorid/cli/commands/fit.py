@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
+from rotorid.cli.common_options import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.fit import FitOptions, choices
 from rotorid.workflows.fit import fit as work

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, RotorArgument
+from rotorid.cli.common_options import JsonOption, OutputOption, PlotOption, RotorArgument
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.influence import InfluenceOptions
 from rotorid.workflows.influence import influence as work

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, options_of
+from rotorid.cli.common_options import JsonOption, OutputOption, PlotOption, ReportOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.reduce import Normalise, Place, ReduceOptions, Rows, View, choices
 from rotorid.workflows.reduce import reduce as work
 
 if TYPE_CHECKING:
-    from rotorid.workflows.reduced_rotor import ReducedRotor
+    from rotorid.workflows.reduce_result import ReducedRotor
 
 say = options_of(ReduceOptions)
 

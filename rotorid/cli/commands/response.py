@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, RotorArgument, options_of
+from rotorid.cli.common_options import (
+    JsonOption,
+    OutputOption,
+    PlotOption,
+    ReportOption,
+    RotorArgument,
+    options_of,
+)
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.response import ResponseOptions, View
 from rotorid.workflows.response import response as work

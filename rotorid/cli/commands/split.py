@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
+from rotorid.cli.common_options import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.split import SplitOptions
 from rotorid.workflows.split import split as work

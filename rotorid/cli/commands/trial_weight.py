@@ -7,7 +7,14 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import AnglesOption, JsonOption, OutputOption, PhaseOption, PlotOption, options_of
+from rotorid.cli.common_options import (
+    AnglesOption,
+    JsonOption,
+    OutputOption,
+    PhaseOption,
+    PlotOption,
+    options_of,
+)
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.trial_weight import TrialWeightOptions
 from rotorid.workflows.trial_weight import trial_weight as work

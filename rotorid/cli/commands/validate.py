@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption
+from rotorid.cli.common_options import JsonOption, OutputOption
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.validation import ValidateOptions
 from rotorid.validation import validate as work

@@ -21,7 +21,7 @@ from rotorid.tables.runs.conventions import FULL_TURN
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import Experiments
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 
 _SPEED = one_of(units.SPEED)

@@ -15,7 +15,7 @@ from rotorid.tables.reader.problems import Problems, TableWarning
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 FREQUENCIES = ("frequency", "speed")
 """Stems of the columns that may hold the frequency."""

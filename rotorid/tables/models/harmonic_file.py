@@ -19,7 +19,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 _IN_TIME = ("M", "C", "K", "states")
 """Keys of models in time; such a file is read by `read_ode_model`, too."""
@@ -139,8 +139,8 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
 
     form = read_time_form(section, problems, initial=False)
     problems.stop()
-    from rotorid.harmonic.hidden import without
     from rotorid.harmonic.operator_equations import harmonic_model
+    from rotorid.harmonic.unmeasured_amplitudes import without
 
     model = None
     try:

@@ -17,7 +17,7 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
-    from fem.matrices.motion import Motion
+    from fem.matrices.equations_of_motion import Motion
 
 
 def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> Motion:
@@ -72,7 +72,7 @@ def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> 
     problems.stop()
     if form.matrices is None:
         raise AssertionError("no matrices and no problem")
-    from fem.matrices.motion import Motion
+    from fem.matrices.equations_of_motion import Motion
 
     return Motion(found["M"], found["C"], found["K"], form.matrices.coordinates, form.speed)
 

@@ -18,7 +18,7 @@ from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.models.ode_model import OdeModel
 
 _KEYS = (
     "M",
@@ -127,9 +127,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     form = read_time_form(section, problems)
     model = None
     if not len(problems):
-        from rotorid.timedomain.models.model import ode_model
-        from rotorid.timedomain.models.nuisance import with_nuisance
+        from rotorid.timedomain.models.ode_model import ode_model
         from rotorid.timedomain.models.second_order import second_order
+        from rotorid.timedomain.models.sensor_offset_drift import with_nuisance
 
         names = form.states if form.matrices is None else form.matrices.coordinates
         outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)

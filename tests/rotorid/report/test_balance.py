@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from balance_sheets import DATA, hard, on_top, parts_of, sheet_of, value_at
 
-from rotorid.report import balance, conventions, grids, page
+from rotorid.report import balance, conventions_explained, number_tables, page
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import plane_figure, residual_figure
 
@@ -157,7 +157,9 @@ def test_each_plane_is_drawn_from_a_stated_end(made):
     labels = report.result.labels
     for plane in report.result.planes:
         what = "take away" if plane in report.result.remove else "add"
-        assert f'aria-label="Plane {plane}, {conventions.seen_from(labels)}: what to {what}"' in text
+        assert (
+            f'aria-label="Plane {plane}, {conventions_explained.seen_from(labels)}: what to {what}"' in text
+        )
     assert text.count("<svg") == 3 + len(report.result.planes)
 
 
@@ -346,7 +348,7 @@ def test_a_reader_can_predict_a_reading_by_hand(phase, angles, turn):
 
 
 def test_examples_in_the_docstrings():
-    for module in (page, conventions, grids):
+    for module in (page, conventions_explained, number_tables):
         failed, tried = doctest.testmod(module)
         assert failed == 0
         assert tried > 0

@@ -8,9 +8,9 @@ import pytest
 from sheets import COMMANDS, Shown, disagreement, disagreements, make, read_sheet, run
 
 import fem
-from rotorid.report.grids import Numbers, evenly, every_warning
-from rotorid.report.inputs import rotor_sheet, unbalance_table
+from rotorid.report.number_tables import Numbers, evenly, every_warning
 from rotorid.report.rotor import critical_report
+from rotorid.report.rotor_description import rotor_sheet, unbalance_table
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 

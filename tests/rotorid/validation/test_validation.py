@@ -18,7 +18,7 @@ import fem.matrices.elements
 from rotorid.reduction import equivalent_masses
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
-from rotorid.validation import PROVIDERS, Group, Validation, masses, row, validate
+from rotorid.validation import PROVIDERS, Group, Validation, equivalent_masses, row, validate
 from rotorid.validation.row import half_unit, number, printed_table, tables
 
 DATA = Path(__file__).parents[2] / "data"
@@ -208,8 +208,11 @@ def test_known_errata(proof, source, quantity, printed, corrected):
 
 
 def test_the_condition_numbers_of_the_reasons():
-    exact = masses.of_rotor(read_rotor(sample_data() / "rotor23.csv"))
-    for modes, reason, condition in ((1, masses.THREE_DIGITS, 63), (2, masses.TWO_MODES, 18)):
+    exact = equivalent_masses.of_rotor(read_rotor(sample_data() / "rotor23.csv"))
+    for modes, reason, condition in (
+        (1, equivalent_masses.THREE_DIGITS, 63),
+        (2, equivalent_masses.TWO_MODES, 18),
+    ):
         assert f"condition number {condition})" in reason
         estimate = equivalent_masses(exact.alpha, exact.omega[:modes], exact.shapes[:, :modes])
         assert estimate.condition_number == pytest.approx(condition, abs=0.5)
@@ -253,11 +256,21 @@ def unstretched(function):
         ("fem.matrices.elements._MASS", lambda form: form * 1.001, "rotor", 3),
         ("fem.matrices.elements._MASS", lambda form: form * 1.03, "rotor", 60),
         ("fem.matrices.elements._BENDING", lambda form: form * 1.01, "masses", 10),
-        ("rotorid.reduction.equivalent.masses.design", lambda f: scaled(f, 1.0001), "masses", 8),
-        ("rotorid.validation.masses.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
-        ("rotorid.harmonic.rows.Rows.real_rows", unstretched, "lessons", 15),
-        ("rotorid.harmonic.model.HarmonicModel.predict", conjugate, "lessons", 8),
-        ("rotorid.validation.lessons.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
+        (
+            "rotorid.reduction.equivalent.equivalent_masses_formula_50.design",
+            lambda f: scaled(f, 1.0001),
+            "masses",
+            8,
+        ),
+        (
+            "rotorid.validation.equivalent_masses.natural_frequencies",
+            lambda f: scaled(f, 1.00001),
+            "masses",
+            6,
+        ),
+        ("rotorid.harmonic.regression_rows.Rows.real_rows", unstretched, "lessons", 15),
+        ("rotorid.harmonic.operator_model.HarmonicModel.predict", conjugate, "lessons", 8),
+        ("rotorid.validation.identification.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
         (
             "rotorid.timedomain.methods.quasilinearization._heun",
             lambda f: times(f, 1.01),
@@ -365,12 +378,12 @@ def test_tables_of_printed_numbers_say_where_they_are_printed():
 
 def test_a_group_that_fails_is_said_and_the_others_are_shown(cli, monkeypatch):
     import rotorid.validation
-    from rotorid.validation import balancing, lessons, masses, rotor, time_records
+    from rotorid.validation import balancing, identification, rotor, time_records
 
     def broken():
         raise KeyError("a table is gone")
 
-    for module in (balancing, lessons, time_records):
+    for module in (balancing, identification, time_records):
         monkeypatch.setattr(module, "rows", list)
     monkeypatch.setattr(masses, "rows", broken)
     found = rotorid.validation.validate(["masses", "rotor"])
