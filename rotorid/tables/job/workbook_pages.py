@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
+from rotorid.tables.job.keys import CELLS
 from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS, Line
 from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576
 _LONGEST_LIST = 255
-_AS_TEXT = (*TEXT_COLUMNS, "forbidden_deg", "taken", "limit")
+_AS_TEXT = {*TEXT_COLUMNS, *(name for name, cell in CELLS.items() if cell in ("name", "words"))}
 _WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
 
 

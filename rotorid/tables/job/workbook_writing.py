@@ -7,15 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.tables.job.comparison import differences
-from rotorid.tables.job.job_data import Job
-from rotorid.tables.job.job_file import job_from_sheets
-from rotorid.tables.job.settings import Overrides
+from rotorid.tables.job.job_data import Job, Overrides
+from rotorid.tables.job.job_reading import job_of
 from rotorid.tables.job.source import JobSource, job_tables
 from rotorid.tables.job.workbook_pages import Page, book_bytes
+from rotorid.tables.job.workbook_reading import job_in_sheets
 from rotorid.tables.job.workbook_results import Results, result_sheets
 from rotorid.tables.job.workbook_sheets import Line, as_rows, job_sheets
 from rotorid.tables.reader.grid import BadCell, clean
-from rotorid.tables.reader.problems import InputError
+from rotorid.tables.reader.problems import InputError, Problems
 
 _NAMED = 3
 
@@ -78,7 +78,9 @@ def _prove(job: Job, sheets: Mapping[str, list[Line]], target: Path) -> None:
         for title, lines in sheets.items()
     }
     try:
-        back = job_from_sheets(target, read, Overrides(None, None, None, None))
+        problems = Problems()
+        written = job_in_sheets(target, read, problems)
+        back = job_of(target, written.top(problems), written.tables, Overrides(), problems)
     except InputError as error:
         raise ValueError(
             f"{target}: this job cannot be kept in a workbook, which would be read like this: "

@@ -132,8 +132,14 @@ class Key:
             return None
 
 
-def take(section: Section, keys: Sequence[Key]) -> dict[str, Any]:
-    """All that a section says, by the first name of each key; every problem is noted with the section.
+class Said(dict[str, Any]):
+    """What a section says, by the first name of each key, and the section, for complaints."""
+
+    section: Section
+
+
+def take(section: Section, keys: Sequence[Key]) -> Said:
+    """All that a section says; every problem is noted with the section.
 
     Parameters
     ----------
@@ -143,7 +149,8 @@ def take(section: Section, keys: Sequence[Key]) -> dict[str, Any]:
         All that it may have, in the order in which they are read and named; every other key is a problem.
     """
     section.know(name for key in keys for name in key.names)
-    said = {key.names[0]: key.value(section) for key in keys}
+    said = Said((key.names[0], key.value(section)) for key in keys)
+    said.section = section
     section.finish()
     return said
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rotorid.base.suggestions import suggest
@@ -76,6 +76,13 @@ class Problems:
     def add(self, file: str, row: int | None, column: str | None, value: str | None, expected: str) -> None:
         """Note one problem."""
         self._items.append(Problem(file, row, column, value, expected))
+
+    def extend(self, more: Iterable[Problem]) -> None:
+        """Note those of another file, or of an `InputError`."""
+        self._items.extend(more)
+
+    def __iter__(self) -> Iterator[Problem]:
+        return iter(self._items)
 
     def __len__(self) -> int:
         return len(self._items)

@@ -208,7 +208,8 @@ class Section:
 
     def refuse(self, expected: str) -> None:
         """Note a problem with these settings as a whole."""
-        self._problems.add(self.source, None, self._prefix.rstrip(".") or None, None, expected)
+        source, row, column = self.place(self._prefix.rstrip("."))
+        self._problems.add(source, row, column or None, None, expected)
 
     def finish(self) -> None:
         """Complain about every key that nobody took."""

@@ -16,8 +16,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, make_table, must_be, read_grid
-from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.columns import Column, Source, make_table, must_be, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.reader.writing import table_bytes, write_bytes
@@ -130,11 +129,11 @@ def read_influence(
 
 
 def load_influence(
-    source: Path | Grid, phase: Phase | None, angles: Angles | None, problems: Problems
+    source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
 ) -> Stored | None:
     """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
     before = len(problems)
-    grid = source if isinstance(source, Grid) else read_grid(source, "influence", problems)
+    grid = read_grid(source, "influence", problems)
     columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
     table = None if grid is None else make_table(grid, columns, problems)
     if table is None:

@@ -17,6 +17,7 @@ from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, job_from_files, read_job, write_influence
 from rotorid.tables.job.comparison import differences
+from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.source import JobSource
 from rotorid.tables.job.workbook_reading import key_parts
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
@@ -206,11 +207,15 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
         "amplitude_error_percent": 2.0,
         "phase_error_deg": 0.5,
     }
-    back = there_and_back(job_from_files(files, **said), JobSource(files, **said), tmp_path / "a.xlsx")
+    back = there_and_back(
+        job_from_files(files, **said), JobSource(files, overrides=Overrides(**said)), tmp_path / "a.xlsx"
+    )
     assert (back.conventions.phase, back.conventions.angles) == ("lag", "against rotation")
     path = write_job(folder, PARTS["tolerance and errors"])
     job = read_job(path, amplitude_error_percent=4.0)
-    back = there_and_back(job, JobSource((path,), amplitude_error_percent=4.0), tmp_path / "b.xlsx")
+    back = there_and_back(
+        job, JobSource((path,), overrides=Overrides(amplitude_error_percent=4.0)), tmp_path / "b.xlsx"
+    )
     assert back.trials.errors.amplitude == 0.04
     assert back.trials.errors.floor == job.trials.errors.floor > 0
     stored = folder / "influence.csv"
