@@ -199,7 +199,8 @@ def by_speed(what: str, example: str, *, above_zero: bool, alone: bool) -> Kind:
     one = {"type": "number", "exclusiveMinimum" if above_zero else "minimum": 0}
     table = {"type": "object", "additionalProperties": one, "minProperties": 1}
     forms = [*([one] if alone else []), table, {"type": "string"}]
-    return Kind(read, {"anyOf": forms}, f"{'a number, or ' if alone else ''}3000: 20; 4500: 30", "words")
+    allowed = f"{'a number, or ' if alone else ''}3000: 20; 4500: 30"
+    return Kind(read, {"anyOf": forms}, allowed, example.rpartition("such as ")[2], "words")
 
 
 def _file(section: Section, key: str) -> str | None:
@@ -247,6 +248,7 @@ _ARCS = Kind(
     _arcs,
     {"anyOf": [{"type": "array", "items": _PAIR_SCHEMA, "minItems": 1}, _PAIR_SCHEMA, {"type": "string"}]},
     "20 to 60; 300 to 340",
+    "[[20, 60], [300, 340]]",
     "name",
 )
 _ANGLES = kinds.numbers(_DEG, "0; 30; 75")
@@ -255,14 +257,15 @@ _NAMES = Kind(
     _hole_names,
     {"anyOf": [{"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1}, TEXT.schema]},
     "A; B; C",
+    '["A", "B", "C"]',
     "name",
 )
-_PLACE = Kind(_place, {"type": ["integer", "string"]}, "a number, or a name", "number")
-FILE = Kind(_file, TEXT.schema, "the name of a file", "name")
+_PLACE = Kind(_place, {"type": ["integer", "string"]}, "a number, or a name")
+FILE = Kind(_file, TEXT.schema, cell="name")
 FORBIDDEN = Key(
     "forbidden_deg",
     _ARCS,
-    "arcs from … to …, `[[20, 60], [300, 340]]`, where nothing may be mounted",
+    "arcs from … to … where nothing may be mounted",
     default=(),
 )
 _PLACES = (Key("node station", _PLACE, "where it is in the rotor model, by number or by name"),)
@@ -276,8 +279,8 @@ _PLANE = (
     LARGEST,
     Key("radius_mm", ABOVE_ZERO, "radius of the corrections; converts masses and unbalances", RADIUS),
     Key("trial_radius_mm", ABOVE_ZERO, "radius of the trial weights, where it is another", RADIUS),
-    Key("use", FLAG, "`false` leaves the plane out", default=True),
-    Key("remove", FLAG, "`true`: material is taken away (drilled, ground) instead of added", default=False),
+    Key("use", FLAG, "whether the plane is used", default=True),
+    Key("remove", FLAG, "whether material is taken away (drilled, ground) instead of added", default=False),
     FORBIDDEN,
     *_PLACES,
 )
@@ -288,12 +291,12 @@ HOLES = (
         "a number of equally spaced holes",
     ),
     Key("first_hole_deg", TURN, "angle of the first of them, default 0", default=0.0),
-    Key("holes_deg", replace(_ANGLES, read=_degrees), "or the angles of the holes, `[0, 30, 75]`"),
+    Key("holes_deg", replace(_ANGLES, read=_degrees), "or the angles of the holes"),
     Key("hole_names", _NAMES, "names of the holes instead of the numbers 1, 2, …"),
     Key(
         "available_g available_g_mm",
         kinds.numbers(_AVAILABLE, "5; 10; 20", above_zero=True),
-        "weights of which each can be mounted in a hole, `[5, 10, 20]`, in any unit",
+        "weights, in any unit, of which each can be mounted in a hole",
         units.WEIGHT,
     ),
     Key("step_g step_g_mm", ABOVE_ZERO, "or any weight in such steps", units.WEIGHT),
@@ -306,10 +309,10 @@ HOLES = (
     Key(
         "taken",
         kinds.by_name(_TAKEN, "3: 10; 5: 20"),
-        'weights that are in holes already, by number or name of the hole, `{ "3" = 10 }`',
+        "weights that are in holes already, by number or name of the hole",
         default={},
     ),
-    Key("stock", replace(_COUNTS, read=_stock), "how many there are of each available weight, `[4, 4, 2]`"),
+    Key("stock", replace(_COUNTS, read=_stock), "how many there are of each available weight"),
 )
 PLANE = (*_PLANE, *HOLES)
 _LIMIT = "an amplitude above 0 in the unit of the readings"
@@ -322,7 +325,7 @@ SENSOR = (
             above_zero=True,
             alone=True,
         ),
-        'largest amplitude, in the unit of the readings; or by speed, `{ "3000" = 20, "4500" = 30 }`',
+        "largest amplitude, in the unit of the readings; or by speed",
         default={},
     ),
     Key(
@@ -335,10 +338,10 @@ SENSOR = (
     *_PLACES,
 )
 ERRORS = (
-    Key("amplitude_percent", number(0.0), "of an amplitude, percent of it"),
-    Key("phase_deg", number(0.0), "of a phase, degrees"),
-    Key("floor", number(0.0), "at amplitude 0, in the unit of the readings"),
-    Key("run_percent", number(0.0), "what changes from run to run, percent"),
+    Key("amplitude_percent", number(0.0), "one standard deviation of an amplitude, percent of it"),
+    Key("phase_deg", number(0.0), "one standard deviation of a phase, degrees"),
+    Key("floor", number(0.0), "one standard deviation at amplitude 0, in the unit of the readings"),
+    Key("run_percent", number(0.0), "what changes from run to run, one standard deviation, percent"),
     Key("run_floor", number(0.0), "the same at amplitude 0, in the unit of the readings"),
 )
 _STATED = kinds.table(ERRORS)
@@ -388,27 +391,27 @@ JOB = (
             above_zero=False,
             alone=False,
         ),
-        'weights of the speeds in the fit, `{ "3000" = 2, "4500" = 0.5 }`; 0: only for the limits',
+        "weights of the speeds in the fit, 0: only for the limits",
         default={},
     ),
     Key(
         "phase",
         kinds.choice(PHASES),
-        '`"lead"` or `"lag"`: whether a positive phase leads or lags; unstated: lead, the answer says so and '
-        "what lag gives",
+        "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
+        "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
     ),
     Key(
         "angles",
         kinds.choice(STATED_ANGLES),
-        '`"with rotation"`, `"against rotation"`, `"clockwise"`, `"counter-clockwise"`: how angles on the '
-        "rotor count; unstated: with, named so where an angle other than 0° and 180° is written",
+        "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
+        "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
     ),
     Key(
         "rotation",
         kinds.choice(ROTATIONS),
-        'how the rotor turns, `"clockwise"` or `"counter-clockwise"`, seen from the same end as the angles',
+        "how the rotor turns, seen from the same end as the angles",
     ),
-    Key("view", kinds.choice(VIEWS), 'the end from which that is seen, `"drive end"` or `"free end"`'),
+    Key("view", kinds.choice(VIEWS), "the end from which that is seen"),
     Key(
         "speed_tolerance_percent",
         number(0.0, LARGEST_TOLERANCE),
@@ -419,7 +422,7 @@ JOB = (
         "errors",
         replace(_STATED, read=_errors),
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
-        "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count too",
+        "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
     ),
     Key("planes", kinds.named(PLANE), "see below", default={}),
     Key("sensors", kinds.named(SENSOR), "see below", default={}),

@@ -73,7 +73,8 @@ def read_readings(
         errors = replace(errors or StatedErrors(), **others)
     if "runs" not in tables:
         return None
-    own = Problems()  # what is wrong with the planes must not hide what is wrong with the tables
+    # what is wrong with the planes must not hide what is wrong with the tables
+    own = problems.apart({source_name(table) for table in tables.values()})
     found, name = None, ""
     if "influence" in tables:
         name = source_name(tables["influence"])

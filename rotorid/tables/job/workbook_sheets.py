@@ -15,15 +15,17 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from rotorid.tables.job.keys import FORBIDDEN, TABLES
+from rotorid.tables.job.keys import CELLS, FORBIDDEN, TABLES
 from rotorid.tables.job.source import JobTables
 from rotorid.tables.reader.columns import REMARKS
 from rotorid.tables.reader.grid import Cell, Grid, Row, Shown, show
 from rotorid.tables.reader.number import decimal_comma, parse_number
+from rotorid.tables.reader.pages import Line
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
-Line = tuple[Cell, ...]
+NAMES = {*TEXT_COLUMNS, *(name for name, cell in CELLS.items() if cell in ("name", "words"))}
+"""Those, and settings that a spreadsheet would take for a date."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -92,11 +94,6 @@ def table_lines(grid: Grid) -> list[Line]:
             )
         )
     return lines
-
-
-def as_rows(lines: Iterable[Line]) -> list[Row]:
-    """Lines as a reader of workbooks finds them, with their row numbers."""
-    return list(enumerate(lines, start=1))
 
 
 def _number(cell: Cell, separator: str, *, comma: bool) -> Cell:

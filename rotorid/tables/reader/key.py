@@ -26,6 +26,8 @@ class Kind:
         The same as a JSON schema.
     allowed
         The same in words, for the cells of a form.
+    example
+        How a file writes it.
     cell
         How a cell of a sheet holds it: text that looks like a number is one, or stays a name; `words` is
         such text as a spreadsheet would take for a date (3:10); a flag is yes or no.
@@ -36,6 +38,7 @@ class Kind:
     read: Callable[[Section, str], Any]
     schema: Mapping[str, Any] = field(default_factory=dict)
     allowed: str = ""
+    example: str = ""
     cell: Literal["number", "name", "words", "flag"] = "number"
     header: str = "{}"
 
@@ -94,9 +97,10 @@ class Key:
         out: dict[str, Unit | None] = {}
         for name in self.names:
             usual = max((unit for unit in self.units if name.endswith(f"_{unit}")), key=len)
-            stem, kind = name.removesuffix(usual), self.units[usual].kind
+            kind = self.units[usual].kind
+            alike = [unit for unit in self.units.values() if unit.kind == kind and unit.name != usual]
             out[name] = self.units[usual]
-            out |= {f"{stem}{unit.name}": unit for unit in self.units.values() if unit.kind == kind}
+            out |= {f"{name.removesuffix(usual)}{unit.name}": unit for unit in alike}
         return out
 
     def accepts(self, name: str) -> bool:
@@ -180,6 +184,10 @@ def file_schema(keys: Sequence[Key], title: str) -> dict[str, Any]:
 
 
 def key_lines(keys: Sequence[Key], what: str = "key") -> list[str]:
-    """Keys as a table in Markdown: names and what is said about them."""
-    rows = [(", ".join(f"`{key.kind.header.format(name)}`" for name in key.names), key.about) for key in keys]
-    return [f"| {what} | meaning |", "|---|---|", *(f"| {names} | {about} |" for names, about in rows)]
+    """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
+    lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
+    for key in keys:
+        names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
+        words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
+        lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
+    return lines

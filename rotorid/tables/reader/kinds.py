@@ -33,7 +33,7 @@ def number(low: float = -math.inf, high: float = math.inf) -> Kind:
 ABOVE_ZERO = number(sys.float_info.min)
 TURN = number(-360.0, 360.0)
 """An angle in degrees."""
-TEXT = Kind(lambda section, key: section.text(key), _TEXT, "text", "name")
+TEXT = Kind(lambda section, key: section.text(key), _TEXT, "text", cell="name")
 
 
 def choice(words: Sequence[str]) -> Kind:
@@ -47,7 +47,7 @@ def choice(words: Sequence[str]) -> Kind:
         section.complain(key, listing(map(repr, words)) + hint)
         return None
 
-    return Kind(read, {"enum": list(words)}, listing(words), "name")
+    return Kind(read, {"enum": list(words)}, listing(words), cell="name")
 
 
 def _flag(section: Section, key: str) -> bool | None:
@@ -58,7 +58,7 @@ def _flag(section: Section, key: str) -> bool | None:
     return None
 
 
-FLAG = Kind(_flag, {"type": "boolean"}, "yes or no", "flag")
+FLAG = Kind(_flag, {"type": "boolean"}, "yes or no", "false", cell="flag")
 
 
 def whole(what: str, low: int, high: int) -> Kind:
@@ -110,7 +110,7 @@ def numbers(what: str, form: str, *, above_zero: bool = False) -> Kind:
 
     one = {**_NUMBER, "exclusiveMinimum": 0} if above_zero else _NUMBER
     schema = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}, _TEXT]}
-    return Kind(read, schema, form)
+    return Kind(read, schema, form, _example(what))
 
 
 def by_name(what: str, form: str) -> Kind:
@@ -140,7 +140,11 @@ def by_name(what: str, form: str) -> Kind:
         return found
 
     table = {"type": "object", "additionalProperties": {**_NUMBER, "exclusiveMinimum": 0}, "minProperties": 1}
-    return Kind(read, {"anyOf": [table, _TEXT]}, form, "name")
+    return Kind(read, {"anyOf": [table, _TEXT]}, form, _example(what), cell="name")
+
+
+def _example(what: str) -> str:
+    return what.rpartition("such as ")[2] if "such as " in what else ""
 
 
 def entries(section: Section, key: str, value: object, expected: str, each: str) -> object:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from rotorid.base.suggestions import suggest
@@ -86,6 +86,13 @@ class Problems:
 
     def __len__(self) -> int:
         return len(self._items)
+
+    def apart(self, files: Collection[str]) -> Problems:
+        """Those of some files, taken out of these."""
+        own = Problems()
+        own.extend(problem for problem in self._items if problem.file in files)
+        self._items = [problem for problem in self._items if problem.file not in files]
+        return own
 
     def withdraw(self, file: str) -> None:
         """Forget what was noted about a file: a better explanation follows."""

@@ -10,13 +10,13 @@ import openpyxl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from job_comparison import differences
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
 from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, job_from_files, read_job, write_influence
-from rotorid.tables.job.comparison import differences
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.source import JobSource
 from rotorid.tables.job.workbook_reading import key_parts

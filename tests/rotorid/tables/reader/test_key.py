@@ -140,9 +140,11 @@ def test_schema():
 def test_table_of_keys():
     lines = key_lines(KEYS, "key of a job")
     assert lines[:3] == [
-        "| key of a job | meaning |",
-        "|---|---|",
-        "| `most_g`, `most_g_mm` | largest weight |",
+        "| key of a job | meaning | such as |",
+        "|---|---|---|",
+        "| `most_g`, `most_g_mm` | largest weight |  |",
     ]
-    assert "| `[planes.NAME]` | tables by name |" in lines
-    assert "| `[[disc]]` | many tables |" in lines
+    assert '| `kind` | which | `"one"`, `"two"` |' in lines
+    assert '| `taken` | what is there | `{ "3" = 10 }` |' in lines
+    assert "| `[planes.NAME]` | tables by name |  |" in lines
+    assert "| `[[disc]]` | many tables |  |" in lines

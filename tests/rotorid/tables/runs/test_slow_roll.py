@@ -213,7 +213,7 @@ BAD = [
         'slow_roll = "a\\tslow.csv"\n',
         "slow_roll",
         "a\tslow.csv",
-        "without control characters: write /",
+        "without control characters",
     ),
     (VECTORS, 'slow_roll = " "\n', "slow_roll", " ", "a table of vectors, [slow_roll.SENSOR]"),
 ]
