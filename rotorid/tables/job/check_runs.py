@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -17,7 +18,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Source, source_name
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.slow_roll import subtract_slow_roll
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.tables.runs.trials import make_trials
 
 
@@ -75,16 +76,16 @@ def _speeds(
     speeds: list[float] = []
     unit = units.SPEED[check.labels.speed_unit]
     for speed in check.speeds:
-        near = float(trials.speeds[int(np.argmin(np.abs(trials.speeds - speed)))])
+        near = nearest_speed(trials.speeds, float(speed), tolerance_percent)
+        meant = math.nan if near is None else float(trials.speeds[near])
         expected = ""
-        if not same_speed(near, float(speed), tolerance_percent):
-            known = listing((show_speed(float(value), unit) for value in trials.speeds), "and")
-            expected = f"a speed of the job; there are {known}"
-        elif near in speeds:
-            expected = f"each speed of the job once; {show_speed(near, unit)} is meant twice"
+        if near is None:
+            expected = f"a speed of the job; there are {show_speeds(trials.speeds, unit)}"
+        elif meant in speeds:
+            expected = f"each speed of the job once; {show_speed(meant, unit)} is meant twice"
         if expected:
             problems.add(source, None, "speed", show_speed(float(speed), unit), expected)
-        speeds.append(near)
+        speeds.append(meant)
     return np.array(speeds)
 
 

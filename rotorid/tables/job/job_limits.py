@@ -12,7 +12,6 @@ import numpy as np
 from balancing.data.limits import Arc, Limits
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import listing
 from rotorid.tables.job.job_planes import Planes
 from rotorid.tables.job.keys import FORBIDDEN, Pair
 from rotorid.tables.reader import units
@@ -20,7 +19,7 @@ from rotorid.tables.reader.key import Quantity, Said
 from rotorid.tables.reader.number import parse_number
 from rotorid.tables.reader.quantity import in_job_units, other_kind
 from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speeds
 
 if TYPE_CHECKING:
     from rotorid.tables.job.job_data import Job
@@ -90,9 +89,9 @@ def at_speeds(
         if not word:
             continue
         speed = unit.to_si(parse_number(word))
-        near = int(np.argmin(np.abs(trials.speeds - speed)))
-        if not same_speed(float(trials.speeds[near]), speed, said["speed_tolerance_percent"]):
-            known = listing((show_speed(float(value), unit) for value in trials.speeds), "and")
+        near = nearest_speed(trials.speeds, speed, said["speed_tolerance_percent"])
+        if near is None:
+            known = show_speeds(trials.speeds, unit)
             section.complain(key, f"speeds of the runs table, not {word}: there are {known}")
         elif near in seen:
             section.complain(key, f"each speed once; {seen[near]} and {word} count as one")

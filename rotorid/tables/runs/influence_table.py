@@ -30,7 +30,7 @@ from rotorid.tables.runs.influence_comments import (
 )
 from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
 from rotorid.tables.runs.runs_table import PHASE, SPEED
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -338,14 +338,15 @@ def fit_to_readings(
     rows, columns = [], []
     rpm = units.SPEED["rpm"]
     for speed in trials.speeds:
-        near = int(np.argmin(np.abs(influence.speeds - speed)))
-        if not same_speed(float(influence.speeds[near]), float(speed), tolerance_percent):
-            known = listing((show_speed(float(value), rpm) for value in influence.speeds), "and")
+        near = nearest_speed(influence.speeds, float(speed), tolerance_percent)
+        if near is None:
+            known = show_speeds(influence.speeds, rpm)
             expected = (
                 f"coefficients at {show_speed(float(speed), rpm)}, as the runs table has; there are {known}"
             )
             problems.add(source, None, "speed", None, expected)
-        rows.append(near)
+        else:
+            rows.append(near)
     for sensor in trials.sensors:
         if sensor not in influence.sensors:
             known = listing(influence.sensors, "and")

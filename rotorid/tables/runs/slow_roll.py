@@ -29,7 +29,7 @@ from rotorid.tables.reader.columns import Source, source_name
 from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.conventions import Conventions, polar
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.tables.runs.trials import make_trials
 
 SLOW = 0.5
@@ -181,12 +181,11 @@ def _rows(
     rows = []
     unit = units.SPEED[trials.labels.speed_unit]
     for speed in trials.speeds:
-        near = int(np.argmin(np.abs(runs.speeds - speed)))
-        if not same_speed(float(runs.speeds[near]), float(speed), conventions.speed_tolerance_percent):
-            known = listing((show_speed(float(value), unit) for value in runs.speeds), "and")
+        near = nearest_speed(runs.speeds, float(speed), conventions.speed_tolerance_percent)
+        if near is None:
             expected = (
                 f"one slow speed, whose vectors hold for all speeds, or vectors at every speed of the job: "
-                f"{show_speed(float(speed), unit)} is not among {known}"
+                f"{show_speed(float(speed), unit)} is not among {show_speeds(runs.speeds, unit)}"
             )
             problems.add(source, None, "speed", None, expected)
             break
