@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import inspect
 from collections.abc import Callable
 from pathlib import Path
@@ -23,11 +22,9 @@ def options_of(kind: type) -> Callable[..., object]:
             texts |= {name: f"{texts.get(name, '')} {line.strip()}".strip() for name in names}
         elif line:
             names = line.split(", ")
-    defaults = {field.name: field.default for field in dataclasses.fields(kind)}
 
     def option(field: str, metavar: str | None = None, *names: str, least: float | None = None) -> object:
-        shown = defaults[field] is not None
-        return typer.Option(*names, metavar=metavar, help=texts.get(field), show_default=shown, min=least)
+        return typer.Option(*names, metavar=metavar, help=texts[field], min=least)
 
     return option
 
@@ -37,51 +34,33 @@ JsonOption = Annotated[
 ]
 PlotOption = Annotated[
     Path | None,
-    typer.Option("--plot", metavar="FILE", help="Picture, .png, .svg or .pdf.", show_default=False),
+    typer.Option("--plot", metavar="FILE", help="Picture, .png, .svg or .pdf."),
 ]
-OutputOption = Annotated[
-    Path | None, typer.Option("--output", metavar="FILE", help="Table, .csv or .xlsx.", show_default=False)
-]
+OutputOption = Annotated[Path | None, typer.Option("--output", metavar="FILE", help="Table, .csv or .xlsx.")]
 ReportOption = Annotated[
     Path | None,
-    typer.Option(
-        "--report", metavar="FILE", help="Sheet to print or to send, .html, one file.", show_default=False
-    ),
+    typer.Option("--report", metavar="FILE", help="Sheet to print or to send, .html, one file."),
 ]
 RotorArgument = Annotated[
     Path,
-    typer.Argument(
-        metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml).", show_default=False
-    ),
+    typer.Argument(metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml)."),
 ]
-OperatingOption = Annotated[
-    str | None,
-    typer.Option(metavar="A:B", help="Operating speeds, such as 5300:6500rpm.", show_default=False),
-]
-
-PhaseOption = Annotated[
-    str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.", show_default=False)
-]
+PhaseOption = Annotated[str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.")]
 AnglesOption = Annotated[
     str | None,
     typer.Option(
         metavar="DIRECTION",
         help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
         "where the job states its rotation.",
-        show_default=False,
     ),
 ]
 AmplitudeErrorOption = Annotated[
     float | None,
-    typer.Option(
-        metavar="PERCENT", min=0.0, help="Standard deviation of a reading's amplitude.", show_default=False
-    ),
+    typer.Option(metavar="PERCENT", min=0.0, help="Standard deviation of a reading's amplitude."),
 ]
 PhaseErrorOption = Annotated[
     float | None,
-    typer.Option(
-        metavar="DEGREES", min=0.0, help="Standard deviation of a reading's phase.", show_default=False
-    ),
+    typer.Option(metavar="DEGREES", min=0.0, help="Standard deviation of a reading's phase."),
 ]
 RunErrorOption = Annotated[
     float | None,
@@ -89,6 +68,5 @@ RunErrorOption = Annotated[
         metavar="PERCENT",
         min=0.0,
         help="Standard deviation of what changes from run to run, percent of a reading.",
-        show_default=False,
     ),
 ]

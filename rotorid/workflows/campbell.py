@@ -25,11 +25,11 @@ class CampbellOptions:
     Attributes
     ----------
     speeds
-        "1000:15000:250rpm", or rad/s.
+        FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm.
     number
         How many modes, by default 6; forward and backward whirl count apart.
     operating
-        Operating speeds, "5300:6500rpm" or rad/s.
+        Operating speeds, such as 5300:6500rpm.
     """
 
     speeds: Speeds

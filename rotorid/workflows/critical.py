@@ -29,9 +29,9 @@ class CriticalOptions:
     mesh_check
         Estimate by refinement how far off the mesh makes each.
     speed_map
-        Critical speeds over the stiffness of the bearings, too.
+        Critical speeds over the stiffness of the bearings, too; the picture is of them then.
     operating
-        Operating speeds, "5300:6500rpm" or rad/s.
+        Operating speeds, such as 5300:6500rpm.
     """
 
     number: int | None = None

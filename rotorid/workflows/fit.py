@@ -35,24 +35,34 @@ class FitOptions:
 
     Attributes
     ----------
-    method, integrator, loss
-        One of `choices`.
+    method
+        How the parameters are searched.
+    integrator
+        How the equations are solved.
+    loss
+        What a residual counts.
     start
-        Starting values instead of the model's; the others stay.
-    starts, seed
-        How many places to begin from, and which others.
-    max_iterations, max_seconds
-        Limits of the search.
+        Starting values instead of the model's: k=2,d=0.1; the others stay.
+    starts
+        Begin from several places, to find other minima.
+    seed
+        Other places to start from; default: 0.
+    max_iterations
+        At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
+    max_seconds
+        Limit of the search; what it has found by then has no intervals.
     trajectory
-        Where quasilinearization and multiple shooting begin: "model" or "data".
+        Where quasilinearization (default: model) and multiple shooting (default: data) begin: the model's own
+        solution, or the measured outputs.
     pieces
-        Of each record in multiple shooting.
+        Of each record in multiple shooting; default: 12, or fewer for a short one.
     rtol
-        Relative tolerance of the integration.
+        Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
     sigma
-        Standard deviation of a sample of every output, or of each; "auto": from the residuals.
+        Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
+        from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
     """
 
     method: str = "levenberg-marquardt"

@@ -31,14 +31,18 @@ class IdentifyOptions:
 
     Attributes
     ----------
-    method, loss
-        One of `choices`.
-    amplitude_error, phase_error
-        One standard deviation of an amplitude, percent, and of a phase, degrees; before those of the model.
+    method
+        How the coefficients are found.
+    loss
+        Of output error.
+    amplitude_error
+        One standard deviation of an amplitude, in percent; before that of the model.
+    phase_error
+        One standard deviation of a phase, in degrees; before that of the model.
     design
-        Which of these frequencies to measure next, "10:30:1" or rad/s.
+        Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose
-        How many of them; default as many as the parameters, at least 2.
+        How many of them; default: as many as the parameters, at least 2.
     """
 
     method: str = "equation-error"

@@ -55,42 +55,54 @@ class ReduceOptions:
     Attributes
     ----------
     nodes
-        Where the masses stand: "7,12,18", or nodes and stations.
+        Where the masses stand: nodes or stations, 7,12,18.
     place
-        Instead, of all places: the best by frequency, by MAC, a compromise, or the book's rule.
+        Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
+        (extrema of the first two modes).
     masses
-        How many masses `place` and `rank` set; None: 3.
+        How many masses are placed or ranked; default: 3.
     modes
-        How many modes the regression uses; None: 2.
-    normalise, rows, nonnegative, supports_apart
-        As in `rotorid.reduce`.
+        How many modes the regression uses; default: 2.
+    normalise
+        Shapes scaled to 1 at the first mass (the book), at their largest, or in length.
+    rows
+        Rows of the regression as they stand (the book: the first mode dominates), or of each mode relative
+        to its 1/ω².
+    nonnegative
+        No mass below 0.
+    supports_apart
+        Compliance of the shaft and its two bearings apart, (47).
     measured
-        Table of measured modes, used instead of computed ones.
+        Table of measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.
     compliance
-        Without a rotor: table of compliance, with `measured`.
+        Without a rotor, with measured modes: table node, force_node, compliance_m_per_N.
     seals
-        With `compliance`: springs to the ground that it does not hold, "12=2e6" or `{12: 2e6}`, N/m.
+        With a table of compliance: springs to the ground that it does not hold, N/m, 12=2e6.
     errors
-        Standard deviations of the inputs: "compliance=1.3" in percent, or shares, `{"compliance": 0.013}`.
+        Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.
     what_if
-        Changes of inputs: "alpha12=1.3" in percent, or shares.
+        What changes of inputs do, in percent: alpha12=1.3,U31=-0.3.
     speed
-        Of tables of bearings and seals and of the small model, "3000rpm" or rad/s; None: the lowest of the
+        Of tables of bearings and seals, and of the small model, such as 3000rpm; default: the lowest of the
         tables.
     rank
         Rank all places of the masses.
     candidates
-        Nodes that `rank` and `place` choose from.
-    trade_off, methods
-        Other masses at these nodes, frequencies against shapes; all methods of `choices`.
+        Nodes that places are chosen from.
+    trade_off
+        Other masses at these nodes: frequencies against shapes.
+    methods
+        Beside other reductions.
     response
-        Speeds of a response beside the full rotor's, "100:700:50" or rad/s, or "auto".
+        Unbalance response beside the full rotor's: A:B:STEP, rad/s or with a unit; or auto.
     stability
-        Speeds of stability beside the full rotor's, "0:9000rpm" or rad/s.
+        Stability beside the full rotor's, 0:9000rpm.
     damping
-        Modal damping of the small model: "1,0.5" in percent of critical of the first modes, or ratios.
-    both_planes, force
-        Of the model file: planes x and y also where nothing couples them; nodes of measured forces.
+        Modal damping of the small model, percent of critical of the first modes: 1,0.5.
+    both_planes
+        Planes x and y in the model file, also where nothing couples them.
+    force
+        Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     """
 
     nodes: Nodes | None = None

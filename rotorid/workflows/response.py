@@ -43,14 +43,14 @@ class ResponseOptions:
     Attributes
     ----------
     speeds
-        "500:15000:20rpm", or rad/s.
+        FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:20rpm.
     sensors
-        "2:45,22:45", or nodes and stations with angles from x in degrees; None: all stations, or else all
+        Nodes or stations with angles from x in degrees, 2:45,22:45; default: all stations, or else all
         supports, in x.
     operating
-        Operating speeds, "5300:6500rpm" or rad/s.
+        Operating speeds, such as 5300:6500rpm.
     at
-        Speed of the orbits that are drawn, "5800rpm" or rad/s; None: where the largest reading is.
+        Speed of the orbits that are drawn, 5800rpm; default: at the largest reading.
     """
 
     speeds: Speeds

@@ -33,7 +33,6 @@ def balance(
         typer.Argument(
             metavar="JOB | RUNS WEIGHTS | RUNS",
             help="Job (.toml, .xlsx); or runs and weights tables; or a runs table with --influence.",
-            show_default=False,
         ),
     ] = None,
     method: Annotated[str | None, say("method", "METHOD"), choices] = None,
@@ -67,11 +66,11 @@ def balance(
     centre: Annotated[str | None, say("centre", "POSITION")] = None,
     save_influence: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx.", show_default=False),
+        typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx."),
     ] = None,
     template: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.xlsx", help="Write an empty workbook to fill in.", show_default=False),
+        typer.Option(metavar="FILE.xlsx", help="Write an empty workbook to fill in."),
     ] = None,
     sheet: ReportOption = None,
     json: JsonOption = False,

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from rotorid.cli.common import JsonOption, OperatingOption, OutputOption, PlotOption, RotorArgument
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, RotorArgument, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.campbell import CampbellOptions
 from rotorid.workflows.campbell import campbell as work
 
+say = options_of(CampbellOptions)
+
 
 def campbell(
     rotor: RotorArgument,
-    speeds: Annotated[
-        str,
-        typer.Option("--speeds", help="FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm."),
-    ],
-    number: Annotated[
-        int | None,
-        typer.Option(
-            "-n", "--number", min=1, help="How many modes, by default 6; forward and backward count apart."
-        ),
-    ] = None,
-    operating: OperatingOption = None,
+    speeds: Annotated[str, say("speeds", None, "--speeds")],
+    number: Annotated[int | None, say("number", None, "-n", "--number", least=1)] = None,
+    operating: Annotated[str | None, say("operating", "A:B")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

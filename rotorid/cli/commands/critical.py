@@ -4,40 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from rotorid.cli.common import (
-    JsonOption,
-    OperatingOption,
-    OutputOption,
-    PlotOption,
-    ReportOption,
-    RotorArgument,
-)
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, RotorArgument, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.critical import CriticalOptions
 from rotorid.workflows.critical import critical as work
 
+say = options_of(CriticalOptions)
+
 
 def critical(
     rotor: RotorArgument,
-    number: Annotated[
-        int | None,
-        typer.Option(
-            "-n",
-            "--number",
-            min=1,
-            help="How many critical speeds, by default 3; rigid-body motions come besides.",
-        ),
-    ] = None,
-    mesh_check: Annotated[
-        bool, typer.Option("--mesh-check", help="Estimate by refinement how far off the mesh makes each.")
-    ] = False,
-    speed_map: Annotated[
-        bool,
-        typer.Option("--map", help="Critical speeds over the stiffness of the bearings; --plot draws it."),
-    ] = False,
-    operating: OperatingOption = None,
+    number: Annotated[int | None, say("number", None, "-n", "--number", least=1)] = None,
+    mesh_check: Annotated[bool, say("mesh_check", None, "--mesh-check")] = False,
+    speed_map: Annotated[bool, say("speed_map", None, "--map")] = False,
+    operating: Annotated[str | None, say("operating", "A:B")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.fit import FitOptions, choices
 from rotorid.workflows.fit import fit as work
@@ -23,92 +23,25 @@ RecordsArgument = Annotated[
         "deviation of each sample.",
     ),
 ]
-MethodOption = Annotated[str, typer.Option(metavar="METHOD"), choices]
-IntegratorOption = Annotated[str, typer.Option(metavar="NAME"), choices]
-LossOption = Annotated[str, typer.Option(metavar="LOSS"), choices]
-StartOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LIST",
-        help="Starting values instead of the model's: k=2,d=0.1; the others stay.",
-        show_default=False,
-    ),
-]
-StartsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, help="Begin from several places, to find other minima.")
-]
-SeedOption = Annotated[
-    int | None,
-    typer.Option(metavar="N", min=0, help="Other places for --starts; default: 0.", show_default=False),
-]
-IterationsOption = Annotated[
-    int,
-    typer.Option(
-        metavar="N",
-        min=1,
-        help="At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.",
-    ),
-]
-TrajectoryOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="model|data",
-        help="Where quasilinearization (default: model) and multiple shooting (default: data) begin: the "
-        "model's own solution, or the measured outputs.",
-        show_default=False,
-    ),
-]
-PiecesOption = Annotated[
-    int | None,
-    typer.Option(
-        metavar="N",
-        min=1,
-        help="Of each record in multiple shooting; default: 12, or fewer for a short one.",
-        show_default=False,
-    ),
-]
-RtolOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="X", help="Relative tolerance of the integration; default: 1e-10.", show_default=False
-    ),
-]
-SecondsOption = Annotated[
-    float,
-    typer.Option(
-        metavar="S", min=0.01, help="Limit of the search; what it has found by then has no intervals."
-    ),
-]
-MissingOption = Annotated[
-    bool, typer.Option("--allow-missing", help="Blank cells, NaN and absent outputs were not measured.")
-]
-SigmaOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LIST",
-        help="Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each "
-        "output from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.",
-        show_default=False,
-    ),
-]
+say = options_of(FitOptions)
 
 
 def fit(
     model: ModelArgument,
     records: RecordsArgument,
-    method: MethodOption = FitOptions.method,
-    integrator: IntegratorOption = FitOptions.integrator,
-    loss: LossOption = FitOptions.loss,
-    start: StartOption = None,
-    starts: StartsOption = FitOptions.starts,
-    seed: SeedOption = None,
-    max_iterations: IterationsOption = FitOptions.max_iterations,
-    max_seconds: SecondsOption = FitOptions.max_seconds,
-    trajectory: TrajectoryOption = None,
-    pieces: PiecesOption = None,
-    rtol: RtolOption = None,
-    allow_missing: MissingOption = False,
-    sigma: SigmaOption = None,
+    method: Annotated[str, say("method", "METHOD"), choices] = FitOptions.method,
+    integrator: Annotated[str, say("integrator", "NAME"), choices] = FitOptions.integrator,
+    loss: Annotated[str, say("loss", "LOSS"), choices] = FitOptions.loss,
+    start: Annotated[str | None, say("start", "LIST")] = None,
+    starts: Annotated[int, say("starts", "N", least=1)] = FitOptions.starts,
+    seed: Annotated[int | None, say("seed", "N", least=0)] = None,
+    max_iterations: Annotated[int, say("max_iterations", "N", least=1)] = FitOptions.max_iterations,
+    max_seconds: Annotated[float, say("max_seconds", "S", least=0.01)] = FitOptions.max_seconds,
+    trajectory: Annotated[str | None, say("trajectory", "model|data")] = None,
+    pieces: Annotated[int | None, say("pieces", "N", least=1)] = None,
+    rtol: Annotated[float | None, say("rtol", "X")] = None,
+    allow_missing: Annotated[bool, say("allow_missing", None, "--allow-missing")] = False,
+    sigma: Annotated[str | None, say("sigma", "LIST")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

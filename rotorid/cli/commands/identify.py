@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.identify import IdentifyOptions, choices
 from rotorid.workflows.identify import identify as work
@@ -20,46 +20,20 @@ DataArgument = Annotated[
     typer.Argument(
         metavar="DATA",
         help="Measured amplitudes, .csv or .xlsx; only --design does without.",
-        show_default=False,
     ),
 ]
-MethodOption = Annotated[str, typer.Option(metavar="METHOD"), choices]
-LossOption = Annotated[str, typer.Option(metavar="LOSS", help="Of output error."), choices]
-DesignOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="FIRST:LAST:STEP",
-        help="Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end.",
-        show_default=False,
-    ),
-]
-ChooseOption = Annotated[
-    int | None,
-    typer.Option(metavar="N", min=1, help="How many frequencies --design chooses.", show_default=False),
-]
-PercentOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="PERCENT", help="One standard deviation of an amplitude, in percent.", show_default=False
-    ),
-]
-DegreesOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="DEGREES", help="One standard deviation of a phase, in degrees.", show_default=False
-    ),
-]
+say = options_of(IdentifyOptions)
 
 
 def identify(
     model: ModelArgument,
     data: DataArgument = None,
-    method: MethodOption = IdentifyOptions.method,
-    loss: LossOption = IdentifyOptions.loss,
-    amplitude_error: PercentOption = None,
-    phase_error: DegreesOption = None,
-    design: DesignOption = None,
-    choose: ChooseOption = None,
+    method: Annotated[str, say("method", "METHOD"), choices] = IdentifyOptions.method,
+    loss: Annotated[str, say("loss", "LOSS"), choices] = IdentifyOptions.loss,
+    amplitude_error: Annotated[float | None, say("amplitude_error", "PERCENT")] = None,
+    phase_error: Annotated[float | None, say("phase_error", "DEGREES")] = None,
+    design: Annotated[str | None, say("design", "FIRST:LAST:STEP")] = None,
+    choose: Annotated[int | None, say("choose", "N", least=1)] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

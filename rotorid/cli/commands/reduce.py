@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.reduce import Normalise, Place, ReduceOptions, Rows, View, choices
 from rotorid.workflows.reduce import reduce as work
 
 if TYPE_CHECKING:
     from rotorid.workflows.reduced_rotor import ReducedRotor
+
+say = options_of(ReduceOptions)
 
 
 def reduce(
@@ -24,129 +26,29 @@ def reduce(
             help="Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.",
         ),
     ] = None,
-    nodes: Annotated[
-        str | None, typer.Option("--nodes", help="Where the masses stand: nodes or stations, 7,12,18.")
-    ] = None,
-    place: Annotated[
-        Place | None,
-        typer.Option(
-            "--place",
-            help="Instead of --nodes, of all places: best by frequency, best by MAC, a compromise, or the "
-            "book's rule (extrema of the first two modes).",
-        ),
-    ] = None,
-    masses: Annotated[
-        int | None, typer.Option("--masses", min=1, help="How many masses --place and --rank set; default 3.")
-    ] = None,
-    modes: Annotated[
-        int | None, typer.Option("--modes", min=1, help="How many modes the regression uses; default 2.")
-    ] = None,
-    normalise: Annotated[
-        Normalise,
-        typer.Option(
-            "--normalise",
-            help="Shapes scaled to 1 at the first mass (the book), at their largest, or in length.",
-        ),
-    ] = ReduceOptions.normalise,
-    rows: Annotated[
-        Rows,
-        typer.Option(
-            "--rows",
-            help="Rows of the regression as they stand (the book: the first mode dominates), or of each mode "
-            "relative to its 1/ω².",
-        ),
-    ] = ReduceOptions.rows,
-    nonnegative: Annotated[bool, typer.Option("--nonnegative", help="No mass below 0.")] = False,
-    supports_apart: Annotated[
-        bool,
-        typer.Option("--supports-apart", help="Compliance of the shaft and its two bearings apart, (47)."),
-    ] = False,
-    measured: Annotated[
-        Path | None,
-        typer.Option(
-            "--measured",
-            metavar="FILE",
-            help="Measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.",
-        ),
-    ] = None,
-    compliance: Annotated[
-        Path | None,
-        typer.Option(
-            "--compliance",
-            metavar="FILE",
-            help="Without a rotor: table node, force_node, compliance_m_per_N, with --measured.",
-        ),
-    ] = None,
-    seals: Annotated[
-        str | None,
-        typer.Option(
-            "--seals",
-            metavar="LIST",
-            help="With --compliance: springs to the ground that it does not hold, N/m, 12=2e6.",
-        ),
-    ] = None,
-    errors: Annotated[
-        str | None,
-        typer.Option(
-            "--errors",
-            metavar="LIST",
-            help="Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.",
-        ),
-    ] = None,
-    what_if: Annotated[
-        str | None,
-        typer.Option(
-            "--what-if", metavar="LIST", help="What changes of inputs do, in percent: alpha12=1.3,U31=-0.3."
-        ),
-    ] = None,
-    speed: Annotated[
-        str | None,
-        typer.Option(
-            "--speed",
-            metavar="SPEED",
-            help="Of tables of bearings and seals, and of --model and --state-space, such as 3000rpm; "
-            "default: the lowest of the tables.",
-        ),
-    ] = None,
-    rank: Annotated[bool, typer.Option("--rank", help="Rank all places of the masses.")] = False,
-    candidates: Annotated[
-        str | None,
-        typer.Option("--candidates", metavar="LIST", help="Nodes that --rank and --place choose from."),
-    ] = None,
-    trade_off: Annotated[
-        bool, typer.Option("--trade-off", help="Other masses at these nodes: frequencies against shapes.")
-    ] = False,
-    methods: Annotated[bool, typer.Option("--methods", help="Beside other reductions:"), choices] = False,
-    response: Annotated[
-        str | None,
-        typer.Option(
-            "--response",
-            metavar="A:B:STEP",
-            help="Unbalance response beside the full rotor's, rad/s or with a unit; or auto.",
-        ),
-    ] = None,
-    stability: Annotated[
-        str | None,
-        typer.Option("--stability", metavar="A:B", help="Stability beside the full rotor's, 0:9000rpm."),
-    ] = None,
-    damping: Annotated[
-        str | None,
-        typer.Option(
-            "--damping",
-            metavar="LIST",
-            help="Modal damping of the small model, percent of critical of the first modes: 1,0.5.",
-        ),
-    ] = None,
-    both_planes: Annotated[
-        bool,
-        typer.Option("--both-planes", help="Planes x and y in --model, also where nothing couples them."),
-    ] = False,
-    force: Annotated[
-        str | None,
-        typer.Option(
-            "--force", metavar="LIST", help="Nodes of measured forces, inputs f_x12 of --model, 12 or 7,12."
-        ),
-    ] = None,
+    nodes: Annotated[str | None, say("nodes", "LIST")] = None,
+    place: Annotated[Place | None, say("place")] = None,
+    masses: Annotated[int | None, say("masses", "N", least=1)] = None,
+    modes: Annotated[int | None, say("modes", "N", least=1)] = None,
+    normalise: Annotated[Normalise, say("normalise")] = ReduceOptions.normalise,
+    rows: Annotated[Rows, say("rows")] = ReduceOptions.rows,
+    nonnegative: Annotated[bool, say("nonnegative", None, "--nonnegative")] = False,
+    supports_apart: Annotated[bool, say("supports_apart", None, "--supports-apart")] = False,
+    measured: Annotated[Path | None, say("measured", "FILE")] = None,
+    compliance: Annotated[Path | None, say("compliance", "FILE")] = None,
+    seals: Annotated[str | None, say("seals", "LIST")] = None,
+    errors: Annotated[str | None, say("errors", "LIST")] = None,
+    what_if: Annotated[str | None, say("what_if", "LIST")] = None,
+    speed: Annotated[str | None, say("speed", "SPEED")] = None,
+    rank: Annotated[bool, say("rank", None, "--rank")] = False,
+    candidates: Annotated[str | None, say("candidates", "LIST")] = None,
+    trade_off: Annotated[bool, say("trade_off", None, "--trade-off")] = False,
+    methods: Annotated[bool, say("methods", None, "--methods"), choices] = False,
+    response: Annotated[str | None, say("response", "A:B:STEP")] = None,
+    stability: Annotated[str | None, say("stability", "A:B")] = None,
+    damping: Annotated[str | None, say("damping", "LIST")] = None,
+    both_planes: Annotated[bool, say("both_planes", None, "--both-planes")] = False,
+    force: Annotated[str | None, say("force", "LIST")] = None,
     model: Annotated[
         Path | None,
         typer.Option(

@@ -7,17 +7,12 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    JsonOption,
-    OperatingOption,
-    OutputOption,
-    PlotOption,
-    ReportOption,
-    RotorArgument,
-)
+from rotorid.cli.common import JsonOption, OutputOption, PlotOption, ReportOption, RotorArgument, options_of
 from rotorid.cli.output import check_targets, chosen, deliver
 from rotorid.workflows.response import ResponseOptions, View
 from rotorid.workflows.response import response as work
+
+say = options_of(ResponseOptions)
 
 
 def response(
@@ -30,25 +25,11 @@ def response(
             help="Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg.",
         ),
     ],
-    speeds: Annotated[
-        str,
-        typer.Option("--speeds", help="FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:20rpm."),
-    ],
-    sensors: Annotated[
-        str | None,
-        typer.Option(
-            "--sensors",
-            metavar="LIST",
-            help="Nodes or stations with angles from x in degrees, 2:45,22:45; default: all stations, or "
-            "else all supports, in x.",
-        ),
-    ] = None,
-    operating: OperatingOption = None,
+    speeds: Annotated[str, say("speeds", None, "--speeds")],
+    sensors: Annotated[str | None, say("sensors", "LIST", "--sensors")] = None,
+    operating: Annotated[str | None, say("operating", "A:B")] = None,
     view: Annotated[View, typer.Option("--view", help="What --plot draws.")] = "bode",
-    at: Annotated[
-        str | None,
-        typer.Option("--at", metavar="SPEED", help="Speed of the orbits; default: at the largest reading."),
-    ] = None,
+    at: Annotated[str | None, say("at", "SPEED", "--at")] = None,
     json: JsonOption = False,
     plot: PlotOption = None,
     output: OutputOption = None,

@@ -21,7 +21,6 @@ def split(
             metavar="VECTOR",
             help="Weight to be added and its angle in degrees, such as 35g@120 or 3500g_mm@120; several "
             "with + between them are added.",
-            show_default=False,
         ),
     ],
     holes: Annotated[str | None, say("holes", "N|DEG,DEG,…")] = None,

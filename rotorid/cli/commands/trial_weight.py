@@ -21,7 +21,6 @@ def trial_weight(
         typer.Argument(
             metavar="[JOB]",
             help="Job (.toml, .xlsx) with coefficients, a rotor or trial runs: they give amount and angle.",
-            show_default=False,
         ),
     ] = None,
     rotor_mass: Annotated[str | None, say("rotor_mass", "MASS")] = None,

@@ -151,14 +151,15 @@ def _notes(conventions: Conventions, found: Stored | None, stored: str) -> tuple
         adopted.append(f"phase = {phase}")
     if "angles" in unstated and angles != "with rotation":
         adopted.append(f"angles {angles}")
+    notes = []
     if adopted:
-        return (
+        notes.append(
             f"nothing states the conventions of the readings: those of {stored} are used for them too, "
-            f"{' and '.join(adopted)}",
+            f"{' and '.join(adopted)}"
         )
     if found is not None and found.said.get("phase", phase) != phase:
-        return (
+        notes.append(
             f"the readings are taken with phase = {phase}, as stated, and the coefficients with "
-            f"phase = {found.said['phase']}, as {stored} says",
+            f"phase = {found.said['phase']}, as {stored} says"
         )
-    return ()
+    return tuple(notes)

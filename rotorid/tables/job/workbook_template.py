@@ -23,7 +23,7 @@ _TABLES = {
         Key("speed_rpm", kinds.ABOVE_ZERO, "speed", units.SPEED),
         Key("sensor", kinds.TEXT, "name of the sensor; every run needs every sensor at every speed"),
         Key(
-            "amplitude_um_pp amplitude_mm_s_rms amplitude_g_rms",
+            "amplitude_um_pp amplitude_mm_s_rms amplitude_g_rms amplitude",
             kinds.number(0.0),
             "amplitude at the running speed (1x): the end of the name is the unit, _pp is peak to peak, _rms "
             "root mean square, neither is peak; the name amplitude alone is for readings without a unit",
@@ -130,7 +130,7 @@ def _form(title: str, keys: tuple[Key, ...]) -> Page:
 
 def _names(key: Key) -> tuple[str, ...]:
     """Common names of a column, in its units."""
-    return tuple(name for name, unit in key.variants.items() if unit is not None and unit.name in _COMMON)
+    return tuple(name for name, unit in key.variants.items() if unit is None or unit.name in _COMMON)
 
 
 def _choice(key: Key) -> Choice | None:

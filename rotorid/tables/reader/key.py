@@ -96,7 +96,10 @@ class Key:
             return dict.fromkeys(self.names)
         out: dict[str, Unit | None] = {}
         for name in self.names:
-            usual = max((unit for unit in self.units if name.endswith(f"_{unit}")), key=len)
+            usual = max((unit for unit in self.units if name.endswith(f"_{unit}")), key=len, default="")
+            if not usual:
+                out[name] = None
+                continue
             kind = self.units[usual].kind
             alike = [unit for unit in self.units.values() if unit.kind == kind and unit.name != usual]
             out[name] = self.units[usual]

@@ -260,9 +260,9 @@ def test_a_rotor_that_cannot_be_named_is_refused(folder, tmp_path, monkeypatch):
 
 
 NOT_KEPT = [
-    ("[planes.1]\nholes = 3\nhole_names = ['A;B', 'C', 'D']\n", "a name for each of the 3 holes"),
+    ("[planes.1]\nholes = 3\nhole_names = ['A;B', 'C', 'D']\n", "planes.1.hole_names"),
     ("[planes.1]\nholes = 2\nhole_names = ['A:', 'C']\ntaken = { 'A:' = 3 }\n", "taken"),
-    ('[planes.1]\nholes = 2\nhole_names = ["A\\u00a0B", "C"]\n', "holes.1.names"),
+    ('[planes.1]\nholes = 2\nhole_names = ["A\\u00a0B", "C"]\n', "planes.1.hole_names"),
 ]
 
 
@@ -317,6 +317,6 @@ def test_the_comparison_sees_every_part(folder):
 
 def test_too_much_for_a_workbook_is_refused(folder, tmp_path, monkeypatch):
     path = write_job(folder, "")
-    monkeypatch.setattr("rotorid.tables.job.workbook_pages.MOST_ROWS", 6)
+    monkeypatch.setattr("rotorid.tables.reader.pages.MOST_ROWS", 6)
     with pytest.raises(ValueError, match="'runs' would have 7 rows, and a workbook holds 6"):
         job_workbook_bytes(read_job(path), JobSource((path,)), tmp_path / "sheet.xlsx")
