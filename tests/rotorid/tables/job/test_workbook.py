@@ -10,9 +10,8 @@ import openpyxl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from job_comparison import differences
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
-from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW
+from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
