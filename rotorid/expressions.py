@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -165,15 +165,19 @@ class _Token:
 class _Node:
     """A part of an expression, and how large it may become.
 
-    `number` is its exact value if it has no names; `bits` bounds the size of its numbers, `terms` and
-    `degree` those of the sum that it is when multiplied out.
+    `bits` bounds the size of its numbers, `terms` and `degree` those of the sum that it is when multiplied
+    out.
     """
 
-    build: Callable[[], Any] = field(repr=False)
-    number: Fraction | None = None
+    expr: Any
     bits: int = 1
     terms: int = 1
     degree: int = 0
+
+    @property
+    def number(self) -> Fraction | None:
+        """Its exact value if it has no names, or these have cancelled."""
+        return Fraction(int(self.expr.p), int(self.expr.q)) if self.expr.is_Rational else None
 
 
 class _Parser:
@@ -231,7 +235,7 @@ class _Parser:
         token = self.next
         if token.kind != "end":
             raise self.error(token.at, self.unexpected(token))
-        return [node.build() for node in nodes]
+        return [node.expr for node in nodes]
 
     def unexpected(self, token: _Token) -> str:
         if token.text == ")":
@@ -239,59 +243,42 @@ class _Parser:
         return f"an operator such as * is missing before {token.text}"
 
     def sum(self) -> _Node:
+        import sympy
+
         signs, nodes, at = [1], [self.product()], self.next.at
         while self.next.text in ("+", "-"):
             signs.append(1 if self.take().text == "+" else -1)
             nodes.append(self.product())
         if len(nodes) == 1:
             return nodes[0]
-        number = None
-        if all(node.number is not None for node in nodes):
-            self.limit(at, sum(node.bits for node in nodes), 1, 0)
-            number = sum((s * _value(node) for s, node in zip(signs, nodes, strict=True)), Fraction(0))
-            return self.constant(number, at)
-
-        def build() -> Any:  # noqa: ANN401
-            import sympy
-
-            parts = [node.build() for node in nodes]
-            return sympy.Add(*(part if s > 0 else -part for s, part in zip(signs, parts, strict=True)))
-
         return self.node(
-            at, build, sum(n.bits for n in nodes), sum(n.terms for n in nodes), max(n.degree for n in nodes)
+            at,
+            lambda: sympy.Add(*(sign * node.expr for sign, node in zip(signs, nodes, strict=True))),
+            sum(node.bits for node in nodes),
+            sum(node.terms for node in nodes),
+            max(node.degree for node in nodes),
         )
 
     def product(self) -> _Node:
+        import sympy
+
         up, nodes, at = [True], [self.unary()], self.next.at
-        places = [at]
         while self.next.text in ("*", "/"):
             sign = self.take()
             up.append(sign.text == "*")
-            places.append(sign.at)
             nodes.append(self.unary())
-            if sign.text == "/" and nodes[-1].number == 0:
+            if sign.text == "/" and nodes[-1].number == 0:  # such as x/(y - y)
                 raise self.error(sign.at, "division by zero")
         if len(nodes) == 1:
             return nodes[0]
-        if all(node.number is not None for node in nodes):
-            self.limit(at, sum(node.bits for node in nodes), 1, 0)
-            number = Fraction(1)
-            for above, node in zip(up, nodes, strict=True):
-                number = number * _value(node) if above else number / _value(node)
-            return self.constant(number, at)
-
-        def build() -> Any:  # noqa: ANN401
-            import sympy
-
-            parts = [node.build() for node in nodes]
-            for above, part, place in zip(up, parts, places, strict=True):
-                if not above and part == 0:  # such as x/(y - y)
-                    raise self.error(place, "division by zero")
-            return sympy.Mul(*(part if above else 1 / part for above, part in zip(up, parts, strict=True)))
-
-        # what stands in a denominator counts once: it is never multiplied out as a sum
-        terms = math.prod(n.terms if above else 1 for above, n in zip(up, nodes, strict=True))
-        return self.node(at, build, sum(n.bits for n in nodes), terms, sum(n.degree for n in nodes))
+        return self.node(
+            at,
+            lambda: sympy.Mul(*(n.expr if above else 1 / n.expr for above, n in zip(up, nodes, strict=True))),
+            sum(node.bits for node in nodes),
+            # what stands in a denominator counts once: it is never multiplied out as a sum
+            math.prod(node.terms if above else 1 for above, node in zip(up, nodes, strict=True)),
+            sum(node.degree for node in nodes),
+        )
 
     def unary(self) -> _Node:
         sign = self.next
@@ -299,48 +286,33 @@ class _Parser:
             return self.power()
         self.take()
         node = self.deeper(sign, self.unary)
-        if sign.text == "+":
-            return node
-        if node.number is not None:
-            return self.constant(-node.number, sign.at)
-        return self.node(sign.at, lambda: -node.build(), node.bits, node.terms, node.degree)
+        return node if sign.text == "+" else replace(node, expr=-node.expr)
 
     def power(self) -> _Node:
+        import sympy
+
         base = self.atom()
         sign = self.next
         if sign.text != "**":
             return base
         self.take()
         exponent = self.deeper(sign, self.unary)
-        if exponent.number is None:
-            both = base.bits + exponent.bits
-            return self.node(sign.at, lambda: self.raised(base, exponent, sign.at), both, 1, 1)
-        n = exponent.number
-        if abs(n) > MAX_EXPONENT:
-            raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
-        if base.number is not None:
-            return self.constant(self.numeric_power(base.number, n, sign.at), sign.at)
-        whole = math.ceil(abs(n))
-        terms = math.comb(base.terms + whole - 1, whole) if n > 0 and n.denominator == 1 else 1
+        x, n, whole, terms = base.number, exponent.number, 1, 1
+        if n is not None:
+            if abs(n) > MAX_EXPONENT:
+                raise self.error(sign.at, f"an exponent is at most {MAX_EXPONENT} in size")
+            if x is not None:
+                return self.constant(self.numeric_power(x, n, sign.at), sign.at)
+            whole = max(1, math.ceil(abs(n)))
+            if n > 0 and n.denominator == 1:
+                terms = math.comb(base.terms + whole - 1, whole)
         return self.node(
             sign.at,
-            lambda: self.raised(base, exponent, sign.at),
-            base.bits * max(1, whole) + exponent.bits,
+            lambda: sympy.Pow(base.expr, exponent.expr),
+            base.bits * whole + exponent.bits,
             terms,
-            base.degree * max(1, whole),
+            max(1, base.degree * whole),
         )
-
-    def raised(self, base: _Node, exponent: _Node, at: int) -> Any:  # noqa: ANN401
-        """A power; what is a number only after terms have cancelled, such as x - x, is looked at here."""
-        import sympy
-
-        below, above = base.build(), exponent.build()
-        if above.is_Rational and abs(above) > MAX_EXPONENT:
-            raise self.error(at, f"an exponent is at most {MAX_EXPONENT} in size")
-        if below.is_Rational and above.is_Rational:
-            value = self.numeric_power(_fraction(below), _fraction(above), at)
-            return _rational(value)
-        return sympy.Pow(below, above)
 
     def numeric_power(self, base: Fraction, n: Fraction, at: int) -> Fraction:
         if base == 0 and n < 0:
@@ -402,30 +374,21 @@ class _Parser:
             )
             raise self.error(token.at, hint)
 
-        def build() -> Any:  # noqa: ANN401
-            import sympy
+        import sympy
 
-            return sympy.Symbol(name)
-
-        return self.node(token.at, build, 1, 1, 1)
+        return _Node(sympy.Symbol(name), degree=1)
 
     def function(self, name: str, argument: _Node, at: int) -> _Node:
+        import sympy
+
         x = argument.number
         if x is not None:
             return self.constant(self.value(name, x, at), at)
-
-        def build() -> Any:  # noqa: ANN401
-            import sympy
-
-            inner = argument.build()
-            if inner.is_Rational:  # such as x - x
-                return _rational(self.value(name, _fraction(inner), at))
-            if name == "sqrt":
-                return sympy.Pow(inner, sympy.Rational(1, 2))
-            # unevaluated: sympy's simplifications may search for long
-            return getattr(sympy, "Abs" if name == "abs" else name)(inner, evaluate=False)
-
-        return self.node(at, build, argument.bits, 1, 1)
+        if name == "sqrt":
+            return self.node(at, lambda: sympy.sqrt(argument.expr), argument.bits, 1, 1)
+        # unevaluated: sympy's simplifications may search for long
+        called = getattr(sympy, "Abs" if name == "abs" else name)
+        return self.node(at, lambda: called(argument.expr, evaluate=False), argument.bits, 1, 1)
 
     def value(self, name: str, x: Fraction, at: int) -> Fraction:
         """A function of a number."""
@@ -445,17 +408,22 @@ class _Parser:
         return Fraction(repr(value))  # the shortest decimal: 0.01**0.5 is 1/10
 
     def constant(self, number: Fraction, at: int) -> _Node:
+        import sympy
+
         bits = _bits(number)
         self.limit(at, bits, 1, 0)
         if number and not 1 / Fraction(LARGEST) <= abs(number) <= Fraction(LARGEST):
             raise self.error(
                 at, f"a number is at most {LARGEST:g} in size, and at least {1 / LARGEST:g} or 0"
             )
-        return _Node(lambda: _rational(number), number, bits)
+        return _Node(sympy.Rational(number.numerator, number.denominator), bits)
 
     def node(self, at: int, build: Callable[[], Any], bits: int, terms: int, degree: int) -> _Node:
+        """What is built once its size is known to be allowed."""
         self.limit(at, bits, terms, degree)
-        return _Node(build, None, bits, terms, degree)
+        node = _Node(build(), bits, terms, degree)
+        number = node.number
+        return node if number is None else self.constant(number, at)
 
     def limit(self, at: int, bits: int, terms: int, degree: int) -> None:
         if terms > MAX_TERMS:
@@ -472,20 +440,5 @@ class _Parser:
         return node
 
 
-def _value(node: _Node) -> Fraction:
-    assert node.number is not None
-    return node.number
-
-
 def _bits(number: Fraction) -> int:
     return number.numerator.bit_length() + number.denominator.bit_length()
-
-
-def _rational(number: Fraction) -> Any:  # noqa: ANN401
-    import sympy
-
-    return sympy.Rational(number.numerator, number.denominator)
-
-
-def _fraction(number: Any) -> Fraction:  # noqa: ANN401
-    return Fraction(int(number.p), int(number.q))

@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.natural import mode_slopes, natural_modes, nearest_mode
-from rotorid.harmonic.operator import Operator
 
 THIN = 0.01
 """An error ellipse is at least this share as thin as long: no direction of a reading is exact."""
@@ -26,7 +26,7 @@ class Comparison:
 
     Attributes
     ----------
-    operator, experiments
+    model, experiments
         Model and data.
     measured
         Outputs (n, e), NaN where not measured.
@@ -46,7 +46,7 @@ class Comparison:
         In words.
     """
 
-    operator: Operator
+    model: HarmonicModel
     experiments: Experiments
     measured: ComplexArray
     inputs: ComplexArray
@@ -63,7 +63,7 @@ class Comparison:
     @property
     def depends_on_prediction(self) -> bool:
         """Whether the errors grow with the amplitude, so that the prediction should set them."""
-        return any(name not in self.experiments.covariances for name in self.operator.outputs)
+        return any(name not in self.experiments.covariances for name in self.model.outputs)
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """(Predicted − measured) over the errors; NaN where the model has no answer (resonance, no mode)."""
@@ -79,9 +79,7 @@ class Comparison:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(predicted) / np.abs(self.measured)
         near = (ratio < TRUSTED) & (ratio > 1 / TRUSTED)
-        whiten, _ = _whitening(
-            self.experiments, self.operator.outputs, np.where(near, predicted, self.measured)
-        )
+        whiten, _ = _whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
         return replace(self, whiten=whiten, _last={})
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -90,7 +88,7 @@ class Comparison:
         Z, frequencies = np.full((n, e), np.nan, dtype=complex), np.full(n, np.nan)
         w = self.experiments.frequencies
         if len(self.forced):
-            Z[self.forced] = self.operator.forced(
+            Z[self.forced] = self.model.forced(
                 theta, w[self.forced], self.inputs[self.forced], False, self._rows(self.forced)
             )[0]
         for i, (_, _, z, v) in zip(self.free, self._modes(theta), strict=True):
@@ -118,7 +116,7 @@ class Comparison:
         if not len(self.forced):
             return np.zeros(0), np.zeros((0, len(theta)))
         w = self.experiments.frequencies[self.forced]
-        Z, dZ = self.operator.forced(theta, w, self.inputs[self.forced], varying=self._rows(self.forced))
+        Z, dZ = self.model.forced(theta, w, self.inputs[self.forced], varying=self._rows(self.forced))
         root = self.whiten[self.forced][self.seen]
         gap = (Z - self.measured[self.forced])[self.seen]
         slope = dZ[self.seen]
@@ -133,8 +131,8 @@ class Comparison:
     def _modes(self, theta: FloatArray) -> Iterator[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
         """Dynamic stiffness, its derivatives and its modes for each free vibration."""
         for k, i in enumerate(self.free):
-            if not k or self.operator.model.varying:
-                A, dA = self.operator.dynamic_stiffness(theta, self._rows(np.array([i])))
+            if not k or self.model.varying:
+                A, dA = self.model.dynamic_stiffness(theta, self._rows(np.array([i])))
                 z, v = natural_modes(A)
             yield A, dA, z, v
 
@@ -161,30 +159,24 @@ class Comparison:
         return parts
 
 
-def compare(operator: Operator, experiments: Experiments) -> Comparison:
+def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     """Set up a comparison, with errors at the measured amplitudes.
 
     Raises
     ------
     ValueError
-        If no reading can be compared, or errors are stated for some outputs only.
+        If equations and outputs differ in number, no reading can be compared, or errors are stated for some
+        outputs only.
     """
-    n, outputs = len(experiments), operator.outputs
-    unknown = np.full(n, np.nan, dtype=complex)
-    measured = np.stack([np.asarray(experiments.signals.get(o, unknown), dtype=complex) for o in outputs], 1)
-    inputs = (
-        np.stack(
-            [np.asarray(experiments.signals.get(i, unknown), dtype=complex) for i in operator.model.inputs], 1
-        )
-        if operator.model.inputs
-        else np.zeros((n, 0), dtype=complex)
-    )
-    given = ~np.isnan(measured)
-    factors = operator.multipliers(experiments.frequencies, experiments.varying)
+    model.check_square()
+    outputs = model.outputs
+    measured, inputs = experiments.table(outputs), experiments.table(model.inputs)
+    given: BoolArray = np.asarray(~np.isnan(measured))
+    factors = model.multipliers(experiments.frequencies, experiments.varying)
     known = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1)
     forced = np.flatnonzero(~experiments.free & known & given.any(axis=1))
     free = np.flatnonzero(experiments.free & (given.sum(axis=1) > 0))
-    left_out = _left_out(experiments, operator, given, known)
+    left_out = _left_out(experiments, model, given, np.asarray(known))
     if not len(forced) and not len(free):
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
     whiten, warnings = _whitening(experiments, outputs, measured)
@@ -199,7 +191,7 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
         rows.append((i, outputs[reference], "frequency"))
         rows += [(i, outputs[j], "shape") for j in np.flatnonzero(given[i]) if j != reference]
     return Comparison(
-        operator=operator,
+        model=model,
         experiments=experiments,
         measured=measured,
         inputs=inputs,
@@ -215,18 +207,18 @@ def compare(operator: Operator, experiments: Experiments) -> Comparison:
 
 
 def _left_out(
-    experiments: Experiments, operator: Operator, given: BoolArray, known: BoolArray
+    experiments: Experiments, model: HarmonicModel, given: BoolArray, known: BoolArray
 ) -> tuple[str, ...]:
     hidden = np.asarray(~given.any(axis=0))
-    words = [f"{o} is measured nowhere" for o, lost in zip(operator.outputs, hidden, strict=True) if lost]
+    words = [f"{o} is measured nowhere" for o, lost in zip(model.outputs, hidden, strict=True) if lost]
     for i, name in enumerate(experiments.names):
         if not known[i] and not experiments.free[i]:
-            what = "input or varying quantity" if operator.model.varying else "input"
+            what = "input or varying quantity" if model.varying else "input"
             words.append(f"experiment {name}: left out, for not every {what} is known")
         elif not given[i].any():
             words.append(f"experiment {name}: left out, for no amplitude is measured")
         elif not given[i].all():
-            missing = [o for o, g in zip(operator.outputs, given[i] | hidden, strict=True) if not g]
+            missing = [o for o, g in zip(model.outputs, given[i] | hidden, strict=True) if not g]
             words += [f"experiment {name}: {', '.join(missing)} not measured"] if missing else []
     return tuple(words)
 

@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray, IntArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import operator_of
 from rotorid.regression import least_squares
 
 if TYPE_CHECKING:
@@ -96,31 +96,31 @@ class Design:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per candidate: frequency, how often chosen, expected standard deviations from it alone."""
-        import pandas as pd
-
         counts = np.bincount(self.chosen, minlength=len(self.candidates))
-        frame = pd.DataFrame({"frequency_rad_s": self.candidates, "chosen": counts})
-        for j, name in enumerate(self.parameters):
-            frame[f"{name}_std"] = self.std_alone[:, j]
-        return frame
+        alone = zip(self.parameters, self.std_alone.T, strict=True)
+        return frame(
+            (
+                Column("frequency_rad_s", self.candidates),
+                Column("chosen", counts),
+                *(Column(f"{name}_std", std) for name, std in alone),
+            )
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; None where not determined."""
-        return {
-            "frequencies_rad_s": self.frequencies.tolist(),
-            "candidates_rad_s": self.candidates.tolist(),
-            "parameters": {
-                name: {
-                    "guess": float(self.guess[j]),
-                    "std": finite(self.std[j]),
-                    "std_all_candidates": finite(self.std_all[j]),
-                    "std_alone": [finite(s) for s in self.std_alone[:, j]],
-                }
-                for j, name in enumerate(self.parameters)
-            },
-            "efficiency": finite(self.efficiency),
-            "determined": self.determined,
-        }
+        table = zip(self.parameters, self.guess, self.std, self.std_all, self.std_alone.T, strict=True)
+        return plain(
+            {
+                "frequencies_rad_s": self.frequencies,
+                "candidates_rad_s": self.candidates,
+                "parameters": {
+                    name: {"guess": guess, "std": std, "std_all_candidates": every, "std_alone": alone}
+                    for name, guess, std, every, alone in table
+                },
+                "efficiency": self.efficiency,
+                "determined": self.determined,
+            }
+        )
 
 
 def design(
@@ -253,7 +253,7 @@ def _sensitivities(
     measured: Sequence[str] | None,
 ) -> FloatArray:
     """Derivatives of amplitudes over errors, (c, 2·sensors, n)."""
-    operator = operator_of(model)
+    model.check_square()
     sensors = tuple(model.outputs if measured is None else measured)
     for name in sensors:
         if name not in model.outputs:
@@ -266,12 +266,12 @@ def _sensitivities(
     loads = {name: np.full(len(w), complex(inputs[name])) for name in model.inputs}
     table = np.stack(list(loads.values()), axis=1) if loads else np.zeros((len(w), 0), dtype=complex)
     try:
-        Z, _ = operator.forced(theta, w, table, slopes=False)
+        Z, _ = model.forced(theta, w, table, slopes=False)
     except np.linalg.LinAlgError:
         raise ValueError("a candidate frequency is a resonance without damping: move it") from None
     signals = {**loads, **{name: Z[:, model.outputs.index(name)] for name in sensors}}
     plan = gather(model, w, signals, errors=errors, free=False)
-    J = compare(operator, plan).jacobian(theta)
+    J = compare(model, plan).jacobian(theta)
     return J.reshape(len(w), 2 * len(sensors), len(theta))
 
 

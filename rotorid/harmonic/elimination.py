@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-
-Powers = tuple[tuple[int, int], ...]
-"""Sorted (unknown, exponent) pairs."""
-Poly = dict[Powers, float]
+from rotorid.harmonic.features import powers_product, powers_slopes
+from rotorid.regression.search import search_from
 
 NEARLY_REAL = 1e-6
 NEGLIGIBLE = 1e-13
@@ -20,22 +20,63 @@ STARTS = 300
 MAX_BRANCHES = 64
 
 
-class PolynomialSystem(Protocol):
-    """What `recovery.System` offers."""
+@dataclass(frozen=True, eq=False)
+class System:
+    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
 
-    @property
-    def exponents(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def matrix(self) -> FloatArray: ...  # noqa: D102
-    @property
-    def values(self) -> FloatArray: ...  # noqa: D102
-    def monomials(self, theta: FloatArray) -> FloatArray: ...  # noqa: D102
-    def jacobian(self, theta: FloatArray) -> FloatArray: ...  # noqa: D102
+    Attributes
+    ----------
+    names
+        Of the n parameters.
+    exponents
+        (monomials, n).
+    matrix
+        (q, monomials).
+    values, covariance
+        (q,), and (q, q) or None.
+    below
+        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
+    """
+
+    names: tuple[str, ...]
+    exponents: FloatArray
+    matrix: FloatArray
+    values: FloatArray
+    covariance: FloatArray | None
+    below: FloatArray | None = None
+
+    def combinations(self, theta: FloatArray) -> FloatArray:
+        """Values (q,) at the parameters."""
+        return np.asarray(self.matrix @ self.monomials(theta) / self.bottom(theta))
+
+    def cleared(self) -> System:
+        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
+        if self.below is None:
+            return self
+        matrix = self.matrix - self.values[:, None] * self.below
+        values = np.where(self.below.any(axis=1), 0.0, self.values)
+        return System(self.names, self.exponents, matrix, values, None)
+
+    def bottom(self, theta: FloatArray) -> FloatArray:
+        """What stands below each sum (q,), 1 where nothing does."""
+        if self.below is None:
+            return np.ones(len(self.values))
+        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
+
+    def monomials(self, theta: FloatArray) -> FloatArray:
+        """Values (monomials,)."""
+        return powers_product(self.exponents, theta)
+
+    def jacobian(self, theta: FloatArray) -> FloatArray:
+        """Derivatives (q, n) of the combinations by the parameters."""
+        out = powers_slopes(self.exponents, theta)
+        slopes = self.matrix @ out
+        if self.below is not None:
+            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
+        return np.asarray(slopes / self.bottom(theta)[:, None])
 
 
-def real_solutions(
-    system: PolynomialSystem, free: Sequence[int], base: FloatArray
-) -> tuple[list[FloatArray], bool]:
+def real_solutions(system: System, free: Sequence[int], base: FloatArray) -> tuple[list[FloatArray], bool]:
     """Candidates for all real solutions, and whether a search was needed (which may miss some).
 
     Parameters
@@ -45,16 +86,16 @@ def real_solutions(
     free
         Indices of the unknowns; the others have the values of `base` (n,).
     """
-    polys = _polynomials(system, frozenset(free), base)
     try:
-        branches = _eliminate(polys, frozenset(free))
+        polys = {poly: _unknowns(poly) for poly in _polynomials(system, free, base)}
+        branches = _eliminate(polys, frozenset(range(len(free))))
     except _NotReducible:
         return _search(system, list(free), base), True
     out = []
     for branch in branches:
         theta = base.copy()
         for j, value in branch.items():
-            theta[j] = value
+            theta[free[j]] = value
         out.append(theta)
     return out, False
 
@@ -63,95 +104,58 @@ class _NotReducible(Exception):
     """No unknown can be eliminated by these simple means."""
 
 
-def _polynomials(system: PolynomialSystem, free: frozenset[int], base: FloatArray) -> list[Poly]:
+def _polynomials(system: System, free: Sequence[int], base: FloatArray) -> list[Any]:
+    """The equations in a ring of sympy, whose generators are the free unknowns."""
+    from sympy import RR, ring, symbols
+
+    R = ring(symbols(f"x:{len(free)}"), RR)[0]
+    fixed = np.setdiff1d(np.arange(len(base)), free)
+    known = system.matrix * np.prod(base[fixed] ** system.exponents[:, fixed], axis=1)
+    exponents = system.exponents[:, list(free)].astype(int)
     polys = []
-    for row, value in zip(system.matrix, system.values, strict=True):
-        poly: Poly = {(): -float(value)} if value else {}
-        for m in np.flatnonzero(row):
-            powers, factor = [], float(row[m])
-            for j in np.flatnonzero(system.exponents[m]):
-                exponent = int(system.exponents[m, j])
-                if j in free:
-                    powers.append((int(j), exponent))
-                else:
-                    factor *= base[j] ** exponent
-            _accumulate(poly, tuple(powers), factor)
+    for row, value in zip(known, system.values, strict=True):
+        used = np.flatnonzero(row)
+        lowest = exponents[used].min(axis=0, initial=0)  # multiplied so that no exponent is negative
+        poly = R.term_new(tuple((-lowest).tolist()), RR(-float(value)))
+        for m in used:
+            poly += R.term_new(tuple((exponents[m] - lowest).tolist()), RR(float(row[m])))
         polys.append(_whole(poly))
     return polys
 
 
-def _accumulate(poly: Poly, powers: Powers, value: float) -> None:
-    """Add a term; what is left of two that cancel but for rounding is zero."""
-    old = poly.get(powers, 0.0)
-    total = old + value
-    if abs(total) <= NEGLIGIBLE * max(abs(old), abs(value)):
-        poly.pop(powers, None)
-    else:
-        poly[powers] = total
+def _whole(poly: Any) -> Any:  # noqa: ANN401 - sympy has no types
+    """Without powers of unknowns that all its terms share: an unknown is not 0."""
+    shared = [min(exponents) for exponents in zip(*poly, strict=True)]
+    lower = {tuple(np.subtract(m, shared).tolist()): x for m, x in poly.items()}
+    return poly.ring.from_dict(lower)
 
 
-def _times(a: Powers, b: Powers) -> Powers:
-    powers = dict(a)
-    for j, e in b:
-        powers[j] = powers.get(j, 0) + e
-    return tuple(sorted((j, e) for j, e in powers.items() if e))
+def _unknowns(poly: Any) -> set[int]:  # noqa: ANN401
+    return {j for j, degree in enumerate(poly.degrees()) if degree > 0}
 
 
-def _product(a: Poly, b: Poly) -> Poly:
-    out: Poly = {}
-    for m, x in a.items():
-        for n, y in b.items():
-            _accumulate(out, _times(m, n), x * y)
-    if len(out) > MAX_TERMS:
-        raise _NotReducible
-    return out
-
-
-def _whole(poly: Poly) -> Poly:
-    """Multiply so that every unknown has lowest exponent 0."""
-    lowest: dict[int, int] = {}
-    unknowns = _unknowns(poly)
-    for j in unknowns:
-        lowest[j] = min(dict(m).get(j, 0) for m in poly)
-    shift = tuple(sorted((j, -e) for j, e in lowest.items() if e))
-    return {_times(m, shift): x for m, x in poly.items()} if shift else poly
-
-
-def _unknowns(poly: Poly) -> set[int]:
-    return {j for m in poly for j, _ in m}
-
-
-def _eliminate(polys: list[Poly], open_: frozenset[int]) -> list[dict[int, float]]:
-    """All branches of values for the open unknowns."""
+def _eliminate(polys: dict[Any, set[int]], open_: frozenset[int]) -> list[dict[int, float]]:
+    """All branches of values for the open unknowns, from polynomials with their unknowns."""
     if not open_:
         return [{}]
-    polys = [p for p in polys if _unknowns(p)]
-    single = [p for p in polys if len(_unknowns(p)) == 1]
+    out: list[dict[int, float]] = []
+    single = [poly for poly, unknowns in polys.items() if len(unknowns) == 1]
     if single:
-        poly = min(single, key=lambda p: (max(e for m in p for _, e in m), len(p)))
-        (j,) = _unknowns(poly)
-        out: list[dict[int, float]] = []
+        poly = min(single, key=lambda p: (p.degree(min(polys[p])), len(p)))
+        (j,) = polys[poly]
         for root in _real_roots(poly, j):
-            rest = [_replace(p, j, {(): root}, {(): 1.0}) for p in polys if p is not poly]
+            value = poly.ring.ground_new(poly.ring.domain(root))
+            rest = _others(polys, poly, j, value, poly.ring.one)
             out += [{j: root, **branch} for branch in _eliminate(rest, open_ - {j})]
             if len(out) > MAX_BRANCHES:
                 raise _NotReducible
         return out
     for poly in sorted(polys, key=len):
-        for j in sorted(_unknowns(poly)):
-            with_j = {m: x for m, x in poly.items() if j in dict(m)}
-            if any(dict(m)[j] != 1 for m in with_j):
+        for j in sorted(polys[poly]):
+            top, bottom = -poly.coeff_wrt(j, 0), poly.coeff_wrt(j, 1)
+            if poly.degree(j) != 1 or len(bottom) != 1 or not top:
                 continue
-            if len(with_j) > 1:
-                continue
-            ((m, x),) = with_j.items()
-            bottom: Poly = {_times(m, ((j, -1),)): x}
-            top: Poly = {k: -y for k, y in poly.items() if k not in with_j}
-            if not top:
-                continue
-            rest = [_replace(p, j, top, bottom) for p in polys if p is not poly]
-            out = []
-            for branch in _eliminate(rest, open_ - {j}):
+            for branch in _eliminate(_others(polys, poly, j, top, bottom), open_ - {j}):
                 value = _value(top, branch) / _value(bottom, branch) if _value(bottom, branch) else np.nan
                 if np.isfinite(value):
                     out.append({**branch, j: value})
@@ -159,31 +163,46 @@ def _eliminate(polys: list[Poly], open_: frozenset[int]) -> list[dict[int, float
     raise _NotReducible
 
 
-def _replace(poly: Poly, j: int, top: Poly, bottom: Poly) -> Poly:
-    """Put top/bottom for unknown j, multiplied out."""
-    degree = max((dict(m).get(j, 0) for m in poly), default=0)
-    if degree == 0:
-        return poly
-    one: Poly = {(): 1.0}
-    tops, bottoms = [one], [one]
-    for _ in range(degree):
-        tops.append(_product(tops[-1], top))
-        bottoms.append(_product(bottoms[-1], bottom))
-    out: Poly = {}
-    for m, x in poly.items():
-        e = dict(m).get(j, 0)
-        others: Powers = tuple((k, n) for k, n in m if k != j)
-        term: Poly = {others: x}
-        for k, y in _product(_product(term, tops[e]), bottoms[degree - e]).items():
-            _accumulate(out, k, y)
-    return _whole(out)
+def _others(polys: dict[Any, set[int]], used: Any, j: int, top: Any, bottom: Any) -> dict[Any, set[int]]:  # noqa: ANN401
+    """The other polynomials with top/bottom for unknown j, each with its unknowns, if it has any."""
+    rest = {}
+    for poly, unknowns in polys.items():
+        if poly is used:
+            continue
+        if j in unknowns:
+            poly = _replace(poly, j, top, bottom)
+            unknowns = _unknowns(poly)
+        if unknowns:
+            rest[poly] = unknowns
+    return rest
 
 
-def _real_roots(poly: Poly, j: int) -> list[float]:
-    degree = max(dict(m).get(j, 0) for m in poly)
+def _replace(poly: Any, j: int, top: Any, bottom: Any) -> Any:  # noqa: ANN401
+    """Put top/bottom for unknown j, multiplied out; where terms cancel but for rounding there is nothing."""
+    degree = poly.degree(j)
+    if comb(len(top) + degree - 1, degree) * len(poly) > 50 * MAX_TERMS:
+        raise _NotReducible
+
+    def put(poly: Any, top: Any, bottom: Any) -> Any:  # noqa: ANN401
+        return sum(poly.coeff_wrt(j, e) * top**e * bottom ** (degree - e) for e in range(degree + 1))
+
+    found, sizes = put(poly, top, bottom), put(_size(poly), _size(top), _size(bottom))
+    kept = {m: x for m, x in found.items() if abs(x) > NEGLIGIBLE * sizes[m]}
+    if len(kept) > MAX_TERMS:
+        raise _NotReducible
+    return _whole(poly.ring.from_dict(kept))
+
+
+def _size(poly: Any) -> Any:  # noqa: ANN401
+    """The polynomial with all coefficients positive."""
+    return poly.ring.from_dict({m: abs(x) for m, x in poly.items()})
+
+
+def _real_roots(poly: Any, j: int) -> list[float]:  # noqa: ANN401
+    degree = poly.degree(j)
     coefficients = np.zeros(degree + 1)
     for m, x in poly.items():
-        coefficients[degree - dict(m).get(j, 0)] = x
+        coefficients[degree - m[j]] = float(x)
     if degree == 1:
         return [float(-coefficients[1] / coefficients[0])]
     # scale the unknown so that first and last coefficient are alike
@@ -195,42 +214,38 @@ def _real_roots(poly: Poly, j: int) -> list[float]:
     return sorted(set(real))
 
 
-def _value(poly: Poly, values: Mapping[int, float]) -> float:
-    return float(sum(x * np.prod([values[j] ** e for j, e in m]) for m, x in poly.items()))
+def _value(poly: Any, values: dict[int, float]) -> float:  # noqa: ANN401
+    return float(
+        sum(float(x) * np.prod([values[j] ** e for j, e in enumerate(m) if e]) for m, x in poly.items())
+    )
 
 
-def _search(system: PolynomialSystem, free: list[int], base: FloatArray) -> list[FloatArray]:
+def _search(system: System, free: list[int], base: FloatArray) -> list[FloatArray]:
     """Levenberg–Marquardt from many starting points of all magnitudes and signs."""
-    from scipy.optimize import least_squares
-
     size = np.where(system.values != 0, np.abs(system.values), 1.0)
     rng = np.random.default_rng(1)
     found: list[FloatArray] = []
 
-    def residual(x: FloatArray) -> FloatArray:
+    def whole(x: FloatArray) -> FloatArray:
         theta = base.copy()
         theta[free] = x
-        return np.asarray((system.matrix @ system.monomials(theta) - system.values) / size)
+        return theta
+
+    def residual(x: FloatArray) -> FloatArray:
+        return np.asarray((system.matrix @ system.monomials(whole(x)) - system.values) / size)
 
     def jacobian(x: FloatArray) -> FloatArray:
-        theta = base.copy()
-        theta[free] = x
-        return np.asarray(system.jacobian(theta)[:, free] / size[:, None])
+        return np.asarray(system.jacobian(whole(x))[:, free] / size[:, None])
 
-    method = "lm" if len(system.values) >= len(free) else "trf"
     typical = float(np.exp(np.mean(np.log(size))))
     for i in range(STARTS):
         magnitude = 10 ** rng.uniform(-2, 2, len(free)) * (1.0 if i % 2 else typical)
         start = magnitude * (rng.choice((-1, 1), len(free)) if i % 4 > 1 else 1)
-        with np.errstate(all="ignore"):
-            try:
-                fit = least_squares(residual, start, jacobian, method=method, x_scale="jac", max_nfev=100)
-            except (ValueError, np.linalg.LinAlgError):  # an unknown ran away to infinity
-                continue
-        theta = base.copy()
-        theta[free] = fit.x
-        if fit.cost < 1e-2 and np.isfinite(theta).all():
-            known = any(np.all(np.abs(theta - t) <= 1e-5 * np.maximum(np.abs(t), 1e-300)) for t in found)
-            if not known:
-                found.append(theta)
+        end = search_from(residual, start, jacobian, limit=100)
+        if end is None or end[0] >= 1e-2:
+            continue
+        theta = whole(end[1])
+        known = any(np.all(np.abs(theta - t) <= 1e-5 * np.maximum(np.abs(t), 1e-300)) for t in found)
+        if not known:
+            found.append(theta)
     return found

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.base.text import listing
+from rotorid.harmonic.elimination import System
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import combination_words, ratio_words
 from rotorid.harmonic.influence import leave_one_out
@@ -19,8 +21,6 @@ from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
 from rotorid.harmonic.recovery import (
     Recovery,
-    System,
-    and_words,
     only_determined,
     recover,
     undetermined_parameters,
@@ -80,7 +80,7 @@ class LinearFit:
 def linear_fit(model: HarmonicModel, experiments: Experiments, bounds: Bounds | None = None) -> LinearFit:
     """Regression of the equations, and the parameters that follow; errors as in `identify`."""
     rows = build_rows(model, experiments)
-    groups = _groups(rows)
+    groups = _groups(model, rows)
     fixed = np.zeros(rows.coefficients.shape[1])
     fixed[[_reference(rows, group) for group in groups]] = 1.0
     if fixed.all():  # each unknown is alone with its factor: nothing is told relative to another
@@ -133,18 +133,17 @@ def equation_error(
             warnings.append(f"{name} = {value:.6g} lies outside its bounds; output error keeps to them")
 
     theta_cov = None
-    if covariance is not None and recovery.gain is not None:
-        theta_cov = recovery.gain @ covariance @ recovery.gain.T
-        theta_cov[np.isnan(parameters), :] = theta_cov[:, np.isnan(parameters)] = np.nan
-    elif covariance is not None:
+    if covariance is not None:
         theta_cov = np.full((len(parameters), len(parameters)), np.nan)
+        if recovery.gain is not None:
+            theta_cov = recovery.gain @ covariance @ recovery.gain.T
+            theta_cov[np.isnan(parameters), :] = theta_cov[:, np.isnan(parameters)] = np.nan
     if not recovery.solutions:  # what stands alone in the equations is known all the same
-        own = [(i, model.parameters.index(w)) for i, w in enumerate(words) if w in model.parameters]
-        for i, j in own:
-            parameters[j] = values[i]
-            for k, m in own:
-                if theta_cov is not None and covariance is not None:
-                    theta_cov[j, m] = covariance[i, k]
+        own = [i for i, w in enumerate(words) if w in model.parameters]
+        at = [model.parameters.index(words[i]) for i in own]
+        parameters[at] = values[own]
+        if theta_cov is not None and covariance is not None:
+            theta_cov[np.ix_(at, at)] = covariance[np.ix_(own, own)]
     influence = None
     if recovery.gain is not None:
         change = leave_one_out(fit.K, fit.Y, fit.experiment, len(experiments))
@@ -165,15 +164,11 @@ def equation_error(
             if w not in model.parameters
         ),
         solutions=tuple(
-            {
-                name: float("nan") if recovery.undetermined[j] else float(theta[j])
-                for j, name in enumerate(model.parameters)
-            }
+            dict(zip(model.parameters, np.where(recovery.undetermined, np.nan, theta).tolist(), strict=True))
             for theta in recovery.solutions
         ),
         starts=tuple(
-            {name: float(x) for name, x in zip(model.parameters, theta, strict=True)}
-            for theta in recovery.solutions
+            dict(zip(model.parameters, theta.tolist(), strict=True)) for theta in recovery.solutions
         ),
         rank=len(fit.picks),
         condition_number=estimate.condition_number,
@@ -253,13 +248,13 @@ def _determined(estimate: Estimate) -> FloatArray:
     return np.array(rows) if rows else np.zeros((0, len(estimate.names)))
 
 
-def _groups(rows: Rows) -> tuple[IntArray, ...]:
+def _groups(model: HarmonicModel, rows: Rows) -> tuple[IntArray, ...]:
     """Groups of regression unknowns that may all be multiplied by one factor: right sides are 0.
 
     Regression would find zero for them, a wrong answer. Equations are linked by the unknowns that they share.
     """
     holds = np.zeros((rows.Y.shape[1], rows.coefficients.shape[1]), dtype=bool)
-    np.logical_or.at(holds, rows.equation, rows.coefficients != 0)
+    np.logical_or.at(holds, model.equation, rows.coefficients != 0)
     linked = holds @ holds.T | np.eye(len(holds), dtype=bool)
     for _ in range(len(holds).bit_length()):
         linked = linked @ linked
@@ -314,8 +309,9 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):
             found.append(
-                f"every multiple of {and_words(loose)} fits, for no known term that is not zero stands in "
-                f"their equations: no experiment of this kind tells more than ratios; make one of them known"
+                f"every multiple of {listing(loose, 'and')} fits, for no known term that is not zero stands "
+                "in their equations: no experiment of this kind tells more than ratios; make one of them "
+                "known"
             )
     if not estimate.full_rank:
         now = len(model.parameters) - len(undetermined_parameters(fit.system)[1])
@@ -328,19 +324,16 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
 
 def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recovery) -> dict[str, ComplexArray]:
     """Amplitudes of the outputs, NaN in free vibration; empty where the model cannot predict them."""
-    if not recovery.solutions or len(model.outputs) != len(model.equations):
-        return {}
     driven = np.flatnonzero(~experiments.free)
-    if not len(driven):
+    if not recovery.solutions or not len(driven):
         return {}
     part = experiments.take(driven)
     try:
         found = model.predict(recovery.solutions[0], part.frequencies, part.signals, part.varying)
     except (np.linalg.LinAlgError, ValueError):
         return {}
-    out = {}
+    out = {name: np.full(len(experiments), np.nan, dtype=complex) for name in found}
     for name, values in found.items():
-        out[name] = np.full(len(experiments), np.nan, dtype=complex)
         out[name][driven] = values
     return out
 
@@ -348,7 +341,7 @@ def _predicted(model: HarmonicModel, experiments: Experiments, recovery: Recover
 def _notes(model: HarmonicModel, experiments: Experiments, estimate: Estimate) -> tuple[str, ...]:
     notes = []
     if model.varying:
-        notes.append(f"{and_words(model.varying)}: from the measurements, row by row")
+        notes.append(f"{listing(model.varying, 'and')}: from the measurements, row by row")
     if not experiments.stated:
         notes.append(
             "all rows count alike; state errors of the amplitudes to weight them and for honest intervals"

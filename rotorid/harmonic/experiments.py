@@ -124,15 +124,18 @@ class Experiments:
     def take(self, index: ArrayLike) -> Experiments:
         """Some of the experiments, by index or by a mask (n,)."""
         chosen = np.arange(len(self))[np.asarray(index)]
-        return Experiments(
-            tuple(self.names[i] for i in chosen),
-            self.frequencies[chosen],
-            {name: values[chosen] for name, values in self.signals.items()},
-            self.free[chosen],
-            self.errors,
-            {name: values[chosen] for name, values in self.covariances.items()},
-            {name: values[chosen] for name, values in self.varying.items()},
-        )
+        tables = (self.signals, self.covariances, self.varying)
+        signals, covariances, varying = ({name: x[chosen] for name, x in table.items()} for table in tables)
+        names, w, free = tuple(self.names[i] for i in chosen), self.frequencies[chosen], self.free[chosen]
+        return Experiments(names, w, signals, free, self.errors, covariances, varying)
+
+    def table(self, names: Sequence[str]) -> ComplexArray:
+        """Amplitudes of some signals, (n, signals), NaN where not measured."""
+        found = np.full((len(self), len(names)), np.nan, dtype=complex)
+        for j, name in enumerate(names):
+            if name in self.signals:
+                found[:, j] = self.signals[name]
+        return found
 
     def without_copies(self) -> tuple[Experiments, tuple[str, ...]]:
         """Each reading once, and in words what was left out: a copy to the last digit is no measurement."""

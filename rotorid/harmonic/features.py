@@ -7,6 +7,7 @@ lists the combinations of monomials that data can determine at best.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,6 +19,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.polynomial import ONE, Monomial, Polynomial, degree, times
 
 P = "p"
+NAME = re.compile(r"[^\W\d]\w*")
+"""A name in a text."""
 CONSTANT = ""
 """Signal name of a term without a signal: amplitude 1."""
 
@@ -106,6 +109,11 @@ def split_features(
         if exact:
             features.append(Feature(equation, k, signal, exact, {m: parts[m] for m in exact}, factors))
     return features
+
+
+def exact_number(value: float) -> Fraction:
+    """The decimal number that a float is printed as: 0.1 is 1/10."""
+    return Fraction(repr(float(value)))
 
 
 def multipliers(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
 from functools import reduce
 from operator import mul
 from typing import Any
@@ -14,7 +13,7 @@ import numpy as np
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import Feature, P, split_features
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.polynomial import Polynomial, times
+from rotorid.harmonic.polynomial import Polynomial, as_data, times
 
 MOST_TERMS = 400
 """More terms than that after an elimination are no model to fit."""
@@ -22,8 +21,8 @@ MOST_TERMS = 400
 
 def hidden_outputs(model: HarmonicModel, experiments: Experiments) -> tuple[str, ...]:
     """Outputs that no experiment has measured, where others are."""
-    unknown = np.full(len(experiments), np.nan)
-    lost = tuple(o for o in model.outputs if np.isnan(experiments.signals.get(o, unknown)).all())
+    never = np.isnan(experiments.table(model.outputs)).all(axis=0)
+    lost = tuple(model.outputs[j] for j in np.flatnonzero(never))
     return () if len(lost) == len(model.outputs) else lost
 
 
@@ -96,10 +95,7 @@ def _features(
     unit = bottom.terms()[-1][1]
     whole: Polynomial = {}
     for signal, x in row.items():
-        for exponents, c in (x.numer * bottom.exquo(x.denom)).terms():
-            product = tuple(sorted((n, e) for n, e in zip(names, exponents, strict=True) if e))
-            c = c / unit
-            whole[times(product, ((signal, 1),) if signal else ())] = Fraction(
-                int(c.numerator), int(c.denominator)
-            )
+        own = ((signal, 1),) if signal else ()
+        numerator = as_data(x.numer * bottom.exquo(x.denom) / unit, names)
+        whole |= {times(monomial, own): value for monomial, value in numerator.items()}
     return split_features(number, whole, {}, frozenset(signals), frozenset(varying))

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from rotorid.base.registry import Method, find
+from rotorid.base.text import listing
 from rotorid.harmonic.equation_error import Bounds, equation_error, limits
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.hidden import hidden_outputs, without
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.output_identification import identify_outputs
-from rotorid.harmonic.recovery import and_words
 from rotorid.harmonic.result import Identification
 from rotorid.harmonic.rows import ask_about_case
 
@@ -88,10 +88,10 @@ def _by_equations(
     if not np.isfinite(found.condition_number):
         raise ValueError(
             f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "
-            f"equations without {and_words(hidden)} (not measured): use the method "
+            f"equations without {listing(hidden, 'and')} (not measured): use the method "
             "output-error, or measure more"
         )
-    note = f"{and_words(hidden)} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
+    note = f"{listing(hidden, 'and')} {'is' if len(hidden) == 1 else 'are'} not measured: eliminated"
     shown = () if found.identifiable else found.combinations
     return replace(found, combinations=shown, notes=(note, *found.notes))
 

@@ -1,37 +1,31 @@
-"""Operator models: linear equations in the amplitudes with coefficients in p = d/dt and parameters."""
+"""Operator models: equations linear in the amplitudes with coefficients in p = d/dt, what they predict."""
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.features import (
     CONSTANT,
     Combinations,
     Feature,
-    P,
+    exact_number,
     lifted,
     merge,
     multipliers,
     powers_product,
     powers_slopes,
 )
-from rotorid.harmonic.features import split_features as _split
-from rotorid.harmonic.polynomial import ONE, Factor, Monomial, Polynomial, add, from_expression
+from rotorid.harmonic.polynomial import ONE, Monomial
 
 
 @dataclass(frozen=True, eq=False)
 class HarmonicModel:
-    """Linear operator equations; made by `harmonic_model`.
+    """Linear operator equations; made by `harmonic_model`: sums of terms c · Πθ^e · p^k · signal.
 
     Attributes
     ----------
@@ -98,10 +92,45 @@ class HarmonicModel:
         """Derivatives (1 + monomials, n) of the monomials by the parameters."""
         return powers_slopes(self.exponents, values)
 
+    @cached_property
+    def equation(self) -> IntArray:
+        """Of each feature (f,)."""
+        return np.array([f.equation for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def power(self) -> IntArray:
+        """Of p in each feature (f,)."""
+        return np.array([f.power for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def column(self) -> IntArray:
+        """Signal of each feature (f,): outputs, then inputs, at last the amplitude 1 of constant terms."""
+        names = (*self.outputs, *self.inputs, CONSTANT)
+        return np.array([names.index(f.signal) for f in self.features], dtype=np.int_)
+
+    @cached_property
+    def _place(self) -> FloatArray:
+        """Where the features stand in the equations, (f, equations · (1 + signals))."""
+        columns = 1 + len(self.signals)
+        place = np.zeros((len(self.features), len(self.equations) * columns))
+        place[np.arange(len(place)), self.equation * columns + self.column] = 1.0
+        return place
+
+    def multipliers(
+        self, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> ComplexArray:
+        """p^k · varying of each feature, (n, f)."""
+        return multipliers(self.power.tolist(), [f.varying for f in self.features], frequencies, varying)
+
+    def polynomials(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values (f,) and derivatives (f, n) of the features' coefficients at parameters (n,)."""
+        C = self.coefficients
+        return C @ self.monomial_values(values), C @ self.monomial_jacobian(values)
+
     def matrices(
         self, values: FloatArray, frequencies: FloatArray, varying: Mapping[str, FloatArray] | None = None
     ) -> ComplexArray:
-        """Coefficients A(iω; θ) of the signals, (n, equations, 1 + signals); the last is the constant's.
+        """Coefficients A(iω; θ) of outputs, inputs and 1, (n, equations, 1 + signals).
 
         Parameters
         ----------
@@ -112,14 +141,8 @@ class HarmonicModel:
         varying
             Known quantities (n,) that change from row to row, by name.
         """
-        place = {name: i for i, name in enumerate((*self.signals, CONSTANT))}
-        powers, products = [f.power for f in self.features], [f.varying for f in self.features]
-        pk = multipliers(powers, products, frequencies, varying)
-        terms = pk * (self.coefficients @ self.monomial_values(values))
-        A = np.zeros((len(terms), len(self.equations), 1 + len(self.signals)), dtype=complex)
-        for j, f in enumerate(self.features):
-            A[:, f.equation, place[f.signal]] += terms[:, j]
-        return A
+        terms = self.multipliers(frequencies, varying) * (self.coefficients @ self.monomial_values(values))
+        return np.asarray((terms @ self._place).reshape(len(terms), len(self.equations), -1))
 
     def predict(
         self,
@@ -136,260 +159,87 @@ class HarmonicModel:
             If there are not as many outputs as equations.
         """
         self.check_square()
-        A = self.matrices(values, frequencies, varying)
-        place = {name: i for i, name in enumerate(self.signals)}
-        right = -A[:, :, -1]
-        for name in self.inputs:
-            right = right - A[:, :, place[name]] * np.asarray(inputs[name])[:, None]
-        left = A[:, :, [place[name] for name in self.outputs]]
-        found = np.linalg.solve(left, right[:, :, None])[:, :, 0]
-        return {name: np.asarray(found[:, i], dtype=complex) for i, name in enumerate(self.outputs)}
+        table = np.zeros((len(frequencies), len(self.inputs)), dtype=complex)
+        for j, name in enumerate(self.inputs):
+            table[:, j] = inputs[name]
+        found, _ = self.forced(values, frequencies, table, False, varying)
+        return {name: found[:, j] for j, name in enumerate(self.outputs)}
+
+    def forced(
+        self,
+        values: FloatArray,
+        frequencies: FloatArray,
+        inputs: ComplexArray,
+        slopes: bool = True,
+        varying: Mapping[str, FloatArray] | None = None,
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Amplitudes of the outputs (n, e) and their derivatives (n, e, parameters).
+
+        From A Z = b with the outputs on one side: Z = A⁻¹ b and dZ/dθ = A⁻¹ (db/dθ − dA/dθ Z) ([S] (17),
+        (18)).
+
+        Parameters
+        ----------
+        values
+            Of the parameters.
+        frequencies
+            ω, shape (n,).
+        inputs
+            Amplitudes of the inputs, (n, inputs).
+        slopes
+            False: without derivatives (an empty array).
+        varying
+            Known quantities (n,) that change from row to row, by name.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            At a resonance without damping.
+        """
+        n, e = len(frequencies), len(self.outputs)
+        given = np.concatenate((inputs, np.ones((n, 1))), axis=1)
+        whole = self.matrices(values, frequencies, varying)
+        A = whole[:, :, :e]
+        right = -(whole[:, :, e:] @ given[:, :, None])
+        Z = np.asarray(np.linalg.solve(A, right)[:, :, 0], dtype=np.complex128)
+        if not slopes:
+            return Z, np.zeros((n, e, 0), dtype=complex)
+        load = self.multipliers(frequencies, varying) * np.concatenate((Z, given), axis=1)[:, self.column]
+        _, dP = self.polynomials(values)
+        own = [np.flatnonzero(self.equation == i) for i in range(e)]
+        G = -np.stack([load[:, f] @ dP[f] for f in own], axis=1)
+        return Z, np.asarray(np.linalg.solve(A, G), dtype=np.complex128)
+
+    def dynamic_stiffness(
+        self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Matrices A_k (k, e, e) of A = Σ A_k z^k with z = ω² = −p², and derivatives (k, e, e, n).
+
+        Of free vibration: odd powers of p, which would need imaginary amplitudes, are left out. Varying
+        quantities (1,) have the values of one row.
+        """
+        P, dP = self.polynomials(values)
+        if self.varying:
+            row = multipliers([0] * len(P), [f.varying for f in self.features], np.ones(1), varying)[0].real
+            P, dP = P * row, dP * row[:, None]
+        e = len(self.outputs)
+        use = (self.column < e) & (self.power % 2 == 0)
+        low = int(self.power[use].min()) if use.any() else 0
+        k = (self.power - low) // 2
+        # multiplied by p^−low: without this a compliance form written with 1/p² would have no polynomial
+        sign = np.where(k % 2 == 0, 1.0, -1.0)
+        degree = int(k[use].max()) + 1 if use.any() else 1
+        A, dA = np.zeros((degree, e, e)), np.zeros((degree, e, e, len(values)))
+        at = (k[use], self.equation[use], self.column[use])
+        np.add.at(A, at, sign[use] * P[use])
+        np.add.at(dA, at, sign[use, None] * dP[use])
+        return A, dA
 
     def check_square(self) -> None:
         """Raise ValueError if amplitudes cannot be predicted: not as many outputs as equations."""
         if len(self.outputs) != len(self.equations):
             raise ValueError(
-                f"to predict amplitudes the model needs as many outputs as equations; it has outputs "
-                f"{', '.join(self.outputs) or 'none'} in {len(self.equations)} equations: "
-                f"say which signals are given with inputs = [...]"
+                f"predicting amplitudes needs as many equations as outputs; there are {len(self.equations)} "
+                f"equations and {len(self.outputs)} outputs ({', '.join(self.outputs) or 'none'}): say which "
+                "signals are given with inputs = [...], or use the equation-error method"
             )
-
-
-def harmonic_model(
-    equations: Sequence[str],
-    *,
-    known: Mapping[str, float] | None = None,
-    estimate: Sequence[str],
-    inputs: Sequence[str] | None = None,
-    varying: Sequence[str] = (),
-) -> HarmonicModel:
-    """Read an operator model.
-
-    Parameters
-    ----------
-    equations
-        "left = right" in p = d/dt, known names, parameters and signals, such as "(m*p**2 + b*p + c)*X = F".
-        Every name that is neither p, known nor to be estimated is a signal, but for one that stands only as a
-        factor of signals: that is varying. A term without a signal has amplitude 1. Denominators of several
-        terms are multiplied out.
-    known
-        Numbers by name.
-    estimate
-        Names of the parameters to be estimated.
-    inputs
-        Signals that excite. Default: those that stand only on right sides.
-    varying
-        Further known quantities that change from row to row, [S] (4), such as a speed.
-
-    Raises
-    ------
-    ValueError
-        For equations that cannot be read, are not linear in the signals or not rational in p and parameters,
-        or follow from the others; parameters that do not occur, names given twice.
-
-    Examples
-    --------
-    >>> model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
-    >>> model.outputs, model.inputs
-    (('X',), ('F',))
-    """
-    from rotorid.expressions import names, parse_equation
-
-    if isinstance(equations, str):
-        equations = [equations]
-    if not equations:
-        raise ValueError("the model has no equations")
-    numbers = {name: _finite(name, value) for name, value in (known or {}).items()}
-    _check_names(tuple(estimate), numbers)
-    sides = [parse_equation(text, where=f"equation {i + 1}") for i, text in enumerate(equations)]
-    left, right = ({n for side in sides for n in names(side[i])} for i in (0, 1))
-    given = {P, *numbers, *estimate}
-    occurring = sorted((left | right) - given)
-    for name in estimate:
-        if name not in left | right:
-            hint = _near(name, occurring)
-            raise ValueError(f"the parameter {name} is to be estimated but stands in no equation{hint}")
-
-    exact = {name: exact_number(value) for name, value in numbers.items()}
-    features, changing = _all_features(equations, sides, exact, occurring, inputs or (), varying)
-    used = {f.signal for f in features} - {CONSTANT}
-    signals = tuple(name for name in _by_place(equations, occurring) if name in used)
-    if not signals:
-        raise ValueError(
-            "the equations contain no signal: no name is left that is neither known nor estimated"
-        )
-    _check_independent(features, len(equations))
-    occurs = {name for f in features for m in f.exact for name, _ in m}
-    for name in estimate:
-        if name not in occurs:
-            raise ValueError(
-                f"the parameter {name} cancels out of the equations: nothing can be said about it"
-            )
-    if inputs is None:
-        chosen = tuple(name for name in signals if name not in left)
-    else:
-        chosen = tuple(inputs)
-        for name in chosen:
-            if name not in signals:
-                raise ValueError(
-                    f"the input {name} is no signal of the equations; signals are {', '.join(signals)}"
-                )
-    outputs = tuple(name for name in signals if name not in chosen)
-    if not outputs:
-        raise ValueError(f"all signals ({', '.join(signals)}) are inputs: there is nothing to measure")
-    return HarmonicModel(
-        tuple(equations),
-        tuple(estimate),
-        numbers,
-        signals,
-        chosen,
-        outputs,
-        tuple(features),
-        tuple(name for name in occurring if name in changing),
-    )
-
-
-def exact_number(value: float) -> Fraction:
-    """The decimal number that a float is printed as: 0.1 is 1/10."""
-    return Fraction(repr(float(value)))
-
-
-def _all_features(
-    equations: Sequence[str],
-    sides: Sequence[Any],
-    known: Mapping[str, Fraction],
-    names_: Sequence[str],
-    inputs: Sequence[str],
-    varying: Sequence[str],
-) -> tuple[list[Feature], frozenset[str]]:
-    """Features of all equations, and the names of quantities that change from row to row."""
-    expanded = []
-    for i, (text, side) in enumerate(zip(equations, sides, strict=True)):
-        with _named(i, text):
-            expanded.append(_expand(side[0], side[1], known))
-    changing = _row_by_row([part for part, _ in expanded], names_, inputs, varying)
-    features: list[Feature] = []
-    for i, (text, (difference, bottom)) in enumerate(zip(equations, expanded, strict=True)):
-        with _named(i, text):
-            for name in (name for factor in bottom for monomial, _ in factor for name, _ in monomial):
-                if name in names_ and name not in changing:
-                    raise ValueError(f"it is not linear in the signals: {name} stands in a denominator")
-            own = _split(i, difference, known, frozenset(names_), changing)
-            if not any(f.signal for f in own):
-                raise ValueError(
-                    "it contains no signal; names that are neither known nor estimated are signals"
-                )
-            features += own
-    return features, changing
-
-
-@contextmanager
-def _named(index: int, text: str) -> Iterator[None]:
-    """Say in which equation a problem lies."""
-    try:
-        yield
-    except ValueError as problem:
-        raise ValueError(f"equation {index + 1}, '{text}': {problem}") from None
-
-
-def _row_by_row(
-    expanded: Sequence[Polynomial], occurring: Sequence[str], inputs: Sequence[str], stated: Sequence[str]
-) -> frozenset[str]:
-    """Names that stand only beside a signal, as factors of it: it stands alone somewhere, they do not."""
-    terms = [{n: e for n, e in m if n in occurring} for part in expanded for m in part]
-    alone = {n for term in terms if len(term) == 1 for n, e in term.items() if e == 1} | set(inputs)
-    alone -= set(stated)
-    found = set(stated)
-    for term in terms:
-        if len(alone.intersection(term)) == 1:
-            found |= set(term) - alone
-    return frozenset(found)
-
-
-def _expand(lhs: Any, rhs: Any, known: Mapping[str, Fraction]) -> tuple[Polynomial, Iterable[Factor]]:  # noqa: ANN401
-    """Left minus right side over the common denominator, and that."""
-
-    def constant(part: Any) -> Fraction | None:  # noqa: ANN401
-        if any(symbol.name not in known for symbol in part.free_symbols):
-            return None
-        value = complex(part.subs({s: float(known[s.name]) for s in part.free_symbols}).evalf())
-        if not np.isfinite(value) or abs(value.imag) > 1e-12 * abs(value):
-            raise ValueError(f"'{part}' is no finite real number for the known values")
-        return exact_number(value.real)
-
-    try:
-        left, right = from_expression(lhs, constant), from_expression(rhs, constant)
-    except ZeroDivisionError:
-        raise ValueError("it divides by zero") from None
-    bottom = left.bottom | right.bottom
-    difference = add(left.over(bottom), right.over(bottom), -1)
-    for monomial in difference:
-        for name, exponent in monomial:
-            if name in known and exponent < 0 and not known[name]:
-                raise ValueError(f"it divides by {name}, which is 0")
-    return difference, (*left.bottom, *right.bottom)
-
-
-def _check_names(estimate: tuple[str, ...], known: Mapping[str, float]) -> None:
-    from rotorid.expressions import is_name
-
-    if not estimate:
-        raise ValueError("no parameter is to be estimated: name at least one")
-    for name in (*estimate, *known):
-        if not is_name(name):
-            raise ValueError(f"'{name}' cannot be a name: letters, digits and _ only, and no function's name")
-        if name == P:
-            raise ValueError("p is d/dt: it can be neither known nor estimated")
-    for name in estimate:
-        if estimate.count(name) > 1:
-            raise ValueError(f"the parameter {name} is named twice")
-        if name in known:
-            raise ValueError(f"{name} is both known and to be estimated")
-
-
-def _check_independent(features: Sequence[Feature], equations: int) -> None:
-    """Raise ValueError for an equation that follows from those before it: its rows would count twice.
-
-    The rank of A(p; θ) at one general point, modulo a large prime.
-    """
-    from sympy import GF
-    from sympy.polys.matrices import DomainMatrix
-
-    names = sorted({name for f in features for m in (*f.exact, f.varying) for name, _ in m} | {P})
-    drawn = np.random.default_rng(1).integers(2, 1000, len(names)).tolist()
-    point = {name: Fraction(value, 999) for name, value in zip(names, drawn, strict=True)}
-    place = {name: i for i, name in enumerate(dict.fromkeys(f.signal for f in features))}
-    table = [[Fraction(0)] * equations for _ in place]
-    for f in features:
-        for monomial, x in f.exact.items():
-            term = x * math.prod(point[n] ** e for n, e in (*monomial, *f.varying, (P, f.power)))
-            table[place[f.signal]][f.equation] += term
-    K = GF(2**61 - 1)
-    whole = [[K(x.numerator) / K(x.denominator) for x in row] for row in table]
-    _, free = DomainMatrix(whole, (len(place), equations), K).to_sparse().rref()
-    for i in range(equations):
-        if i not in free:
-            raise ValueError(
-                f"equation {i + 1} follows from those before it and tells nothing new: leave it out, or its "
-                "rows would count twice"
-            )
-
-
-def _finite(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not np.isfinite(value):
-        raise ValueError(f"the known {name} must be a finite number; got {value!r}")
-    return float(value)
-
-
-def _near(name: str, names: Sequence[str]) -> str:
-    found = difflib.get_close_matches(name, names, 1, 0.5)
-    return f"; did you mean {found[0]}?" if found else ""
-
-
-def _by_place(equations: Sequence[str], names: Sequence[str]) -> list[str]:
-    """Names in the order in which they first stand in the equations."""
-    import re
-
-    found = re.findall(r"[^\W\d]\w*", " ".join(equations))
-    place = {name: i for i, name in reversed(list(enumerate(found)))}
-    return sorted(names, key=lambda name: place.get(name, len(place)))

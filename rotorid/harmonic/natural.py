@@ -32,11 +32,8 @@ def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     sizes = [float(np.abs(a).max()) for a in A]
     unit = (sizes[0] / sizes[-1]) ** (1 / degree) if sizes[0] > 0 and sizes[-1] > 0 else 1.0
     scaled = A * unit ** np.arange(degree + 1)[:, None, None]
-    L, R = np.zeros((degree * e, degree * e)), np.eye(degree * e)
-    for i in range(degree - 1):
-        L[i * e : (i + 1) * e, (i + 1) * e : (i + 2) * e] = np.eye(e)
-    for i in range(degree):
-        L[-e:, i * e : (i + 1) * e] = -scaled[i]
+    L, R = np.eye(degree * e, k=e), np.eye(degree * e)
+    L[-e:] = -np.hstack([*scaled[:-1]])
     R[-e:, -e:] = scaled[-1]
     (alpha, beta), y = eig(L, R, homogeneous_eigvals=True)
     with np.errstate(divide="ignore", invalid="ignore"):

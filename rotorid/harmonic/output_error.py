@@ -26,7 +26,6 @@ from rotorid.base.text import counted
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import Operator, operator_of
 from rotorid.harmonic.starting import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
@@ -109,8 +108,7 @@ def output_error(
     -----
     Exact Jacobian: dZ/dθ = A⁻¹ (db/dθ − dA/dθ Z).
     """
-    operator = operator_of(model)
-    comparison = compare(operator, experiments)
+    comparison = compare(model, experiments)
     point = starting_values(model, experiments, start)[0]
     rounds: list[NonlinearEstimate] = []
     while True:
@@ -133,7 +131,7 @@ def output_error(
         comparison = comparison.reweighted(point)
     joined = _joined(rounds)
     J = comparison.jacobian(joined.estimate.solution)
-    return _result(replace(joined, estimate=_spare(joined.estimate, J)), comparison, experiments, operator)
+    return _result(replace(joined, estimate=_spare(joined.estimate, J)), comparison)
 
 
 def _moved(before: NonlinearEstimate, after: NonlinearEstimate) -> float:
@@ -152,8 +150,6 @@ def _joined(rounds: Sequence[NonlinearEstimate]) -> NonlinearEstimate:
     last = rounds[-1]
     return replace(
         last,
-        start=rounds[0].start,
-        iterations=iterations,
         message=f"converged in {counted(iterations, 'iteration')}" if last.converged else last.message,
         history=np.concatenate([rounds[0].history, *(fit.history[1:] for fit in rounds[1:])]),
         costs=np.concatenate([rounds[0].costs, *(fit.costs[1:] for fit in rounds[1:])]),
@@ -184,25 +180,20 @@ def _spare(estimate: Estimate, jacobian: FloatArray) -> Estimate:
     )
 
 
-def _result(
-    fit: NonlinearEstimate, comparison: Comparison, experiments: Experiments, operator: Operator
-) -> OutputError:
+def _result(fit: NonlinearEstimate, comparison: Comparison) -> OutputError:
     predicted, frequencies = comparison.predict(fit.estimate.solution)
-    table = {name: predicted[:, j] for j, name in enumerate(operator.outputs)}
-    relative = {}
-    for name, z in table.items():
-        measured = np.asarray(experiments.signals.get(name, np.full(len(experiments), np.nan)), dtype=complex)
-        good = ~np.isnan(measured) & ~np.isnan(z) & (measured != 0)
-        relative[name] = np.full(len(z), np.nan, dtype=complex)
-        relative[name][good] = (measured - z)[good] / np.abs(measured[good])
+    measured, outputs = comparison.measured, comparison.model.outputs
+    relative = np.full(measured.shape, np.nan, dtype=complex)
+    good = ~np.isnan(measured) & ~np.isnan(predicted) & (measured != 0)
+    relative[good] = (measured - predicted)[good] / np.abs(measured[good])
     return OutputError(
         fit=fit,
-        predicted=table,
+        predicted=dict(zip(outputs, predicted.T, strict=True)),
         natural_frequencies=frequencies,
         rows=comparison.rows,
         jacobian=comparison.jacobian(fit.estimate.solution),
         experiment=comparison.experiment,
-        relative=relative,
+        relative=dict(zip(outputs, relative.T, strict=True)),
         left_out=comparison.left_out,
-        warnings=(*comparison.warnings, *fit.warnings),
+        warnings=(*comparison.warnings, *fit.end_warnings),
     )

@@ -12,9 +12,9 @@ from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.features import multipliers
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.operator import operator_of
 from rotorid.harmonic.result import Identification
-from rotorid.regression.estimate import Estimate, coverage_factor
+from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
 
 LARGE = 0.12
@@ -80,7 +80,7 @@ def _refined(refine: Refine, theta: FloatArray) -> tuple[NonlinearEstimate | Non
 
 def _biased(found: Identification, fit: NonlinearEstimate, combinations: FloatArray) -> str:
     """Words where output error lies outside an interval of the linear estimate."""
-    factor = coverage_factor(None if found.errors_stated else found.dof)
+    factor = found.coverage_factor
     if found.std is None or factor is None:
         return ""
     words = [*found.parameters, *(c.words for c in found.combinations)]
@@ -100,7 +100,7 @@ def _biased(found: Identification, fit: NonlinearEstimate, combinations: FloatAr
 
 def _ordered(found: Identification, theta: FloatArray) -> bool:
     """Whether relative residuals of neighbouring frequencies are alike: those of noise are not (2.5 %)."""
-    comparison = compare(operator_of(found.model), found.experiments)
+    comparison = compare(found.model, found.experiments)
     gap = (comparison.predict(theta)[0] - comparison.measured) / np.abs(comparison.measured)
     seen = np.isfinite(gap)
     r = np.where(seen, gap, 0.0)[np.argsort(found.experiments.frequencies)]
@@ -129,7 +129,7 @@ def left_over(model: HarmonicModel, experiments: Experiments, theta: FloatArray)
     Relative to the root mean square of the readings; None where the model predicts none.
     """
     try:
-        comparison = compare(operator_of(model), experiments)
+        comparison = compare(model, experiments)
         predicted, natural = comparison.predict(theta)
     except (ValueError, np.linalg.LinAlgError):
         return None
@@ -209,8 +209,7 @@ def passive_elements(model: HarmonicModel) -> dict[str, int]:
     e = len(model.equations)
     if len(model.outputs) != e:
         return {}
-    operator = operator_of(model)
-    equation, signal, power = operator.equation, operator.signal, operator.power
+    equation, signal, power = model.equation, model.column, model.power
     own = (signal == equation) & (power >= 0) & (power <= 2)
     diagonal = np.zeros((e, 3))
     np.add.at(diagonal, (equation[own], power[own]), model.coefficients.sum(axis=1)[own])
@@ -255,17 +254,16 @@ def what_more_can_tell(model: HarmonicModel, experiments: Experiments, now: int)
         }
         try:
             plan = replace(many, frequencies=w, signals=signals, varying=varying, errors=None, covariances={})
-            comparison = compare(operator_of(model), plan)
+            comparison = compare(model, plan)
             exact = comparison.predict(theta)[0]
             both = {name: exact[:, j] for j, name in enumerate(model.outputs) if name in signals}
             seen = {name: np.where(np.isnan(signals[name]), np.nan, z) for name, z in both.items()}
-            J = compare(operator_of(model), replace(plan, signals={**signals, **seen})).jacobian(theta)
+            J = compare(model, replace(plan, signals={**signals, **seen})).jacobian(theta)
         except (ValueError, np.linalg.LinAlgError):
             continue
         J = J[np.isfinite(J).all(axis=1)] * theta
-        size = np.linalg.norm(J, axis=0)
-        s = np.linalg.svd(J / np.where(size > 0, size, 1.0), compute_uv=False)
-        most = max(most, int(np.count_nonzero(s > 1e-9 * s.max(initial=0.0))))
+        if len(J):
+            most = max(most, least_squares(J, np.zeros(len(J)), rcond=1e-9).rank)
     if 0 < most <= now:
         return "no experiment of this kind tells more: make a parameter known, or excite or measure elsewhere"
     return "more experiments, at other frequencies, may determine the rest"

@@ -49,11 +49,10 @@ def figure_identification(result: Identification) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
     if result.experiments.free.all():
-        grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
         draw_shapes(result, figure.add_subplot(grid[:, 0]))
     else:
-        grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
         above = figure.add_subplot(grid[0, 0])
         draw_amplitudes(result, above)
         draw_phases(result, figure.add_subplot(grid[1, 0], sharex=above))
@@ -79,10 +78,7 @@ def draw_amplitudes(result: Identification, axes: Axes) -> None:
         axes.set_yscale("log")
         axes.set_ylim(smallest / 2, largest * 2)
     axes.set(xlabel="frequency, rad/s", ylabel="amplitude")
-    axes.grid(alpha=0.3)
-    axes.set_title("measured (points) and identified model (lines)", fontsize=10)
-    if len(result.model.outputs) <= MANY:
-        axes.legend(frameon=False, fontsize=9)
+    _finish(axes, "measured (points) and identified model (lines)", len(result.model.outputs))
 
 
 def draw_phases(result: Identification, axes: Axes) -> None:
@@ -106,7 +102,7 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     """Measured and fitted mode shapes, one line per natural frequency."""
     outputs = result.model.outputs
     place = np.arange(len(outputs))
-    table = _table(result)
+    table = result.experiments.table(result.model.outputs)
     fitted, natural = _modes(result)
     for i, w in enumerate(_frequencies(result)):
         color = COLORS[i % len(COLORS)]
@@ -117,20 +113,17 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     axes.set_xticks(place, outputs)
     axes.set(ylabel="shape")
     fit = " and identified model (lines)" if np.isfinite(fitted).any() else ""
-    axes.set_title(f"shapes: measured (points){fit}", fontsize=10)
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False, fontsize=9)
+    _finish(axes, f"shapes: measured (points){fit}")
 
 
 def draw_residuals(result: Identification, axes: Axes) -> None:
     """Residuals of each equation (or output) and experiment: real part filled, imaginary part open."""
     place = np.arange(len(result.experiments))
-    width = min(0.6, 0.12 * len(result.residual_names))
+    number = len(result.residual_names)
+    width = min(0.6, 0.12 * number)
     for j, name in enumerate(result.residual_names):
         color = COLORS[j % len(COLORS)]
-        shift = place + (j - (len(result.residual_names) - 1) / 2) * width / max(
-            1, len(result.residual_names)
-        )
+        shift = place + (j - (number - 1) / 2) * width / number
         values = result.residuals[:, j]
         axes.plot(shift, values.real, "o", color=color, ms=5, label=name)
         if not result.experiments.free.all():
@@ -142,10 +135,7 @@ def draw_residuals(result: Identification, axes: Axes) -> None:
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     axes.set(xlabel="experiment", ylabel="residual")
     parts = "" if result.experiments.free.all() else ": real part filled, imaginary open"
-    axes.set_title(f"residuals{parts} (rms {result.residual_rms:.3g})", fontsize=10)
-    axes.grid(alpha=0.3)
-    if len(result.residual_names) <= MANY:
-        axes.legend(frameon=False, fontsize=9)
+    _finish(axes, f"residuals{parts} (rms {result.residual_rms:.3g})", len(result.residual_names))
 
 
 def draw_correlations(result: Identification, axes: Axes) -> None:
@@ -174,20 +164,21 @@ def draw_correlations(result: Identification, axes: Axes) -> None:
     axes.set_title("correlations of the parameters", fontsize=10)
 
 
+def _finish(axes: Axes, title: str, names: int = 0) -> None:
+    """Grid, title, and a legend where it has not too many names."""
+    axes.grid(alpha=0.3)
+    axes.set_title(title, fontsize=10)
+    if names <= MANY:
+        axes.legend(frameon=False, fontsize=9)
+
+
 def _frequencies(result: Identification) -> FloatArray:
     return np.asarray(result.experiments.frequencies, dtype=float)
 
 
-def _table(result: Identification) -> ComplexArray:
-    """Measured outputs, shape (experiments, outputs)."""
-    unknown = np.full(len(result.experiments), np.nan, dtype=complex)
-    signals = result.experiments.signals
-    return np.stack([np.asarray(signals.get(name, unknown)) for name in result.model.outputs], axis=1)
-
-
 def _outputs(result: Identification) -> list[tuple[str, str, ComplexArray, BoolArray]]:
     """Color, name, measured amplitudes and which experiments, forced ones only, of every output."""
-    table, forced = _table(result), ~result.experiments.free
+    table, forced = result.experiments.table(result.model.outputs), ~result.experiments.free
     return [
         (COLORS[j % len(COLORS)], name, table[forced, j], forced)
         for j, name in enumerate(result.model.outputs)
@@ -214,15 +205,13 @@ def _curve(result: Identification) -> Curve | None:
         values = np.array([result.solutions[0].get(name, np.nan) for name in model.parameters])
     forced = ~data.free
     w = _frequencies(result)[forced]
-    if not np.isfinite(values).all() or len(w) < 2 or len(model.outputs) != len(model.equations):
-        return None
-    if model.varying:
+    if model.varying or not np.isfinite(values).all() or len(w) < 2:
         return None
     # what is measured may lie at a peak: the line passes exactly there
     grid = np.unique(np.concatenate((np.linspace(w.min(), w.max(), CURVE_POINTS), w)))
     inputs: dict[str, ComplexArray] = {}
     for name in model.inputs:
-        given = np.asarray(data.signals.get(name, np.full(len(data), np.nan)))[forced]
+        given = data.table([name])[forced, 0]
         if np.isnan(given).any() or not np.allclose(given, given[0], rtol=1e-9, atol=0.0):
             return None
         inputs[name] = np.full(len(grid), given[0])
@@ -235,12 +224,11 @@ def _curve(result: Identification) -> Curve | None:
 def _modes(result: Identification) -> tuple[ComplexArray, FloatArray]:
     """Shapes (experiments, outputs) and frequencies of the identified model; NaN where it predicts none."""
     from rotorid.harmonic.comparison import compare
-    from rotorid.harmonic.operator import operator_of
 
     unknown = np.full((len(result.experiments), len(result.model.outputs)), np.nan, dtype=complex)
     try:
         if np.isfinite(result.values).all():
-            return compare(operator_of(result.model), result.experiments).predict(result.values)
+            return compare(result.model, result.experiments).predict(result.values)
     except (ValueError, np.linalg.LinAlgError):  # a model that predicts nothing has measured points only
         pass
     return unknown, unknown[:, 0].real.copy()

@@ -1,15 +1,17 @@
-"""Polynomials with exact coefficients: dictionary arithmetic, quick where sympy's expansion is not.
+"""Polynomials with exact coefficients: expressions multiplied out by sympy.polys, quick where sympy is not.
 
-A polynomial is a dictionary from monomials to rational coefficients; a monomial is a sorted tuple of
+As data a polynomial is a dictionary from monomials to rational coefficients; a monomial is a sorted tuple of
 (name, exponent), exponents of either sign, so that 1/p**2 or 1/k needs no multiplying out.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
+from operator import add, mul
 from typing import Any
 
 Monomial = tuple[tuple[str, int], ...]
@@ -22,11 +24,8 @@ MAX_EXPONENT = 50
 
 def times(a: Monomial, b: Monomial) -> Monomial:
     """Product of two monomials."""
-    if not a or not b:
-        return a or b
-    powers = dict(a)
-    for name, exponent in b:
-        powers[name] = powers.get(name, 0) + exponent
+    powers = Counter(dict(a))
+    powers.update(dict(b))
     return tuple(sorted((name, e) for name, e in powers.items() if e))
 
 
@@ -35,91 +34,18 @@ def degree(monomial: Monomial) -> int:
     return sum(abs(e) for _, e in monomial)
 
 
-def add(a: Polynomial, b: Polynomial, factor: int = 1) -> Polynomial:
-    """A + factor·b."""
-    out = dict(a)
-    for monomial, value in b.items():
-        total = out.get(monomial, Fraction(0)) + factor * value
-        if total:
-            out[monomial] = total
-        else:
-            out.pop(monomial, None)
-    return out
-
-
-def multiply(a: Polynomial, b: Polynomial) -> Polynomial:
-    """Product; ValueError beyond MAX_TERMS terms."""
-    if len(a) * len(b) > 50 * MAX_TERMS:
-        raise ValueError("it expands to too many terms")
-    out: Polynomial = {}
-    for m, x in a.items():
-        for n, y in b.items():
-            key = times(m, n)
-            out[key] = out.get(key, Fraction(0)) + x * y
-    if len(out) > MAX_TERMS:
-        raise ValueError("it expands to too many terms")
-    return {m: x for m, x in out.items() if x}
-
-
-def power(a: Polynomial, exponent: int) -> Polynomial:
-    """A to a whole power, negative only for a single term."""
-    if len(a) == 1:
-        ((monomial, value),) = a.items()
-        return {tuple((name, e * exponent) for name, e in monomial) if exponent else ONE: value**exponent}
-    out: Polynomial = {ONE: Fraction(1)}
-    for _ in range(exponent):
-        out = multiply(out, a)
-    return out
-
-
-Factor = tuple[tuple[Monomial, Fraction], ...]
-
-
-class Ratio:
-    """A numerator over a product of polynomials of more than one term."""
-
-    def __init__(self, top: Polynomial, bottom: Mapping[Factor, int] | None = None) -> None:
-        self.top = top
-        self.bottom: Counter[Factor] = Counter(bottom or {})
-
-    def __add__(self, other: Ratio) -> Ratio:
-        bottom = self.bottom | other.bottom
-        return Ratio(add(self.over(bottom), other.over(bottom)), bottom)
-
-    def __mul__(self, other: Ratio) -> Ratio:
-        return Ratio(multiply(self.top, other.top), self.bottom + other.bottom)
-
-    def to_power(self, exponent: int) -> Ratio:
-        """Whole power, of either sign."""
-        if exponent >= 0:
-            bottom = Counter({f: n * exponent for f, n in self.bottom.items() if exponent})
-            return Ratio(power(self.top, exponent), bottom)
-        if not self.top:
-            raise ValueError("it divides by zero")
-        top: Polynomial = {ONE: Fraction(1)}
-        for factor, n in self.bottom.items():
-            top = multiply(top, power(dict(factor), -n * exponent))
-        if len(self.top) == 1:
-            return Ratio(multiply(top, power(self.top, exponent)))
-        return Ratio(top, {tuple(sorted(self.top.items())): -exponent})
-
-    def over(self, bottom: Counter[Factor]) -> Polynomial:
-        """Numerator over a common denominator."""
-        top = self.top
-        for factor, n in (bottom - self.bottom).items():
-            top = multiply(top, power(dict(factor), n))
-        return top
-
-
-def from_expression(
-    expression: Any,  # noqa: ANN401 - a sympy expression; sympy has no types
+def difference(
+    left: Any,  # noqa: ANN401 - sympy expressions; sympy has no types
+    right: Any,  # noqa: ANN401
     constant: Callable[[Any], Fraction | None],
-) -> Ratio:
-    """Expand a sympy expression.
+) -> tuple[Polynomial, frozenset[str]]:
+    """Left minus right over their common denominator, and the names in it.
+
+    Denominators of one term are no part of it: they stay as negative exponents.
 
     Parameters
     ----------
-    expression
+    left, right
         Sums, products and whole powers of symbols and numbers.
     constant
         Value of a subexpression that is a number although it is no polynomial, such as sqrt(2*k) of a known
@@ -130,30 +56,99 @@ def from_expression(
     ValueError
         With the reason, for whatever is not rational, and for expansions that are too long.
     """
-    if expression.is_Symbol:
-        return Ratio({((expression.name, 1),): Fraction(1)})
-    if expression.is_Rational:
-        return _number(Fraction(int(expression.p), int(expression.q)))
-    if expression.is_Float:
-        return _number(Fraction(repr(float(expression))))
-    if expression.is_Add or expression.is_Mul:
-        join, start = (Ratio.__add__, 0) if expression.is_Add else (Ratio.__mul__, 1)
-        parts = (from_expression(part, constant) for part in expression.args)
-        return reduce(join, parts, _number(Fraction(start)))
-    if expression.is_Pow and expression.exp.is_Integer:
-        base, exponent = expression.base, int(expression.exp)
-        if abs(exponent) > MAX_EXPONENT:
-            raise ValueError(f"the exponent {exponent} is too large (at most {MAX_EXPONENT})")
-        value = None if exponent >= 0 or base.is_Symbol else constant(base)
-        return _number(value**exponent) if value else from_expression(base, constant).to_power(exponent)
-    found = constant(expression)
-    if found is None:
-        raise ValueError(
-            f"'{expression}' is neither a polynomial nor a fraction of polynomials in p and the parameters; "
-            f"give such a term a name and estimate that"
-        )
-    return _number(found)
+    from sympy import QQ, Symbol, ring
+
+    names = sorted(symbol.name for symbol in left.free_symbols | right.free_symbols)
+    R, *generators = ring([Symbol(text) for text in (*names, *(f"1/{name}" for name in names))], QQ)
+    place = dict(zip(names, generators, strict=False))
+
+    def ratio(expression: Any) -> _Ratio:  # noqa: ANN401
+        if expression.is_Symbol:
+            return _Ratio(place[expression.name])
+        if expression.is_Rational:
+            return _Ratio(R(QQ(expression.p, expression.q)))
+        if expression.is_Add or expression.is_Mul:
+            return reduce(add if expression.is_Add else mul, map(ratio, expression.args))
+        value = None
+        if expression.is_Pow and expression.exp.is_Integer:
+            base, exponent = expression.base, int(expression.exp)
+            if abs(exponent) > MAX_EXPONENT:
+                raise ValueError(f"the exponent {exponent} is too large (at most {MAX_EXPONENT})")
+            value = None if exponent >= 0 or base.is_Symbol else constant(base)
+            if not value:
+                return ratio(base) ** exponent
+            value **= exponent
+        else:
+            value = constant(expression)
+        if value is None:
+            raise ValueError(
+                f"'{expression}' is neither a polynomial nor a fraction of polynomials in p and the "
+                "parameters; give such a term a name and estimate that"
+            )
+        return _Ratio(R(QQ(value.numerator, value.denominator)))
+
+    first, second = ratio(left), ratio(right)
+    whole = first + _Ratio(R(-1)) * second
+    below = {
+        name for factor in (*first.bottom, *second.bottom) for m in as_data(factor, names) for name, _ in m
+    }
+    return as_data(whole.top, names), frozenset(below)
 
 
-def _number(value: Fraction) -> Ratio:
-    return Ratio({ONE: value} if value else {})
+def as_data(element: Any, names: Sequence[str]) -> Polynomial:  # noqa: ANN401
+    """An element of a ring of sympy; of twice as many generators as names the second half are inverses."""
+    found: Polynomial = {}
+    for exponents, value in element.items():
+        powers = Counter(dict(zip(names, exponents, strict=False)))
+        powers.subtract(dict(zip(names, exponents[len(names) :], strict=False)))
+        monomial = tuple(sorted((name, e) for name, e in powers.items() if e))
+        number = Fraction(int(value.numerator), int(value.denominator))
+        found[monomial] = found.get(monomial, Fraction(0)) + number
+    return {monomial: value for monomial, value in found.items() if value}
+
+
+@dataclass(frozen=True, eq=False)
+class _Ratio:
+    """A numerator over a product of polynomials of more than one term, each with its power."""
+
+    top: Any
+    bottom: Counter[Any] = field(default_factory=Counter)
+
+    def __add__(self, other: _Ratio) -> _Ratio:
+        bottom = self.bottom | other.bottom
+        return _Ratio(self.over(bottom) + other.over(bottom), bottom)
+
+    def __mul__(self, other: _Ratio) -> _Ratio:
+        return _Ratio(_product(self.top, other.top), self.bottom + other.bottom)
+
+    def __pow__(self, exponent: int) -> _Ratio:
+        """Whole power, of either sign."""
+        R, size = self.top.ring, abs(exponent)
+        powers = Counter({factor: n * size for factor, n in self.bottom.items() if size})
+        if exponent >= 0:
+            return _Ratio(_power(self.top, size), powers)
+        if not self.top:
+            raise ValueError("it divides by zero")
+        turned = _Ratio(R.one).over(powers)
+        if len(self.top) > 1:
+            return _Ratio(turned, Counter({self.top: size}))
+        ((exponents, value),) = self.top.items()
+        half = len(exponents) // 2
+        inverse = R.term_new(exponents[half:] + exponents[:half], 1 / value)
+        return _Ratio(_product(turned, _power(inverse, size)))
+
+    def over(self, bottom: Counter[Any]) -> Any:  # noqa: ANN401
+        """Numerator over a common denominator."""
+        missing = (_power(factor, n) for factor, n in (bottom - self.bottom).items())
+        return reduce(_product, missing, self.top)
+
+
+def _product(a: Any, b: Any) -> Any:  # noqa: ANN401
+    """Product; ValueError beyond MAX_TERMS terms."""
+    if len(a) * len(b) <= 50 * MAX_TERMS and len(found := a * b) <= MAX_TERMS:
+        return found
+    raise ValueError("it expands to too many terms")
+
+
+def _power(a: Any, exponent: int) -> Any:  # noqa: ANN401
+    return reduce(_product, [a] * exponent, a.ring.one)

@@ -9,9 +9,10 @@ from functools import cmp_to_key
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.harmonic.elimination import real_solutions
-from rotorid.harmonic.features import powers_product, powers_slopes
-from rotorid.regression.estimate import WORD_TOLERANCE
+from rotorid.base.text import listing
+from rotorid.harmonic.elimination import System, real_solutions
+from rotorid.harmonic.features import NAME
+from rotorid.regression import echelon, least_squares, solution
 
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -19,61 +20,6 @@ GAUGE = 0.7318
 """Value given to a parameter that nothing determines while the others are solved for."""
 SAME = 1e-6
 """Relative difference below which two solutions are one."""
-
-
-@dataclass(frozen=True, eq=False)
-class System:
-    """Combinations `matrix @ monomials(θ) = values`, or ratios of such sums.
-
-    Attributes
-    ----------
-    names
-        Of the n parameters.
-    exponents
-        (monomials, n).
-    matrix
-        (q, monomials).
-    values, covariance
-        (q,), and (q, q) or None.
-    below
-        (q, monomials): what stands below each sum; a row of zeros, or None, is 1.
-    """
-
-    names: tuple[str, ...]
-    exponents: FloatArray
-    matrix: FloatArray
-    values: FloatArray
-    covariance: FloatArray | None
-    below: FloatArray | None = None
-
-    def combinations(self, theta: FloatArray) -> FloatArray:
-        """Values (q,) at the parameters."""
-        return np.asarray(self.matrix @ self.monomials(theta) / self._bottom(theta))
-
-    def cleared(self) -> System:
-        """The same without fractions: what stands below, multiplied by the value, is taken away above."""
-        if self.below is None:
-            return self
-        matrix = self.matrix - self.values[:, None] * self.below
-        values = np.where(self.below.any(axis=1), 0.0, self.values)
-        return System(self.names, self.exponents, matrix, values, None)
-
-    def _bottom(self, theta: FloatArray) -> FloatArray:
-        if self.below is None:
-            return np.ones(len(self.values))
-        return np.where(self.below.any(axis=1), self.below @ self.monomials(theta), 1.0)
-
-    def monomials(self, theta: FloatArray) -> FloatArray:
-        """Values (monomials,)."""
-        return powers_product(self.exponents, theta)
-
-    def jacobian(self, theta: FloatArray) -> FloatArray:
-        """Derivatives (q, n) of the combinations by the parameters."""
-        out = powers_slopes(self.exponents, theta)
-        slopes = self.matrix @ out
-        if self.below is not None:
-            slopes -= self.combinations(theta)[:, None] * (self.below @ out)
-        return np.asarray(slopes / self._bottom(theta)[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +60,15 @@ class Recovery:
 
 def undetermined_parameters(system: System) -> tuple[BoolArray, list[int]]:
     """Which parameters the combinations leave open at a general point, and which of them to fix to solve."""
-    rng = np.random.default_rng(5)
-    n = len(system.names)
-    theta = rng.uniform(0.6, 1.7, n)
+    theta = np.random.default_rng(5).uniform(0.6, 1.7, len(system.names))
     J = system.jacobian(theta)
-    J = J / np.where((size := np.linalg.norm(J, axis=1, keepdims=True)) > 0, size, 1)
-    scale = np.linalg.norm(J, axis=0)
-    J = J / np.where(scale > 0, scale, 1)
-    _, s, Vt = np.linalg.svd(J)
-    rank = int(np.count_nonzero(s > 1e-9 * max(s[0], 1e-300))) if s.size else 0
-    null = Vt[rank:]
-    open_ = np.linalg.norm(null, axis=0) > WORD_TOLERANCE
-    fixed: list[int] = []
-    while len(null):  # the last of the open parameters are fixed, one per dimension of the null space
-        j = int(np.flatnonzero(np.abs(null).max(axis=0) > 1e-4)[-1])
-        fixed.append(j)
-        i = int(np.argmax(np.abs(null[:, j])))
-        pivot = null[i] / null[i, j]
-        null = np.delete(null - np.outer(null[:, j], pivot), i, axis=0)
-    return open_, fixed
+    if not len(J):
+        return np.ones(len(theta), dtype=bool), list(range(len(theta)))
+    size = np.linalg.norm(J, axis=1, keepdims=True)
+    estimate = least_squares(J / np.where(size > 0, size, 1.0), np.zeros(len(J)), rcond=1e-9)
+    # the last of the open parameters are fixed, one per dimension of the null space
+    solved = {int(np.flatnonzero(row)[0]) for row in echelon(estimate.row_space)}
+    return np.isnan(estimate.values), [j for j in range(len(theta)) if j not in solved]
 
 
 def recover(system: System, bounds: Bounds | None = None) -> Recovery:
@@ -175,12 +111,9 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
     gain = np.full((len(names), len(system.values)), np.nan)
     J = system.jacobian(solutions[0])[:, free]
     white = weight @ J
-    scale = np.linalg.norm(white, axis=0)
-    scale[scale == 0] = 1.0
-    s = np.linalg.svd(white / scale, compute_uv=False)
-    if len(s) and s[-1] < 1e-7 * s[0]:
+    if len(free) and np.isinf(least_squares(white, np.zeros(len(white)), rcond=1e-7).condition_number):
         warnings.append("two solutions nearly coincide: the parameters are hardly determined there")
-    gain[free] = (np.linalg.pinv(white / scale, rcond=1e-13) / scale[:, None]) @ weight
+    gain[free] = solution(white, weight, rcond=1e-13)
     gain[open_] = np.nan
     return Recovery(tuple(solutions), open_, gain, tuple(reasons), tuple(warnings))
 
@@ -217,11 +150,9 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
             return None
         for _ in range(60):
             J = weight @ system.jacobian(theta)[:, free]
-            scale = np.linalg.norm(J, axis=0)
             if not np.isfinite(J).all():
                 return None
-            scale[scale == 0] = 1.0
-            step = np.linalg.lstsq(J / scale, -r, rcond=1e-12)[0] / scale
+            step = solution(J, -r, rcond=1e-12)
             length = 1.0
             while length > 1e-6:
                 trial = theta.copy()
@@ -242,7 +173,7 @@ def _refine(system: System, start: FloatArray, free: Sequence[int], weight: Floa
 def _misfit(system: System, theta: FloatArray) -> float:
     """Largest error of a combination in units of what rounding and four standard deviations allow."""
     mu = system.monomials(theta)
-    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system._bottom(theta))
+    size = np.abs(system.matrix) @ np.abs(mu) / np.abs(system.bottom(theta))
     size += np.abs(system.values) + 1e-300
     error = np.abs(system.combinations(theta) - system.values) / size
     std = 0.0 if system.covariance is None else np.sqrt(np.diag(system.covariance))
@@ -275,7 +206,7 @@ def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: Bo
     differ = np.flatnonzero((np.ptp(table, axis=0) > SAME * np.max(np.abs(table), axis=0)) & ~open_)
     if not len(differ):
         return []
-    who = and_words([names[int(j)] for j in differ])
+    who = listing([names[int(j)] for j in differ], "and")
     ordered = np.sort(table[:, differ], axis=1)
     if np.all(np.ptp(ordered, axis=0) <= 1e-5 * np.max(np.abs(ordered), axis=0)):
         return [f"{who} can be exchanged without any change of the amplitudes: see the solutions"]
@@ -283,22 +214,11 @@ def why_several(solutions: Sequence[FloatArray], names: Sequence[str], open_: Bo
     return [f"{who} {several.format(len(solutions))} that explain the data equally well"]
 
 
-def and_words(words: Sequence[str]) -> str:
-    """Join words: "a, b and c"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
 def only_determined(parameters: Sequence[str], lost: Sequence[str], words: Sequence[str]) -> str:
     """Say which parameters and combinations are determined and which parameters are not."""
     seen = [name for name in parameters if name not in lost]
-    seen += [w for w in words if w not in seen and any(n in _names(w) for n in lost)]
+    seen += [w for w in words if w not in seen and any(n in NAME.findall(w) for n in lost)]
     verb = "is" if len(seen) == 1 else "are"
-    text = f"only {and_words(seen)} {verb} determined" if seen else "nothing is determined"
+    text = f"only {listing(seen, 'and')} {verb} determined" if seen else "nothing is determined"
     itself = "itself is" if len(lost) == 1 else "themselves are"
-    return f"{text}; {and_words(lost)} by {itself} not"
-
-
-def _names(words: str) -> set[str]:
-    import re
-
-    return set(re.findall(r"[^\W\d]\w*", words))
+    return f"{text}; {listing(lost, 'and')} by {itself} not"

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.regression.estimate import coverage_factor
+from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,7 +39,7 @@ class FoundCombination:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(Uncertain):
     """Parameters of a harmonic model, identified.
 
     Attributes
@@ -117,28 +118,6 @@ class Identification:
         """Whether the data determine one value of every parameter, and the search found it."""
         return self.converged and bool(np.isfinite(self.values).all())
 
-    @property
-    def std(self) -> FloatArray | None:
-        """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
-        return None if self.covariance is None else np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def ci95(self) -> FloatArray | None:
-        """95 % intervals (n, 2); None where errors are unknown."""
-        std, factor = self.std, coverage_factor(None if self.errors_stated else self.dof)
-        if std is None or factor is None:
-            return None
-        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
-
-    @property
-    def correlation(self) -> FloatArray | None:
-        """Correlation matrix (n, n); None where errors are unknown."""
-        std = self.std
-        if self.covariance is None or std is None:
-            return None
-        scale = np.where(std > 0, std, 1.0)
-        return np.asarray(self.covariance / np.outer(scale, scale))
-
     def value(self, name: str) -> float:
         """Value of a parameter by name; NaN if it is not determined."""
         if name not in self.parameters:
@@ -147,75 +126,43 @@ class Identification:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        std, ci95, correlation, names = self.std, self.ci95, self.correlation, self.parameters
-        return {
-            "method": self.method,
-            "parameters": {
-                name: {
-                    "value": finite(self.values[i]),
-                    "std": None if std is None else finite(std[i]),
-                    "ci95": None if ci95 is None or not np.isfinite(ci95[i]).all() else ci95[i].tolist(),
-                }
-                for i, name in enumerate(names)
-            },
-            "converged": self.converged,
-            "rank": self.rank,
-            "condition_number": finite(self.condition_number),
-            "identifiable": self.identifiable,
-            "unidentifiable": list(self.unidentifiable),
-            "combinations": {
-                c.words: {"value": finite(c.value), "std": None if c.std is None else finite(c.std)}
-                for c in self.combinations
-            },
-            "solutions": [{k: finite(v) for k, v in s.items()} for s in self.solutions],
-            "residual_rms": finite(self.residual_rms),
-            "left_out": list(self.left_out),
-            "warnings": list(self.warnings),
-            "correlation": None
-            if correlation is None
-            else {a: _by_name(names, row) for a, row in zip(names, correlation, strict=True)},
-            "residuals": [
-                {key: finite(value) if key in ("re", "im") else value for key, value in row.items()}
-                for row in self.residual_frame().to_dict("records")
-            ],
-            "influence": None
-            if self.influence is None
-            else [
-                {"experiment": experiment, "change": _by_name(names, row)}
-                for experiment, row in zip(self.experiments.names, self.influence, strict=True)
-            ],
-        }
+        names, correlation, influence = self.parameters, self.correlation, self.influence
+
+        def by_name(values: Sequence[Any]) -> dict[str, Any]:
+            return dict(zip(names, values, strict=True))
+
+        return plain(
+            {
+                "method": self.method,
+                "parameters": parameter_dict(names, self),
+                "converged": self.converged,
+                "rank": self.rank,
+                "condition_number": self.condition_number,
+                "identifiable": self.identifiable,
+                "unidentifiable": self.unidentifiable,
+                "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
+                "solutions": self.solutions,
+                "residual_rms": self.residual_rms,
+                "left_out": self.left_out,
+                "warnings": self.warnings,
+                "correlation": None if correlation is None else by_name([*map(by_name, correlation)]),
+                "residuals": rows(_residual_columns(self)),
+                "influence": None
+                if influence is None
+                else [
+                    {"experiment": experiment, "change": by_name(row)}
+                    for experiment, row in zip(self.experiments.names, influence, strict=True)
+                ],
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
-        import pandas as pd
-
-        unknown = np.full(len(self.parameters), np.nan)
-        ci95 = self.ci95
-        return pd.DataFrame(
-            {
-                "parameter": self.parameters,
-                "value": self.values,
-                "std": unknown if self.std is None else self.std,
-                "ci95_low": unknown if ci95 is None else ci95[:, 0],
-                "ci95_high": unknown if ci95 is None else ci95[:, 1],
-            }
-        )
+        return frame(parameter_columns(self.parameters, self))
 
     def residual_frame(self) -> pd.DataFrame:
         """One row per experiment and equation (or output): real and imaginary part of the residual."""
-        import pandas as pd
-
-        n, e = self.residuals.shape
-        return pd.DataFrame(
-            {
-                "experiment": np.repeat(self.experiments.names, e),
-                "frequency_rad_s": np.repeat(self.experiments.frequencies, e),
-                "row": np.tile(self.residual_names, n),
-                "re": self.residuals.real.ravel(),
-                "im": self.residuals.imag.ravel(),
-            }
-        )
+        return frame(_residual_columns(self))
 
     def summary(self) -> str:
         """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
@@ -259,5 +206,12 @@ class Identification:
         return text
 
 
-def _by_name(names: Sequence[str], values: FloatArray) -> dict[str, float | None]:
-    return {name: finite(value) for name, value in zip(names, values, strict=True)}
+def _residual_columns(found: Identification) -> tuple[Column, ...]:
+    n, e = found.residuals.shape
+    return (
+        Column("experiment", np.repeat(found.experiments.names, e)),
+        Column("frequency_rad_s", np.repeat(found.experiments.frequencies, e)),
+        Column("row", np.tile(found.residual_names, n)),
+        Column("re", found.residuals.real.ravel()),
+        Column("im", found.residuals.imag.ravel()),
+    )

@@ -8,9 +8,8 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import multipliers
+from rotorid.harmonic.features import NAME
 from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.polynomial import ONE
 
 COVARIANCE_FLOOR = 1e-10
 """Smallest variance relative to the mean of an experiment: exact rows must not get infinite weight."""
@@ -30,8 +29,6 @@ class Rows:
         (n, equations, 2): real and imaginary rows.
     coefficients, constants
         (features, u) and (features,): a feature's coefficient is constants + coefficients @ u.
-    equation, column
-        (features,): equation and column of the signal (last: constant).
     powers
         (n, features): (iω)^k.
     left_out, warnings
@@ -43,8 +40,6 @@ class Rows:
     used: BoolArray
     coefficients: FloatArray
     constants: FloatArray
-    equation: IntArray
-    column: IntArray
     powers: ComplexArray
     left_out: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -74,26 +69,21 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
     check_signals(model, experiments)
     combos, features = model.combinations, model.features
     n, equations = len(experiments), len(model.equations)
-    w = experiments.frequencies
-    place = {name: i for i, name in enumerate(model.signals)}
-    column = np.array([place.get(f.signal, len(place)) for f in features])
-    equation = np.array([f.equation for f in features])
-    k = np.array([f.power for f in features])
-    powers = multipliers(k.tolist(), [f.varying for f in features], w, experiments.varying)
+    equation, column, k = model.equation, model.column, model.power
+    powers = model.multipliers(experiments.frequencies, experiments.varying)
     warnings: list[str] = []
     if experiments.free.any() and (k % 2).any():
         powers[np.ix_(experiments.free, k % 2 == 1)] = 0
         warnings.append(
             "in free vibration p**2 = -omega**2: terms with odd powers of p (damping) are left out there"
         )
-    pivots = [combos.monomials[i] for i in combos.pivots]
-    C = np.array([[float(f.exact.get(m, 0)) for m in pivots] for f in features]) / combos.scales
-    constants = np.array([float(f.exact.get(ONE, 0)) for f in features])
-    amplitudes = np.column_stack(
-        [np.asarray(experiments.signals[name], dtype=complex) for name in model.signals] + [np.ones(n)]
-    )
+    constants, lifted = model.coefficients[:, 0], model.coefficients[:, 1:]
+    C = lifted[:, combos.pivots] / combos.scales
+    measured = (*model.outputs, *model.inputs)
+    amplitudes = np.column_stack((experiments.table(measured), np.ones(n)))
+    table = {**dict(zip(measured, amplitudes.T, strict=False)), **experiments.varying}
     phi = powers * amplitudes[:, column]
-    K = np.zeros((n, equations, len(pivots)), dtype=complex)
+    K = np.zeros((n, equations, len(combos.pivots)), dtype=complex)
     Y = np.zeros((n, equations), dtype=complex)
     missing = np.zeros((n, equations), dtype=bool)
     empty = np.zeros((n, equations, 2), dtype=bool)
@@ -109,13 +99,8 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
             empty[:, e, part] = (np.abs(np.column_stack((row, right))) <= sizes).all(axis=1)
         for i in np.flatnonzero(missing[:, e]):
             lost_here = [features[j] for j in np.flatnonzero(own) if np.isnan(phi[i, j])]
-            names = dict.fromkeys(
-                name
-                for f in lost_here
-                for name in (f.signal, *dict(f.varying))
-                if name
-                and np.isnan(amplitudes[i, place[name]] if name in place else experiments.varying[name][i])
-            )
+            needed = dict.fromkeys(name for f in lost_here for name in (f.signal, *dict(f.varying)) if name)
+            names = [name for name in needed if np.isnan(table[name][i])]
             left_out.append(
                 f"experiment {experiments.names[i]}, equation {e + 1} ({', '.join(names)} not measured)"
             )
@@ -127,7 +112,7 @@ def build_rows(model: HarmonicModel, experiments: Experiments) -> Rows:
         raise ValueError(
             "no equation can be used: in every experiment an amplitude that it needs was not measured or is 0"
         )
-    return Rows(K, Y, used, C, constants, equation, column, powers, tuple(left_out), tuple(warnings))
+    return Rows(K, Y, used, C, constants, powers, tuple(left_out), tuple(warnings))
 
 
 def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
@@ -152,9 +137,7 @@ def check_signals(model: HarmonicModel, experiments: Experiments) -> None:
 
 def ask_about_case(model: HarmonicModel, experiments: Experiments) -> None:
     """Raise ValueError for a signal without readings that differs by case only from another name (x2, X2)."""
-    import re
-
-    words = re.findall(r"[^\W\d]\w*", " ".join(model.equations))
+    words = NAME.findall(" ".join(model.equations))
     for name in model.signals:
         alike = [w for w in words if w != name and w.casefold() == name.casefold()]
         values = np.nan_to_num(experiments.signals.get(name, np.zeros(1)))
@@ -173,13 +156,11 @@ def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u
     n, equations = rows.Y.shape
     weights = rows.constants + rows.coefficients @ u
     total = np.zeros((n, 2 * equations, 2 * equations))
-    for s, name in enumerate(model.signals):
-        if name in model.inputs:
-            continue
+    for s, name in enumerate(model.outputs):
         covariance = experiments.covariance(name)
-        own = rows.column == s
+        own = model.column == s
         a = np.zeros((n, equations), dtype=complex)
-        np.add.at(a.T, rows.equation[own], (rows.powers[:, own] * weights[own]).T)
+        np.add.at(a.T, model.equation[own], (rows.powers[:, own] * weights[own]).T)
         block = np.empty((n, equations, 2, 2))
         block[..., 0, 0] = block[..., 1, 1] = a.real
         block[..., 0, 1], block[..., 1, 0] = -a.imag, a.imag

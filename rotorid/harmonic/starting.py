@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import CONSTANT, multipliers
+from rotorid.harmonic.features import CONSTANT
 from rotorid.harmonic.hidden import hidden_outputs
 from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.plausibility import passive_elements
+from rotorid.regression.search import search_from
 
 SEARCHES, AGAIN, BEST = 60, 4, 3
 """Random starts at most; enough of them with one end; how many ends are handed on."""
@@ -45,16 +47,7 @@ def starting_values(
     ValueError
         For unknown names, a wrong number of values, or where nothing is found.
     """
-    names = model.parameters
-    if isinstance(start, Mapping):
-        wrong = [name for name in start if name not in names]
-        if wrong:
-            raise ValueError(f"a start is given for {wrong[0]!r}, which is not estimated: {', '.join(names)}")
-        theta = np.array([start.get(name, np.nan) for name in names], dtype=np.float64)
-    else:
-        theta = np.array(start, dtype=np.float64)
-    if theta.shape != (len(names),):
-        raise ValueError(f"{len(names)} starting values are needed, for {', '.join(names)}; got {start!r}")
+    names, theta = model.parameters, _given(model.parameters, start)
     open_ = np.flatnonzero(np.isnan(theta))
     if not len(open_):
         return [theta]
@@ -63,11 +56,21 @@ def starting_values(
     either = np.array([names[j] not in passive for j in open_])
     rng = np.random.default_rng(0)
     ends: list[tuple[float, FloatArray]] = []
+
+    def whole(size: FloatArray, x: FloatArray) -> FloatArray:
+        full = theta.copy()
+        full[open_] = size * 10.0**x
+        return full
+
+    def residual(size: FloatArray, x: FloatArray) -> FloatArray:
+        return projected(whole(size, x))
+
     for _ in range(SEARCHES):
         size = scale[open_] * np.where(either, rng.choice((-1.0, 1.0), len(open_)), 1.0)
         begin = rng.uniform(-DECADES, DECADES, len(open_))
-        end = _searched(projected, theta, open_, size, begin)
-        ends = sorted([*ends, *end], key=lambda one: one[0])
+        end = search_from(partial(residual, size), begin, limit=60)
+        if end is not None and end[1].max() < 4 * DECADES:
+            ends = sorted([*ends, (end[0], whole(size, end[1]))], key=lambda one: one[0])
         if ends and sum(cost < 1.01 * ends[0][0] + 1e-14 for cost, _ in ends) >= AGAIN:
             break
     if not ends:
@@ -80,27 +83,18 @@ def starting_values(
     return apart[:BEST]
 
 
-def _searched(
-    projected: Callable[[FloatArray], FloatArray],
-    theta: FloatArray,
-    open_: IntArray,
-    size: FloatArray,
-    begin: FloatArray,
-) -> list[tuple[float, FloatArray]]:
-    """Sum of squares and parameters where one search over their logarithms ends; none if they ran away."""
-    from scipy.optimize import least_squares
-
-    def whole(x: FloatArray) -> FloatArray:
-        full = theta.copy()
-        full[open_] = size * 10.0**x
-        return full
-
-    with np.errstate(all="ignore"):
-        try:
-            found = least_squares(lambda x: projected(whole(x)), begin, max_nfev=60)
-        except (ValueError, np.linalg.LinAlgError):
-            return []
-    return [(float(found.cost), whole(found.x))] if found.x.max() < 4 * DECADES else []
+def _given(names: tuple[str, ...], start: Mapping[str, float] | ArrayLike) -> FloatArray:
+    """The starting values (n,), NaN where there is none."""
+    if isinstance(start, Mapping):
+        wrong = [name for name in start if name not in names]
+        if wrong:
+            raise ValueError(f"a start is given for {wrong[0]!r}, which is not estimated: {', '.join(names)}")
+        theta = np.array([start.get(name, np.nan) for name in names], dtype=np.float64)
+    else:
+        theta = np.array(start, dtype=np.float64)
+    if theta.shape != (len(names),):
+        raise ValueError(f"{len(names)} starting values are needed, for {', '.join(names)}; got {start!r}")
+    return theta
 
 
 def _projected(
@@ -110,23 +104,22 @@ def _projected(
 
     ValueError where no experiment has all other amplitudes.
     """
-    hidden, place = hidden_outputs(model, experiments), {s: i for i, s in enumerate(model.signals)}
-    seen = [s for s in model.signals if s not in hidden]
-    unknown = np.full(len(experiments), np.nan)
-    table = np.column_stack([*(experiments.signals.get(s, unknown) for s in seen), np.ones(len(experiments))])
+    hidden, names = hidden_outputs(model, experiments), (*model.outputs, *model.inputs)
+    lost = [j for j, name in enumerate(names) if name in hidden]
+    columns = [j for j in range(1 + len(names)) if j not in lost]
+    table = np.column_stack((experiments.table(names), np.ones(len(experiments))))[:, columns]
     complete = ~np.isnan(table).any(axis=1)
     if not complete.any():
         raise ValueError(
             f"no experiment has every amplitude: give starting values of {', '.join(model.parameters)}"
         )
     data, table = experiments.take(complete), table[complete]
-    columns, lost = [*(place[s] for s in seen), len(place)], [place[s] for s in hidden]
-    sizes = dict(zip((*seen, CONSTANT), np.abs(table).T, strict=True))
-    typical = np.median([sizes[s] for s in seen if s in model.outputs])
+    sizes = {(*names, CONSTANT)[j]: np.abs(values) for j, values in zip(columns, table.T, strict=True)}
+    typical = np.median([size for name, size in sizes.items() if name in model.outputs])
+    factors = np.abs(model.multipliers(data.frequencies, data.varying))
     known, own = np.zeros(len(table)), dict[str, list[float]]()
-    for f in model.features:
-        pk = multipliers([f.power], [f.varying], data.frequencies, data.varying)[:, 0]
-        force = np.abs(pk) * sizes.get(f.signal, typical)
+    for f, factor in zip(model.features, factors.T, strict=True):
+        force = factor * sizes.get(f.signal, typical)
         for monomial, x in f.exact.items():
             if not monomial:
                 known = np.maximum(known, abs(float(x)) * force)

@@ -11,6 +11,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import finite
+from rotorid.base.result import Column, frame, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,8 +45,84 @@ class Combination:
         return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
 
 
+class Uncertain:
+    """Standard deviations, intervals and correlations of values with a covariance matrix.
+
+    Attributes
+    ----------
+    values
+        Shape (n,); NaN where the data do not determine one.
+    covariance
+        Shape (n, n), NaN where not determined; None where errors are unknown.
+    dof, errors_stated
+        Degrees of freedom; whether the covariance comes from errors that the user stated (normal intervals)
+        and not from the residuals (Student's t).
+    """
+
+    values: FloatArray
+    covariance: FloatArray | None
+    dof: int
+    errors_stated: bool
+
+    @property
+    def std(self) -> FloatArray | None:
+        """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
+        if self.covariance is None:
+            return None
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def coverage_factor(self) -> float | None:
+        """Half width of the 95 % interval in standard deviations; None where there is no interval."""
+        return coverage_factor(None if self.errors_stated else self.dof)
+
+    @property
+    def ci95(self) -> FloatArray | None:
+        """95 % intervals, shape (n, 2); None where errors are unknown."""
+        std, factor = self.std, self.coverage_factor
+        if std is None or factor is None:
+            return None
+        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
+
+    @property
+    def correlation(self) -> FloatArray | None:
+        """Correlation matrix (n, n); None where errors are unknown."""
+        std = self.std
+        if self.covariance is None or std is None:
+            return None
+        scale = np.where(std > 0, std, 1.0)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+
+def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, ...]:
+    """Parameter, value, std and the 95 % interval: one row a parameter, NaN where unknown."""
+    unknown = np.full(len(names), np.nan)
+    std, ci95 = found.std, found.ci95
+    low, high = (unknown, unknown) if ci95 is None else ci95.T
+    return (
+        Column("parameter", names),
+        Column("value", found.values),
+        Column("std", unknown if std is None else std),
+        Column("ci95_low", low),
+        Column("ci95_high", high),
+    )
+
+
+def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
+    """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
+    table = rows(parameter_columns(names, found))
+    return {
+        row["parameter"]: {
+            "value": row["value"],
+            "std": row["std"],
+            "ci95": None if row["ci95_low"] is None else [row["ci95_low"], row["ci95_high"]],
+        }
+        for row in table
+    }
+
+
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(Uncertain):
     """Parameters estimated from `K θ = Y`, and what the data do not say about them.
 
     Attributes
@@ -99,35 +176,6 @@ class Estimate:
         """Whether the data determine every parameter."""
         return self.rank == len(self.names)
 
-    @property
-    def std(self) -> FloatArray | None:
-        """Standard deviations (n,), NaN where not determined; None where errors are unknown."""
-        if self.covariance is None:
-            return None
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
-
-    @property
-    def coverage_factor(self) -> float | None:
-        """Half width of the 95 % interval in standard deviations; None where there is no interval."""
-        return coverage_factor(None if self.errors_stated else self.dof)
-
-    @property
-    def ci95(self) -> FloatArray | None:
-        """95 % intervals, shape (n, 2); None where errors are unknown."""
-        std, factor = self.std, self.coverage_factor
-        if std is None or factor is None:
-            return None
-        return np.stack((self.values - factor * std, self.values + factor * std), axis=1)
-
-    @property
-    def correlation(self) -> FloatArray | None:
-        """Correlation matrix (n, n); None where errors are unknown."""
-        std = self.std
-        if self.covariance is None or std is None:
-            return None
-        scale = np.where(std > 0, std, 1.0)
-        return np.asarray(self.covariance / np.outer(scale, scale))
-
     @cached_property
     def combinations(self) -> tuple[Combination, ...]:
         """What the data determine instead, where they do not determine every parameter (else empty).
@@ -140,8 +188,8 @@ class Estimate:
             return ()
         if self.curved is not None:
             return self.curved
-        rows = echelon(self.row_space)
-        return tuple(self._combination(row) for row in rows if np.count_nonzero(row) > 1)
+        basis = echelon(self.row_space)
+        return tuple(self._combination(row) for row in basis if np.count_nonzero(row) > 1)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -169,16 +217,8 @@ class Estimate:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        std, ci95 = self.std, self.ci95
         return {
-            "parameters": {
-                name: {
-                    "value": finite(self.values[i]),
-                    "std": None if std is None else finite(std[i]),
-                    "ci95": None if ci95 is None or np.isnan(ci95[i]).any() else ci95[i].tolist(),
-                }
-                for i, name in enumerate(self.names)
-            },
+            "parameters": parameter_dict(self.names, self),
             "rank": self.rank,
             "condition_number": finite(self.condition_number),
             "identifiable": self.full_rank,
@@ -189,19 +229,7 @@ class Estimate:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
-        import pandas as pd
-
-        unknown = np.full(len(self.names), np.nan)
-        ci95 = self.ci95
-        return pd.DataFrame(
-            {
-                "parameter": self.names,
-                "value": self.values,
-                "std": unknown if self.std is None else self.std,
-                "ci95_low": unknown if ci95 is None else ci95[:, 0],
-                "ci95_high": unknown if ci95 is None else ci95[:, 1],
-            }
-        )
+        return frame(parameter_columns(self.names, self))
 
     def summary(self, at_bounds: Sequence[str] = ()) -> str:
         """Text for an engineer: values ± standard deviations, intervals, and what is not determined.

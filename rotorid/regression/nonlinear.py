@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,9 +20,6 @@ from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import Function, Search, drive, inside, polish
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
@@ -38,31 +34,27 @@ class NonlinearEstimate:
         Values, covariance, rank and null space at the minimum; `residuals` are those of the given function.
         The values of combinations are of the model linearised there. No covariance where the search did not
         converge.
-    start
-        Where the search began (inside the bounds), shape (n,).
-    converged, message
-        Whether the minimum was reached, and in words.
-    iterations
-        Accepted steps, polishing included.
     history
-        Parameters at the start and after each accepted step, shape (iterations + 1, n).
+        Parameters at the start and after each accepted step, polishing included, shape (iterations + 1, n).
     costs
         Half the sum of squared residuals (of the loss) at each of them.
+    converged, message
+        Whether the minimum was reached, and in words.
     at_bounds
         Names of parameters that stand at a bound: kept there, without a standard deviation.
-    loss
-        Name of the loss.
     """
 
     estimate: Estimate
-    start: FloatArray
-    converged: bool
-    message: str
-    iterations: int
     history: FloatArray
     costs: FloatArray
-    at_bounds: tuple[str, ...]
-    loss: str
+    converged: bool
+    message: str
+    at_bounds: tuple[str, ...] = ()
+
+    @property
+    def iterations(self) -> int:
+        """Number of steps."""
+        return len(self.history) - 1
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,49 +77,24 @@ class NonlinearEstimate:
         return self.estimate.ci95
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user must know before trusting the numbers."""
+    def bound_warning(self) -> str:
+        """What stands at a bound, in words, or nothing."""
+        if not self.at_bounds:
+            return ""
+        stand = "stands at its bound" if len(self.at_bounds) == 1 else "stand at their bounds"
+        return (
+            f"{', '.join(self.at_bounds)} {stand}: no standard deviation is given, and those of the others "
+            "hold it fixed"
+        )
+
+    @property
+    def end_warnings(self) -> tuple[str, ...]:
+        """What a user must know of the end of the search before trusting the numbers."""
         found = [] if self.converged else [self.message]
-        if self.at_bounds:
-            one = len(self.at_bounds) == 1
-            found.append(
-                f"{', '.join(self.at_bounds)} {'stands at its bound' if one else 'stand at their bounds'}: "
-                "no standard deviation is given, and those of the others hold it fixed"
-            )
+        found += [self.bound_warning] if self.at_bounds else []
         if self.converged and not self.estimate.full_rank:
             found.append(self.estimate.describe_rank())
         return tuple(found)
-
-    def summary(self) -> str:
-        """Text: the estimate, parameters at bounds, convergence."""
-        if not self.converged:
-            values = [
-                f"{name} = {value:.6g}" for name, value in zip(self.names, self.history[-1], strict=True)
-            ]
-            return "\n".join(("the search ended, not converged, at", *values, self.message))
-        return f"{self.estimate.summary(self.at_bounds)}\n{self.message}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types; the keys of the estimate and those of the search."""
-        return {
-            **self.estimate.to_dict(),
-            "identifiable": self.converged and self.estimate.full_rank,
-            "converged": self.converged,
-            "message": self.message,
-            "iterations": self.iterations,
-            "history": [
-                {"cost": float(c), **dict(zip(self.names, map(float, row), strict=True))}
-                for c, row in zip(self.costs, self.history, strict=True)
-            ],
-            "at_bounds": list(self.at_bounds),
-            "warnings": list(self.warnings),
-        }
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per parameter: value, std, interval, and whether it stands at a bound."""
-        frame = self.estimate.to_frame()
-        frame["at_bound"] = [name in self.at_bounds for name in self.names]
-        return frame
 
 
 def nonlinear_least_squares(  # noqa: PLR0913
@@ -221,14 +188,11 @@ def nonlinear_least_squares(  # noqa: PLR0913
     fixed = (x <= lower) | (x >= upper)
     return NonlinearEstimate(
         estimate=judged,
-        start=first,
-        converged=converged,
-        message=why,
-        iterations=len(search.path) - 1,
         history=np.array(search.path),
         costs=np.array(search.costs),
+        converged=converged,
+        message=why,
         at_bounds=tuple(name for name, f in zip(labels, fixed, strict=True) if f),
-        loss=loss,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,8 +28,11 @@ RCOND = 1e-10
 class Search:
     """Residuals and Jacobian of one search, with the accepted points it passed."""
 
-    def __init__(self, residual: Function, jacobian: Function, loss: str) -> None:
+    def __init__(
+        self, residual: Function, jacobian: Function, loss: str, tolerance: float = TOLERANCE
+    ) -> None:
         self.residual = residual
+        self.tolerance = tolerance
         self.slopes = jacobian
         self.loss = loss
         self.f_scale = 1.0
@@ -84,9 +88,9 @@ def drive(
                 x_scale=x_scale,
                 loss=name,
                 f_scale=search.f_scale,
-                ftol=TOLERANCE,
-                xtol=TOLERANCE,
-                gtol=TOLERANCE,
+                ftol=search.tolerance,
+                xtol=search.tolerance,
+                gtol=search.tolerance,
                 max_nfev=limit,
             )
         x, ok = np.asarray(found.x), found.status > 0
@@ -94,6 +98,28 @@ def drive(
         tried = counted(limit, "evaluation")
         why = "" if ok else f"not converged after {tried}: raise max_iterations or start nearer"
     return x, ok, why
+
+
+def search_from(
+    residual: Function, start: FloatArray, jacobian: Function | None = None, *, limit: int
+) -> tuple[float, FloatArray] | None:
+    """Half the sum of squares and the parameters (n,) where one of many searches ends; None if it ran away.
+
+    Scipy's driver with at most `limit` evaluations, not polished: of most starts the end does not matter.
+    Without a Jacobian differences and parameters of one size, such as logarithms.
+    """
+    from scipy.optimize import least_squares as driver
+
+    options: dict[str, Any] = {"max_nfev": limit}
+    if jacobian is not None:
+        enough = len(residual(start)) >= len(start)
+        options |= {"jac": jacobian, "x_scale": "jac", "method": "lm" if enough else "trf"}
+    with np.errstate(all="ignore"):
+        try:
+            found = driver(residual, start, **options)
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+    return (float(found.cost), np.asarray(found.x)) if np.isfinite(found.x).all() else None
 
 
 def polish(

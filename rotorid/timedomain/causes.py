@@ -13,6 +13,7 @@ import numpy as np
 
 from rotorid import expressions
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import gain, solution
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, simulate
 from rotorid.timedomain.methods.problem import Problem
@@ -41,7 +42,7 @@ class _Cause:
 
 @dataclass(frozen=True)
 class _Found:
-    gain: float
+    taken: float
     shift: float
     words: str
 
@@ -62,52 +63,52 @@ def causes(problem: Problem, theta: FloatArray, J: FloatArray, r: FloatArray) ->
     if seen is not None and seen.probability > 1e-2:
         return (), False
     candidates = (*_of_sensors(problem, r), *_of_initial_values(problem, theta))
-    tested = [_test(problem, J, r, cause) for cause in candidates]
-    found = sorted((one for one in tested if one is not None), key=lambda one: -one.gain)
-    named = [one for one in found if one.gain > AS_GOOD * found[0].gain]
+    G = gain(J, rcond=RCOND)
+    tested = [_test(problem, J, G, r, cause) for cause in candidates]
+    found = sorted((one for one in tested if one is not None), key=lambda one: -one.taken)
+    named = [one for one in found if one.taken > AS_GOOD * found[0].taken]
     if not named:
         return (), False
     wrong = all(one.shift > FAR for one in named)
     moved = max(one.shift for one in named)
     off = f", and move a parameter by {moved:.2g} standard deviations" if moved > 1 else ""
     which = "; or ".join(one.words for one in named)
-    share = 100 * named[0].gain / float(r @ r)
+    share = 100 * named[0].taken / float(r @ r)
     end = ". No intervals are given" if wrong else ""
     return (f"{which}: that would take {share:.2g} % of the residuals' variance{off}{end}",), wrong
 
 
-def _test(problem: Problem, J: FloatArray, r: FloatArray, cause: _Cause) -> _Found | None:
-    """What the columns take of the residuals; None for what chance may give, or what the parameters give."""
-    size = np.linalg.norm(J, axis=0)
-    scaled = J / np.where(size > 0, size, 1.0)
-    U, s, Vt = np.linalg.svd(scaled, full_matrices=False)
-    kept = s > RCOND * s[0]
-    U, s, Vt = U[:, kept], s[kept], Vt[kept]
+def _test(problem: Problem, J: FloatArray, G: FloatArray, r: FloatArray, cause: _Cause) -> _Found | None:
+    """What the columns take of the residuals; None for what chance may give, or what the parameters give.
+
+    G is the gain of J: J G y is what the parameters take of y.
+    """
     C = cause.columns / np.maximum(np.linalg.norm(cause.columns, axis=0), 1e-300)
-    own = C - U @ (U.T @ C)
-    q, free = C.shape[1], len(r) - len(s) - C.shape[1]
+    own = C - J @ (G @ C)
+    rank = round(float(np.sum(G.T * J)))
+    q, free = C.shape[1], len(r) - rank - C.shape[1]
     if free < 3 or np.linalg.norm(own, axis=0).min() < 1e-6 or np.linalg.cond(own) > 1e8:
         return None
-    amount = np.linalg.lstsq(own, -r, rcond=None)[0]
+    amount = solution(own, -r)
     rest = r + own @ amount
-    gain = float(r @ r - rest @ rest)
+    taken = float(r @ r - rest @ rest)
     left = correlation(problem, rest)
     spread = float(rest @ rest) / free * (1.0 if left is None else left.factor**2)
     spread = max(spread, 1.0) if problem.stated else spread
     # a probability of F, or with stated errors of χ²
     from scipy.special import chdtrc, fdtrc
 
-    ratio = gain / max(spread, 1e-300)
+    ratio = taken / max(spread, 1e-300)
     probability = chdtrc(q, ratio) if problem.stated else fdtrc(q, free, ratio / q)
     if not probability < CHANCE or (cause.alone and left is not None and left.probability < CHANCE):
         return None
-    move = Vt.T @ ((U.T @ (C @ amount)) / s)
-    error = np.sqrt(spread * ((Vt.T / s) ** 2).sum(axis=1))
+    move = G @ (C @ amount)
+    error = np.sqrt(spread * (G**2).sum(axis=1))
     shift = float(np.max(np.abs(move) / np.maximum(error, 1e-300)))
-    if gain < SHARE * float(r @ r) and shift < FAR:
+    if taken < SHARE * float(r @ r) and shift < FAR:
         return None
     first = amount[0] / max(float(np.linalg.norm(cause.columns[:, 0])), 1e-300)
-    return _Found(gain, shift, cause.words.format(first))
+    return _Found(taken, shift, cause.words.format(first))
 
 
 def _of_sensors(problem: Problem, r: FloatArray) -> Iterator[_Cause]:

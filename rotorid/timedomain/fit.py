@@ -15,12 +15,12 @@ from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.path import Path
 from rotorid.timedomain.methods.problem import RTOL, Problem
 from rotorid.timedomain.methods.search import METHODS, Search, Trajectories
-from rotorid.timedomain.methods.starts import merge, spread_starts
+from rotorid.timedomain.methods.starts import Minimum, merge, spread_starts
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
 from rotorid.timedomain.models.several import for_copies
 from rotorid.timedomain.residuals import output_errors, settled
-from rotorid.timedomain.result import Fit, Minimum
+from rotorid.timedomain.result import Fit
 
 SECONDS = 60.0
 """Of a search, by default."""
@@ -146,18 +146,14 @@ def fit(  # noqa: PLR0913
         warnings = (*warnings, f"{len(minima)} different minima were found; the best is given, see minima")
     if plain and _outside(path.estimate.solution, limits):
         warnings = (*warnings, f"{method} knows no bounds, and the result lies outside those of the model")
+    found = vars(path) | {"estimate": judged.estimate}
     return Fit(
+        **found,
         models=problem.models,
         records=problem.records,
         method=method,
         integrator=simulations[0].method if simulations else integrator,
         loss=loss,
-        estimate=judged.estimate,
-        history=path.history,
-        costs=path.costs,
-        converged=path.converged,
-        message=path.message,
-        at_bounds=path.at_bounds,
         reliable=judged.reliable,
         warnings=warnings,
         simulations=simulations,
@@ -165,7 +161,6 @@ def fit(  # noqa: PLR0913
         integration_change=judged.integration_change,
         autocorrelation=judged.autocorrelation,
         residual_rms=float(np.sqrt(np.mean(problem.plain(path.estimate.residuals) ** 2))),
-        trajectories=path.trajectories,
         errors=problem.errors or None,
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.regression import least_squares
+from rotorid.regression import gain, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.causes import causes, known_initial
@@ -20,6 +20,8 @@ from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
 
 PROBES = 100_001
 """Times at which pulses are looked for."""
+ROUNDING = 1e-14
+"""Difference of two integrations, relative to the record, that is none."""
 INSENSITIVE = 1e-7
 """Change of the outputs, relative to their size, by a parameter changing by all of itself."""
 
@@ -54,7 +56,7 @@ class _Draft:
 def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
     draft, r = _Draft(path.estimate, path.converged), path.estimate.residuals
-    draft.note(*_end_words(path))
+    draft.note("" if path.converged else f"{path.message}; no intervals are given", path.bound_warning)
     try:
         _note_sensitivities(draft, problem, path, loss)
     except SimulationError as error:
@@ -79,18 +81,6 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
         found = replace(found, covariance=None, solution_covariance=None, curved=curved)
     neighbours = None if seen is None else seen.neighbours
     return Judgement(found, draft.reliable, tuple(draft.warnings), draft.integration_change, neighbours)
-
-
-def _end_words(path: Path) -> list[str]:
-    """Where the method stopped: before the minimum, or at bounds."""
-    words = [] if path.converged else [f"{path.message}; no intervals are given"]
-    if path.at_bounds:
-        stand = "stands at its bound" if len(path.at_bounds) == 1 else "stand at their bounds"
-        words.append(
-            f"{', '.join(path.at_bounds)} {stand}: no standard deviation is given, and those of the others "
-            "hold it fixed"
-        )
-    return words
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:
@@ -140,7 +130,11 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     else:
         finer = problem.again(problem.integrator, max(problem.rtol / 100, 1e-13))
     exact = finer.evaluate(found.solution)[0]
-    return least_squares(J, r - exact, rcond=RCOND).solution
+    missed = r - exact
+    if np.linalg.norm(missed) <= ROUNDING * np.linalg.norm(problem.data):
+        return np.zeros(len(found.names))
+    change: FloatArray = solution(J, missed, rcond=RCOND)
+    return change
 
 
 def _integration_words(found: Estimate, change: FloatArray | None, names: tuple[str, ...]) -> list[str]:
@@ -165,7 +159,9 @@ def _aliases(problem: Problem, theta: FloatArray) -> list[str]:
         steps = np.diff(record.t)
         if not model.linear_driven or len(steps) < 2 or np.ptp(steps) > 1e-3 * steps.mean():
             continue
-        fastest = float(np.abs(np.linalg.eigvals(model.matrices(theta)[0]).imag).max())
+        fastest = float(
+            np.abs(np.linalg.eigvals(model.matrices(theta)[0, :, : len(model.states)]).imag).max()
+        )
         if fastest * steps.mean() > np.pi:
             return [
                 f"the model can vibrate with {fastest:.4g} rad/s, faster than half the sampling rate "
@@ -206,8 +202,7 @@ def _unequal_words(problem: Problem, found: Estimate, J: FloatArray, variances: 
     )
     words = f"the outputs have different errors ({sizes}), but the intervals hold for equal ones"
     if found.full_rank and found.std is not None and np.isfinite(found.std).all():
-        size = np.linalg.norm(J, axis=0)
-        G = np.linalg.pinv(J / size, rcond=RCOND) / size[:, None] * own
+        G = gain(J, rcond=RCOND) * own
         ratio = np.sqrt((G * G).sum(axis=1)) / found.std
         words += f"; with their own they would be {ratio.min():.2g} to {ratio.max():.2g} times as wide"
     return f"{words}. With --sigma auto precise outputs count for more"

@@ -5,7 +5,7 @@ Legends stand below the axes, where they cover no curve; give the figure the lay
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -77,29 +77,26 @@ def draw_records(result: Fit, axes: Axes, curves: Sequence[Trajectory] | None = 
     curves = fine_curves(result) if curves is None else curves
     scales, unlike = _scales(result)
     for k, record in enumerate(result.records):
-        for (color, j, name), scale in zip(_outputs(result), scales, strict=True):
-            measured = record.outputs.get(name)
-            if measured is not None:
-                axes.plot(record.t, measured / scale, _mark(k), color=color, ms=_size(record), alpha=0.5)
+        for j, (name, scale) in enumerate(_named(result, scales)):
+            if name in record.outputs:
+                measured = record.outputs[name] / scale
+                axes.plot(record.t, measured, _mark(k), color=_color(j), ms=_size(record), alpha=0.5)
             if k < len(curves):
                 y = curves[k].y[:, j] / scale
-                axes.plot(curves[k].t, y, color=color, **_line(k, y))
+                axes.plot(curves[k].t, y, color=_color(j), **_line(k, y))
     axes.set(xlabel="t, s", ylabel="output / largest value" if unlike else "output")
     axes.set_title("measured (points) and fitted model (lines)", fontsize=10)
     _plain_numbers(axes)
     words = [f"{name} ({_short(s)})" if unlike else name for name, s in _named(result, scales)]
-    _legend(axes, _colored(words), _record_keys(result, lines=bool(curves)))
+    _legend(axes, _colored(words) + _record_keys(result, lines=bool(curves)))
 
 
 def draw_residuals(result: Fit, axes: Axes) -> None:
     """Model minus measured, over time; over the rms of each output where these are very different."""
     rms, sizes, unlike = _residual_sizes(result)
-    for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False)):
-        for (color, j, name), size in zip(_outputs(result), sizes, strict=True):
-            measured = record.outputs.get(name)
-            if measured is not None:
-                r = (run.y[:, j] - measured) / size
-                axes.plot(record.t, r, _mark(k), color=color, ms=2.5 if len(record) > 60 else 4.0)
+    for k, j, r in _residuals(result):
+        t = result.records[k].t
+        axes.plot(t, r / sizes[j], _mark(k), color=_color(j), ms=2.5 if len(t) > 60 else 4.0)
     axes.axhline(0.0, color="0.6", lw=0.8)
     axes.set(xlabel="t, s", ylabel="(model − measured) / own rms" if unlike else "model − measured")
     one = f"residuals (rms {result.residual_rms:.3g})"
@@ -116,7 +113,7 @@ def draw_residuals(result: Fit, axes: Axes) -> None:
         words = [
             f"{n} (rms {_short(s)}{note})" for (n, s), note in zip(_named(result, rms), notes, strict=True)
         ]
-    _legend(axes, _colored(words, line="", mark="o"), _record_keys(result, lines=False))
+    _legend(axes, _colored(words, line="", mark="o") + _record_keys(result, lines=False))
 
 
 def draw_sensitivities(result: Fit, axes: Axes, curves: Sequence[Trajectory] | None = None) -> None:
@@ -154,13 +151,13 @@ def draw_sensitivities(result: Fit, axes: Axes, curves: Sequence[Trajectory] | N
         axes.set_xticks([])
         _say(axes, "no output depends on any parameter")
     words = _effect_words(result, largest, logarithmic)
-    _legend(axes, _colored(words, shown=largest > 0), _record_keys(result, marks=False))
+    _legend(axes, _colored(words, shown=largest > 0) + _record_keys(result, marks=False))
 
 
 def draw_iterations(result: Fit, axes: Axes) -> None:
     """Parameters after each iteration, relative to the last value; those not determined are left out."""
     steps = np.arange(len(result.history))
-    known = _determined(result)
+    known = ~np.isnan(result.values)
     words, far = [], 1.0
     for i, name in enumerate(result.parameters):
         values, word = _relative(result.history[:, i], name)
@@ -181,12 +178,7 @@ def draw_iterations(result: Fit, axes: Axes) -> None:
     axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=10)
     if not known.any():
         _say(axes, "no parameter by itself is determined\nby these data")
-    _legend(axes, _colored(words, mark="o", shown=known), [])
-
-
-def _outputs(result: Fit) -> list[tuple[str, int, str]]:
-    """Color, index and name of every output."""
-    return [(_color(j), j, name) for j, name in enumerate(result.model.outputs)]
+    _legend(axes, _colored(words, mark="o", shown=known))
 
 
 def _named(result: Fit, sizes: FloatArray) -> list[tuple[str, float]]:
@@ -210,15 +202,21 @@ def _scales(result: Fit) -> tuple[FloatArray, bool]:
     return np.where((sizes > 0) & unlike, sizes, 1.0), unlike
 
 
+def _residuals(result: Fit) -> Iterator[tuple[int, int, FloatArray]]:
+    """Record, output, and model minus measured of every measured series."""
+    for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False)):
+        for j, name in enumerate(result.model.outputs):
+            if name in record.outputs:
+                yield k, j, run.y[:, j] - record.outputs[name]
+
+
 def _residual_sizes(result: Fit) -> tuple[FloatArray, FloatArray, bool]:
     """Rms of the residuals of each output, what they are drawn over, and whether that is the rms."""
-    rms = np.zeros(len(result.model.outputs))
-    for j, name in enumerate(result.model.outputs):
-        pairs = zip(result.records, result.simulations, strict=False)
-        parts = [run.y[:, j] - record.outputs[name] for record, run in pairs if name in record.outputs]
-        squares = np.concatenate([np.zeros(0), *parts]) ** 2
-        measured = squares[~np.isnan(squares)]
-        rms[j] = np.sqrt(measured.mean()) if measured.size else 0.0
+    squares, counts = np.zeros((2, len(result.model.outputs)))
+    for _, j, r in _residuals(result):
+        squares[j] += np.nansum(r**2)
+        counts[j] += np.count_nonzero(~np.isnan(r))
+    rms = np.sqrt(squares / np.maximum(counts, 1))
     largest = _largest(result)
     real = rms > ROUNDING * largest
     unlike = _unlike(rms[real]) or _unlike(largest)
@@ -230,21 +228,15 @@ def _unlike(sizes: FloatArray) -> bool:
     return bool(some.size and some.max() > UNLIKE * some.min())
 
 
-def _steps_of(result: Fit) -> FloatArray:
-    """1 % of each parameter; 0.01 where it is 0."""
-    size: FloatArray = np.abs(result.estimate.solution)
-    return 0.01 * np.where(size > 0, size, 1.0)
-
-
 def _effects(result: Fit, curve: Trajectory) -> FloatArray:
-    """Change of all outputs together by 1 % of each parameter, (n, n_p)."""
-    y_theta = curve.y_theta / _scales(result)[0][:, None] * _steps_of(result)
-    effect: FloatArray = np.linalg.norm(y_theta, axis=1)
-    return effect
+    """Change of all outputs together by 1 % of each parameter, by 0.01 where it is 0, (n, n_p)."""
+    size = np.abs(result.estimate.solution)
+    steps = 0.01 * np.where(size > 0, size, 1.0)
+    return np.asarray(np.linalg.norm(curve.y_theta / _scales(result)[0][:, None] * steps, axis=1))
 
 
 def _effect_words(result: Fit, largest: FloatArray, logarithmic: bool) -> list[str]:
-    words, known = [], _determined(result)
+    words, known = [], ~np.isnan(result.values)
     for i, name in enumerate(result.parameters):
         notes = [] if known[i] else ["not determined"]
         if result.estimate.solution[i] == 0:
@@ -255,10 +247,6 @@ def _effect_words(result: Fit, largest: FloatArray, logarithmic: bool) -> list[s
             notes.append(f"at most {largest[i]:.1g}")
         words.append(f"{name} ({', '.join(notes)})" if notes else name)
     return words
-
-
-def _determined(result: Fit) -> BoolArray:
-    return ~np.isnan(result.values)
 
 
 def _relative(history: FloatArray, name: str) -> tuple[FloatArray, str]:
@@ -310,7 +298,6 @@ def _refined(record: Record) -> Record:
 
 
 def _color(i: int) -> str:
-
     return COLORS[i % len(COLORS)]
 
 
@@ -341,32 +328,36 @@ def _plain_numbers(axes: Axes) -> None:
 def _colored(
     words: Sequence[str], line: str = "-", mark: str = "", shown: BoolArray | None = None
 ) -> list[Artist]:
-    """Keys of colors, one for each word; at most `MANY`, without line and mark where nothing is `shown`."""
-    from matplotlib.lines import Line2D
+    """Keys of colors, one for each word, without line and mark where nothing is `shown`."""
 
-    keys: list[Artist] = []
-    for i, word in enumerate(words[:MANY]):
+    def style(i: int) -> dict[str, Any]:
         seen = shown is None or bool(shown[i])
-        ls, marker = (line, mark) if seen else ("", "")
-        keys.append(Line2D([], [], ls=ls, marker=marker, ms=4.0, lw=1.2, color=_color(i), label=word))
-    if len(words) > MANY:
-        keys.append(Line2D([], [], ls="", label=f"and {len(words) - MANY} more"))
-    return keys
+        return {"ls": line if seen else "", "marker": mark if seen else "", "color": _color(i)}
+
+    return _keys(words, style, "more")
 
 
 def _record_keys(result: Fit, *, lines: bool = True, marks: bool = True) -> list[Artist]:
     """Keys of marks and line styles, one for each of several records."""
-    from matplotlib.lines import Line2D
-
     names = record_names([record.name for record in result.records])
     if len(names) < 2:
         return []
-    keys: list[Artist] = []
-    for k, name in enumerate(names[:MANY]):
-        ls, marker = STYLES[k] if lines else "", _mark(k) if marks else ""
-        keys.append(Line2D([], [], ls=ls, marker=marker, ms=4.0, lw=1.2, color="0.25", label=name))
-    if len(names) > MANY:
-        keys.append(Line2D([], [], ls="", label=f"and {len(names) - MANY} more records"))
+
+    def style(k: int) -> dict[str, Any]:
+        return {"ls": STYLES[k] if lines else "", "marker": _mark(k) if marks else "", "color": "0.25"}
+
+    return _keys(names, style, "more records")
+
+
+def _keys(words: Sequence[str], style: Callable[[int], dict[str, Any]], rest: str) -> list[Artist]:
+    """At most `MANY`, and how many more there are."""
+    from matplotlib.lines import Line2D
+
+    keys: list[Artist] = [
+        Line2D([], [], ms=4.0, lw=1.2, label=word, **style(i)) for i, word in enumerate(words[:MANY])
+    ]
+    if len(words) > MANY:
+        keys.append(Line2D([], [], ls="", label=f"and {len(words) - MANY} {rest}"))
     return keys
 
 
@@ -390,38 +381,27 @@ def record_names(names: Sequence[str]) -> list[str]:
     return list(names)
 
 
-def _legend(axes: Axes, keys: list[Artist], records: list[Artist]) -> None:
-    """Below the axes and their label; records in rows of their own."""
-    rows = _keys_below(axes, keys, 34.0) if keys else 0
-    if records:
-        first = axes.get_legend()
-        _keys_below(axes, records, 34.0 + 15.0 * rows)
-        if first is not None:
-            axes.add_artist(first)
-
-
-def _keys_below(axes: Axes, keys: list[Artist], points: float) -> int:
-    """A legend that far below the axes, in as many columns as fit; how many rows it has."""
+def _legend(axes: Axes, keys: list[Artist]) -> None:
+    """Below the axes and their label, in as many columns as fit."""
     from matplotlib.transforms import ScaledTranslation
 
     figure = axes.get_figure(root=True)
-    assert figure is not None
+    if not keys or figure is None:
+        return
     longest = max(len(str(key.get_label())) for key in keys)
     width = axes.get_position().width * figure.get_figwidth() * 72
     rows = max(1, -(-len(keys) // max(1, int(1.15 * width / (5.0 * longest + 38)))))
-    columns = -(-len(keys) // rows)
     axes.legend(
         handles=keys,
         loc="upper center",
         bbox_to_anchor=(0.5, 0.0),
-        bbox_transform=axes.transAxes + ScaledTranslation(0, -points / 72, figure.dpi_scale_trans),
+        bbox_transform=axes.transAxes + ScaledTranslation(0, -34 / 72, figure.dpi_scale_trans),
         borderaxespad=0.0,
         frameon=False,
         fontsize=9,
-        ncols=columns,
+        ncols=-(-len(keys) // rows),
         columnspacing=1.4,
     )
-    return rows
 
 
 def _short(size: float) -> str:

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.base.text import counted
-from rotorid.regression.estimate import Estimate
+from rotorid.regression.estimate import parameter_columns
 from rotorid.timedomain.integration.simulate import Trajectory
+from rotorid.timedomain.methods.path import Path
+from rotorid.timedomain.methods.starts import Minimum
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record
 
@@ -17,28 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class Minimum:
-    """Where one or more starts ended.
-
-    Attributes
-    ----------
-    values
-        Parameters, by name.
-    cost
-        Half the sum of squared weighted residuals.
-    starts
-        How many starts ended here.
-    """
-
-    values: dict[str, float]
-    cost: float
-    starts: int
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Parameters of a model in time, fitted to records.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fit(Path):
+    """Parameters of a model in time, fitted to records: the way of the search, and what became of it.
 
     Attributes
     ----------
@@ -49,14 +33,6 @@ class Fit:
     estimate
         Values, covariance, rank, combinations; residuals (model − record, over the stated standard deviations
         if there are any), record by record, output by output. No covariance where intervals would mislead.
-    history
-        Parameters at the start and after each iteration, (iterations + 1, n).
-    costs
-        Half the sum of squared weighted residuals at each.
-    converged, message
-        Whether a minimum was reached, and in words.
-    at_bounds
-        Parameters that stand at a bound.
     reliable
         Whether a minimum was reached that describes the record: otherwise there are no intervals.
     warnings
@@ -71,8 +47,6 @@ class Fit:
         Of neighbouring residuals; None for few samples or exact data.
     residual_rms
         In the unit of the outputs.
-    trajectories
-        Quasilinearization: states of each record at the start and after each iteration.
     errors
         Standard deviation of each output as estimated from its residuals, where these were the weights.
     """
@@ -82,12 +56,6 @@ class Fit:
     method: str
     integrator: str
     loss: str
-    estimate: Estimate
-    history: FloatArray
-    costs: FloatArray
-    converged: bool
-    message: str
-    at_bounds: tuple[str, ...]
     reliable: bool
     warnings: tuple[str, ...]
     simulations: tuple[Trajectory, ...]
@@ -95,7 +63,6 @@ class Fit:
     integration_change: FloatArray | None
     autocorrelation: float | None
     residual_rms: float
-    trajectories: tuple[tuple[FloatArray, ...], ...] = ()
     errors: dict[str, float] | None = None
 
     @property
@@ -108,70 +75,47 @@ class Fit:
         """Names of the parameters."""
         return self.model.parameters
 
-    @property
-    def values(self) -> FloatArray:
-        """Parameters (n,); NaN where the data do not determine one."""
-        return self.estimate.values
-
-    @property
-    def std(self) -> FloatArray | None:
-        """Standard deviations (n,); None where none can be given."""
-        return self.estimate.std
-
-    @property
-    def ci95(self) -> FloatArray | None:
-        """95 % intervals (n, 2); None where none can be given."""
-        return self.estimate.ci95
-
-    @property
-    def iterations(self) -> int:
-        """Number of steps."""
-        return len(self.history) - 1
-
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        change = self.integration_change
+        names, change = self.parameters, self.integration_change
         return {
             **self.estimate.to_dict(),
             "solutions": [],
-            "residual_rms": finite(self.residual_rms),
-            "method": self.method,
-            "integrator": self.integrator,
-            "loss": self.loss,
-            "converged": self.converged,
-            "message": self.message,
-            "reliable": self.reliable,
-            "iterations": self.iterations,
-            "history": [
-                {"cost": finite(cost), "parameters": dict(zip(self.parameters, row.tolist(), strict=True))}
-                for row, cost in zip(self.history, self.costs, strict=True)
-            ],
-            "errors": self.errors,
-            "at_bounds": list(self.at_bounds),
-            "minima": [
-                {"parameters": m.values, "cost": finite(m.cost), "starts": m.starts} for m in self.minima
-            ],
-            "integration_change": None
-            if change is None
-            else {name: finite(c) for name, c in zip(self.parameters, change, strict=True)},
-            "autocorrelation": None if self.autocorrelation is None else finite(self.autocorrelation),
-            "warnings": list(self.warnings),
+            **plain(
+                {
+                    "residual_rms": self.residual_rms,
+                    "method": self.method,
+                    "integrator": self.integrator,
+                    "loss": self.loss,
+                    "converged": self.converged,
+                    "message": self.message,
+                    "reliable": self.reliable,
+                    "iterations": self.iterations,
+                    "history": [
+                        {"cost": cost, "parameters": dict(zip(names, row, strict=True))}
+                        for row, cost in zip(self.history, self.costs, strict=True)
+                    ],
+                    "errors": self.errors,
+                    "at_bounds": self.at_bounds,
+                    "minima": [
+                        {"parameters": m.values, "cost": m.cost, "starts": m.starts} for m in self.minima
+                    ],
+                    "integration_change": None if change is None else dict(zip(names, change, strict=True)),
+                    "autocorrelation": self.autocorrelation,
+                    "warnings": self.warnings,
+                }
+            ),
         }
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, the 95 % interval, and whether it stands at a bound."""
-        frame = self.estimate.to_frame()
-        frame["at_bound"] = [name in self.at_bounds for name in self.parameters]
-        return frame
+        at_bound = [name in self.at_bounds for name in self.parameters]
+        return frame((*parameter_columns(self.parameters, self.estimate), Column("at_bound", at_bound)))
 
     def history_frame(self) -> pd.DataFrame:
         """One row per iteration: parameters and cost."""
-        import pandas as pd
-
-        frame = pd.DataFrame(self.history, columns=list(self.parameters))
-        frame.insert(0, "iteration", range(len(frame)))
-        frame["cost"] = self.costs
-        return frame
+        values = (Column(*pair) for pair in zip(self.parameters, self.history.T, strict=True))
+        return frame((Column("iteration", range(1 + self.iterations)), *values, Column("cost", self.costs)))
 
     def summary(self) -> str:
         """Text for an engineer: method, values ± standard deviations, intervals, and what to beware of."""

@@ -16,7 +16,6 @@ import fem
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic import Experiments, HarmonicModel, Identification, harmonic_model, identify
 from rotorid.harmonic.natural import natural_modes
-from rotorid.harmonic.operator import operator_of
 from rotorid.harmonic.rows import build_rows
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements
@@ -253,7 +252,7 @@ def _model(folder: str) -> HarmonicModel:
 
 def _squares(model: HarmonicModel, values: FloatArray) -> FloatArray:
     """Squares of the natural frequencies."""
-    return natural_modes(operator_of(model).dynamic_stiffness(values)[0])[0]
+    return natural_modes(model.dynamic_stiffness(values)[0])[0]
 
 
 def _shapes(

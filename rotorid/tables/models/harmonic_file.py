@@ -119,7 +119,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     section.finish()
     model = None
     if not len(problems) and equations is not None and estimate is not None:
-        from rotorid.harmonic.model import harmonic_model
+        from rotorid.harmonic.operator_equations import harmonic_model
 
         try:
             model = harmonic_model(
@@ -140,7 +140,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
     form = read_time_form(section, problems, initial=False)
     problems.stop()
     from rotorid.harmonic.hidden import without
-    from rotorid.harmonic.model import harmonic_model
+    from rotorid.harmonic.operator_equations import harmonic_model
 
     model = None
     try:

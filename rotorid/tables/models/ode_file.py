@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,8 +168,12 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     initial
         Whether every state of `[states]` needs its initial value.
     """
-    inputs = _inputs(section)
-    own = section.take("per_record")
+    inputs = _names(
+        section,
+        "inputs",
+        'a list of names, such as inputs = ["u"], at the top of the file',
+        lambda item: "" if _usable(item) else _A_NAME,
+    )
     known = _numbers(section, "known")
     estimate = _numbers(section, "estimate")
     others = [key for key in section.keys if key not in _KEYS]
@@ -178,7 +183,12 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
             "[estimate] with name = starting value for at least one parameter (an empty [estimate] where the "
             "model is only to be simulated)",
         )
-    own = _per_record(section, own, estimate)
+    own = _names(
+        section,
+        "per_record",
+        'a list of names of [estimate], such as per_record = ["x0"]',
+        lambda item: "" if item in estimate else f"names of [estimate]{did_you_mean(item, estimate)}",
+    )
     matrices = read_matrices(section)
     states = _texts(section, "states") if matrices is None else matrices.rates
     outputs = _texts(section, "outputs")
@@ -219,32 +229,32 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     )
 
 
-def _named(inner: Section, key: str) -> bool:
-    """Whether a key is a name; otherwise a complaint."""
-    if is_name(key) and key != "t":
-        return True
-    inner.take(key)
-    inner.complain(key, _A_NAME, value=False)
-    return False
+def _entries(section: Section, table: str, *, named: bool = True) -> Iterator[tuple[Section, str]]:
+    """A table with each of its keys; with `named` those that are names, and a complaint of the others."""
+    inner = section.section(table)
+    if inner is None:
+        return
+    for key in inner.keys:
+        if not named or _usable(key):
+            yield inner, key
+        else:
+            inner.take(key)
+            inner.complain(key, _A_NAME, value=False)
+
+
+def _usable(name: str) -> bool:
+    return is_name(name) and name != "t"
 
 
 def _numbers(section: Section, table: str) -> dict[str, float]:
-    inner = section.section(table)
-    found: dict[str, float] = {}
-    for name in () if inner is None else inner.keys:
-        if inner is not None and _named(inner, name):
-            # zero stands for a value that has been complained about: its name stays known
-            found[name] = inner.number(name, 0.0) or 0.0
-    return found
+    # zero stands for a value that has been complained about: its name stays known
+    return {name: inner.number(name, 0.0) or 0.0 for inner, name in _entries(section, table)}
 
 
 def _texts(section: Section, table: str) -> dict[str, str]:
     """Expressions by name; a plain number is one, too."""
-    inner = section.section(table)
     found: dict[str, str] = {}
-    for name in () if inner is None else inner.keys:
-        if inner is None or not _named(inner, name):
-            continue
+    for inner, name in _entries(section, table):
         value = inner.take(name)
         if isinstance(value, str) and value.strip():
             found[name] = value
@@ -256,31 +266,18 @@ def _texts(section: Section, table: str) -> dict[str, str]:
     return found
 
 
-def _inputs(section: Section) -> list[str]:
-    value = section.take("inputs")
+def _names(section: Section, key: str, expected: str, wrong: Callable[[str], str]) -> list[str]:
+    """A list of names; `wrong` says what is expected instead of one, or nothing."""
+    value = section.take(key)
     if value is None:
         return []
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        section.complain("inputs", 'a list of names, such as inputs = ["u"], at the top of the file')
+        section.complain(key, expected)
         return []
     for item in value:
-        if not is_name(item) or item == "t":
-            section.complain("inputs", f"{_A_NAME}; {item!r} is none", value=False)
-    return [item for item in value if is_name(item) and item != "t"]
-
-
-def _per_record(section: Section, value: object, estimate: dict[str, float]) -> list[str]:
-    """Parameters that every record has for itself."""
-    if value is None:
-        return []
-    if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        section.complain("per_record", 'a list of names of [estimate], such as per_record = ["x0"]')
-        return []
-    for item in value:
-        if item not in estimate:
-            hint = did_you_mean(item, estimate)
-            section.complain("per_record", f"names of [estimate]{hint}; {item!r} is none", value=False)
-    return [item for item in value if item in estimate]
+        if words := wrong(item):
+            section.complain(key, f"{words}; {item!r} is none", value=False)
+    return [item for item in value if not wrong(item)]
 
 
 def _once(section: Section, groups: dict[str, dict[str, str] | dict[str, float] | list[str]]) -> None:
@@ -317,11 +314,10 @@ def _initial(
     section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
 ) -> dict[str, float | str]:
     """Initial values, `complete` if those of all states must be given, and the time they belong to."""
-    inner = section.section("initial")
     found: dict[str, float | str] = {}
-    for name in () if inner is None else inner.keys:
-        if inner is None:
-            continue
+    given: list[str] = []
+    for inner, name in _entries(section, "initial", named=False):
+        given.append(name)
         value = inner.take(name)
         if name == "t0" and name not in states:
             found[name] = value
@@ -337,7 +333,6 @@ def _initial(
             inner.complain(name, "a number, or an expression of parameters in quotes")
     texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
     _readable(section, "initial", texts, constants, problems)
-    given = () if inner is None else inner.keys
     for name in states if complete else ():
         if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
             section.missing(f"initial.{name}", f"the value of {name} at the first time of the record")
@@ -363,11 +358,8 @@ def _nuisance(section: Section) -> tuple[bool, bool, list[float]]:
 
 
 def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:
-    inner = section.section("bounds")
     found: dict[str, tuple[float, float]] = {}
-    for name in () if inner is None else inner.keys:
-        if inner is None:
-            continue
+    for inner, name in _entries(section, "bounds", named=False):
         limits = pair(inner.take(name))
         if name not in estimate:
             inner.complain(name, f"a name of [estimate]{did_you_mean(name, estimate)}", value=False)

@@ -140,12 +140,8 @@ def _matrix_rows(form: TimeForm, matrices: Matrices) -> list[tuple[str, str]]:
         terms = []
         for j, other in enumerate(matrices.coordinates):
             parts = []
-            for key, matrix, power in (
-                ("M", matrices.M, "*p**2"),
-                ("C", matrices.C, "*p"),
-                ("K", matrices.K, ""),
-            ):
-                entry = matrix[i][j]
+            for key, power in (("M", "*p**2"), ("C", "*p"), ("K", "")):
+                entry = getattr(matrices, key)[i][j]
                 text = entry if isinstance(entry, str) else repr(float(entry))
                 if lost := sorted(expressions.names(expressions.parse(text, where=key)) - allowed):
                     raise ValueError(
@@ -233,20 +229,14 @@ def _scaled(text: str, form: TimeForm) -> tuple[str, str] | None:
 
 
 def _check_names(form: TimeForm) -> None:
-    for what, names in (
-        ("states", form.states),
-        ("outputs", form.outputs),
-        ("estimate", form.estimate),
-        ("known", form.known),
-        ("inputs", form.inputs),
-    ):
-        if "p" in names:
+    for what in ("states", "outputs", "estimate", "known", "inputs"):
+        if "p" in getattr(form, what):
             raise ValueError(f"{what}: p is d/dt in equations of amplitudes; choose another name")
 
 
 def _check_time(form: TimeForm) -> None:
-    for what, texts in (("states", form.states), ("force", form.force), ("outputs", form.outputs)):
-        for name, text in texts.items():
+    for what in ("states", "force", "outputs"):
+        for name, text in getattr(form, what).items():
             if "t" in expressions.names(expressions.parse(text)):
                 raise ValueError(
                     f"{what}.{name} depends on the time t, which amplitudes do not know: make what excites a "

@@ -20,10 +20,6 @@ SMALL = 0.1
 """Absolute tolerance of a state, as a share of rtol times its largest size so far."""
 
 
-Options = tuple[float, float | None, float]
-"""Relative tolerance, first step, longest step."""
-
-
 class _TooManySteps(SimulationError):
     pass
 
@@ -33,7 +29,6 @@ def integrate(
     x0: FloatArray,
     s0: FloatArray,
     rtol: float,
-    atol: float | None,
     method: str = "auto",
 ) -> tuple[FloatArray, FloatArray, str]:
     """States (n, n_x), sensitivities (n, n_x, n_p) and the method used ("dop853" or "lsoda").
@@ -44,8 +39,8 @@ def integrate(
         With the times.
     x0, s0
         Initial states and sensitivities.
-    rtol, atol
-        Tolerances; `atol` None: follows the size of each state and sensitivity.
+    rtol
+        Relative tolerance; the absolute one follows the size of each state and sensitivity.
     method
         "auto", "dop853" or "lsoda".
 
@@ -56,23 +51,21 @@ def integrate(
     """
     if not 1e-14 < rtol < 1:
         raise ValueError(f"rtol must be between 1e-14 and 1, not {rtol:g}")
-    if atol is not None and not atol > 0:
-        raise ValueError(f"atol must be above 0, not {atol:g}")
     z0, n = system.pack(x0, s0), len(system.t)
     if method == "auto":
-        usual = rtol >= taylor.TOLERANCE and atol is None
+        usual = rtol >= taylor.TOLERANCE
         quick = taylor.integrate(system, x0, s0, longest_step(system)) if usual else None
         if quick is not None:
             return *system.unpack(quick), "taylor"
         try:
-            return *_solve(system, z0, "dop853", rtol, atol, max(TRIAL_STEPS, 4 * n)), "dop853"
+            return *_solve(system, z0, "dop853", rtol, max(TRIAL_STEPS, 4 * n)), "dop853"
         except _TooManySteps:
             method = "lsoda"
-    return *_solve(system, z0, method, rtol, atol, max(MAX_STEPS[method], 10 * n)), method
+    return *_solve(system, z0, method, rtol, max(MAX_STEPS[method], 10 * n)), method
 
 
 def _solve(
-    system: Augmented, z0: FloatArray, method: str, rtol: float, atol: float | None, budget: int
+    system: Augmented, z0: FloatArray, method: str, rtol: float, budget: int
 ) -> tuple[FloatArray, FloatArray]:
     t = system.t
     table = np.empty((len(t), system.size))
@@ -84,7 +77,7 @@ def _solve(
         warnings.simplefilter("ignore")  # what lsoda would warn of is raised as an error
         scale = _first_scale(system, z0)
         for end in ends:
-            steps, first = _segment(system, table, begin, end, method, (rtol, atol), scale, first, budget)
+            steps, first = _segment(system, table, begin, end, method, rtol, scale, first, budget)
             budget -= steps
             begin = end
     if method == "dop853":
@@ -98,18 +91,17 @@ def _segment(  # noqa: PLR0913
     begin: int,
     end: int,
     method: str,
-    tolerances: tuple[float, float | None],
+    rtol: float,
     scale: FloatArray,
     first: float | None,
     budget: int,
 ) -> tuple[int, float]:
     """Fill rows begin + 1 … end; the number of steps, and the size of the last full one."""
     t, span = system.t, float(system.t[end] - system.t[begin])
-    rtol, atol = tolerances
     first = None if first is None else min(first, span)
-    limits = _atol(system, scale if method == "dop853" else _levelled(system, scale), rtol, atol)
-    options = (rtol, first, longest_step(system))
-    solver = _solver(system, method, float(t[begin]), table[begin], float(t[end]), limits, options)
+    limits = _atol(system, scale if method == "dop853" else _levelled(system, scale), rtol)
+    options = {"rtol": rtol, "atol": limits, "first_step": first, "max_step": longest_step(system)}
+    solver = _solver(system, method, (float(t[begin]), table[begin], float(t[end])), options)
     row, steps, longest = begin + 1, 0, 0.0
     while row <= end:
         if steps >= budget:
@@ -133,7 +125,7 @@ def _segment(  # noqa: PLR0913
             row = upto
         np.maximum(scale, np.abs(solver.y), out=scale)
         if method == "dop853":  # lsoda keeps its own copy
-            solver.atol = _atol(system, scale, rtol, atol)
+            solver.atol = _atol(system, scale, rtol)
     return steps, longest
 
 
@@ -149,32 +141,21 @@ def shortest_pulse(t: FloatArray) -> float:
 
 
 def _solver(
-    system: Augmented,
-    method: str,
-    begin: float,
-    z: FloatArray,
-    end: float,
-    atol: FloatArray,
-    options: Options,
+    system: Augmented, method: str, problem: tuple[float, FloatArray, float], options: dict[str, Any]
 ) -> Any:  # noqa: ANN401  scipy has no types
+    """Scipy's, for the first time, the states there and the last time."""
     from scipy.integrate import DOP853, LSODA
 
-    rtol, first, longest = options
-    if method == "dop853":
-        solver = DOP853(system, begin, z, end, rtol=rtol, atol=atol, first_step=first, max_step=longest)
-        if not np.isfinite(solver.h_abs):  # of rates that are not finite; it would be tried for ever
-            solver.h_abs = 1e-6 * (end - begin)
-        return solver
-    return LSODA(
-        system, begin, z, end, rtol=rtol, atol=atol, first_step=first, max_step=longest, jac=system.jacobian
-    )
+    if method == "lsoda":
+        return LSODA(system, *problem, **options, jac=system.jacobian)
+    solver = DOP853(system, *problem, **options)
+    if not np.isfinite(solver.h_abs):  # of rates that are not finite; it would be tried for ever
+        solver.h_abs = 1e-6 * (problem[2] - problem[0])
+    return solver
 
 
-def _atol(system: Augmented, scale: FloatArray, rtol: float, atol: float | None) -> FloatArray:
-    """Absolute tolerances (size,): what is asked for, for S per size of the parameter; or after `scale`."""
-    if atol is not None:
-        per = np.tile(_per_parameter(system, atol), system.nx)
-        return np.concatenate([np.full(system.nx, atol), per])
+def _atol(system: Augmented, scale: FloatArray, rtol: float) -> FloatArray:
+    """Absolute tolerances (size,), after the sizes of states and sensitivities."""
     x, s = system.unpack(scale[None])
     # below rounding of the largest there is nothing to control
     sizes = np.maximum(SMALL * rtol * x[0], 1e-16 * x[0].max())

@@ -20,10 +20,8 @@ from rotorid.timedomain.models.record import Record, from_t0
 
 __all__ = ["INTEGRATORS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
 
-Integrate = Callable[
-    [Augmented, FloatArray, FloatArray, float, float | None], tuple[FloatArray, FloatArray, str]
-]
-"""System, initial states and sensitivities, rtol, atol → both at all times, and the method used."""
+Integrate = Callable[[Augmented, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray, str]]
+"""System, initial states and sensitivities, rtol → both at all times, and the method used."""
 Step = Callable[[Augmented, float, float, FloatArray], FloatArray]
 """System, time now and then, states → states then."""
 
@@ -59,7 +57,6 @@ def simulate(
     *,
     method: str = "auto",
     rtol: float = 1e-10,
-    atol: float | None = None,
     sensitivities: bool = True,
     x0: ArrayLike | None = None,
 ) -> Trajectory:
@@ -76,8 +73,8 @@ def simulate(
     method
         One of `INTEGRATORS`; "auto" with the extra `rotorid[fast]` takes "taylor" for a model that has
         needed many steps.
-    rtol, atol
-        Tolerances of "dop853" and "lsoda"; by default `atol` follows the size of each state.
+    rtol
+        Relative tolerance of "dop853" and "lsoda"; the absolute one follows the size of each state.
     sensitivities
         Whether to solve for the derivatives too.
     x0
@@ -100,9 +97,7 @@ def simulate(
         )
     longer = record if x0 is not None else from_t0(model, record)
     if longer is not record:
-        run = simulate(
-            model, values, longer, method=method, rtol=rtol, atol=atol, sensitivities=sensitivities
-        )
+        run = simulate(model, values, longer, method=method, rtol=rtol, sensitivities=sensitivities)
         return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
     u = inputs_of(model, record)
     t = record.t
@@ -112,7 +107,7 @@ def simulate(
         system = Augmented(model, values, t, u, sensitivities)
         x_0, s_0 = _start(model, values, x0, sensitivities)
         check_finite(model, t[:1], x_0[None], s_0[None])
-        x, s, used = integrate(system, x_0, s_0, rtol, atol)
+        x, s, used = integrate(system, x_0, s_0, rtol)
         check_finite(model, t, x, s)
     y = model.h(t, x, values, u)
     y_theta = np.zeros((*y.shape, len(values)))
@@ -153,14 +148,14 @@ def _start(
 
 
 def _auto(
-    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
 ) -> tuple[FloatArray, FloatArray, str]:
     exact = system.model.linear_driven
-    return (_exact if exact else adaptive.integrate)(system, x0, s0, rtol, atol)
+    return (_exact if exact else adaptive.integrate)(system, x0, s0, rtol)
 
 
 def _exact(
-    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+    system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
 ) -> tuple[FloatArray, FloatArray, str]:
     model, t, u = system.model, system.t, system.u
     if not model.linear_driven:
@@ -168,25 +163,14 @@ def _exact(
             "expm solves linear models with constant coefficients, without explicit time; use dop853, lsoda, "
             "or auto"
         )
-    a, b, da, db = model.matrices(system.theta)
-    n, k = len(x0), s0.shape[1]
-    if not (model.driven or b.any() or db.any()):
-        return *propagation.propagate(t, x0, s0, a, da[:k]), "expm"
-    # more states: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
-    nu = u.shape[1] if model.driven else 0
-    size = n + 1 + 2 * nu
-    matrix, derivatives = np.zeros((size, size)), np.zeros((k, size, size))
-    matrix[:n, :n], matrix[:n, n] = a, b
-    derivatives[:, :n, :n], derivatives[:, :n, n] = da[:k], db[:k]
-    if not nu:
-        z, s = propagation.propagate(t, np.append(x0, 1.0), np.vstack([s0, np.zeros(k)]), matrix, derivatives)
-        return z[:, :n], s[:, :n], "expm"
-    inputs, slopes = model.input_matrices(system.theta)
-    matrix[:n, n + 1 : n + 1 + nu], derivatives[:, :n, n + 1 : n + 1 + nu] = inputs, slopes[:k]
-    matrix[n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
-    growth = np.diff(u, axis=0) / np.diff(t)[:, None]
-    drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1], growth], axis=1)
-    return *propagation.propagate_driven(t, x0, s0, matrix, derivatives, drive), "expm"
+    n, k, nu = len(x0), s0.shape[1], u.shape[1] if model.driven else 0
+    # behind x: 1, whose effect is the constant rate b; u, which grows by its slope; and the slope
+    matrix = np.zeros((1 + k, n + 1 + 2 * nu, n + 1 + 2 * nu))
+    matrix[:, :n, : n + 1 + nu] = model.matrices(system.theta)[: 1 + k, :, : n + 1 + nu]
+    matrix[0, n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
+    growth = np.diff(u[:, :nu], axis=0) / np.diff(t)[:, None]
+    drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1, :nu], growth], axis=1)
+    return *propagation.propagate(t, x0, s0, matrix[0], matrix[1:], drive), "expm"
 
 
 def _heun(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
@@ -206,7 +190,7 @@ def _stepwise(name: str, step: Step) -> Integrate:
     """One step from sample to sample."""
 
     def integrate(
-        system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float, atol: float | None
+        system: Augmented, x0: FloatArray, s0: FloatArray, rtol: float
     ) -> tuple[FloatArray, FloatArray, str]:
         table = np.empty((len(system.t), system.size))
         table[0] = z = system.pack(x0, s0)

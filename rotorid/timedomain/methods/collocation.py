@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.models.errors import SimulationError
@@ -53,31 +54,27 @@ def solve_linear(equations: Equations, t: FloatArray, first: FloatArray) -> tupl
         if len(edges) * DEGREE * n * (k + n) > LARGEST:
             break
         with np.errstate(all="ignore"):
-            table, nodes = _intervals(equations, edges, first, DEGREE)
-            resolved = _resolved(table, nodes)
+            table = _intervals(equations, edges, first)
+            resolved = _resolved(table)
         if not np.isfinite(table).all():
             raise SimulationError(
                 "the linearised equations have no finite solution; start from another trajectory"
             )
         if resolved:
             samples = np.concatenate([table[:: 2**halving, 0], table[-1:, -1]])
-            return samples, partial(_between, edges=edges, nodes=nodes, table=table)
+            return samples, partial(_between, edges=edges, table=table)
     raise SimulationError(
         "the linearised equations vary too fast between the samples; use levenberg-marquardt, or give more"
     )
 
 
-def _intervals(
-    equations: Equations, edges: FloatArray, first: FloatArray, degree: int
-) -> tuple[FloatArray, FloatArray]:
-    """W at the nodes of each interval, (N, degree + 1, n, k), and the nodes in 0 … 1."""
-    nodes = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
-    slopes = _differentiation(nodes)
-    h, (n, k) = np.diff(edges), first.shape
-    A, B = equations(edges[:-1, None] + h[:, None] * nodes[1:])
-    joined = np.kron(-slopes[1:, :1], np.eye(n))
+def _intervals(equations: Equations, edges: FloatArray, first: FloatArray) -> FloatArray:
+    """W at the nodes of each interval, (N, DEGREE + 1, n, k)."""
+    h, (n, k), degree = np.diff(edges), first.shape, DEGREE
+    A, B = equations(edges[:-1, None] + h[:, None] * NODES[1:])
+    joined = np.kron(-SLOPES[1:, :1], np.eye(n))
     loads = (h[:, None, None, None] * B).reshape(len(h), degree * n, k)
-    inner = np.kron(slopes[1:, 1:], np.eye(n))
+    inner = np.kron(SLOPES[1:, 1:], np.eye(n))
     solved = np.empty((len(h), degree * n, n + k))
     if A.ndim == 2:
         kinds, which = np.unique(np.round(h, 15 - int(np.ceil(np.log10(h.max())))), return_inverse=True)
@@ -100,7 +97,7 @@ def _intervals(
         table[i, 0] = w
         w = solved[i, -n:, :n] @ w + solved[i, -n:, n:]
     table[:, 1:] = (solved[:, :, :n] @ table[:, 0] + solved[:, :, n:]).reshape(len(h), degree, n, k)
-    return table, nodes
+    return table
 
 
 def _inverse(matrices: FloatArray) -> FloatArray:
@@ -112,40 +109,30 @@ def _inverse(matrices: FloatArray) -> FloatArray:
         return np.full_like(matrices, np.nan)
 
 
-def _differentiation(nodes: FloatArray) -> FloatArray:
-    """Derivatives at the nodes of a polynomial with these values there."""
-    weights = _weights(len(nodes))
-    away = nodes[:, None] - nodes + np.eye(len(nodes))
-    out = weights / weights[:, None] / away
-    np.fill_diagonal(out, 0.0)
-    np.fill_diagonal(out, -out.sum(axis=1))
-    return np.asarray(out)
+def _polynomials(at: FloatArray) -> FloatArray:
+    """Chebyshev polynomials up to DEGREE over an interval, at shares 0 … 1 of it, (*B, DEGREE + 1)."""
+    return np.asarray(chebyshev.chebvander(2 * at - 1, DEGREE), dtype=float)
 
 
-def _weights(count: int) -> FloatArray:
-    """Of the barycentric formula."""
-    weights = (-1.0) ** np.arange(count)
-    weights[[0, -1]] /= 2
-    return np.asarray(weights)
-
-
-def _resolved(table: FloatArray, nodes: FloatArray) -> bool:
+def _resolved(table: FloatArray) -> bool:
     """Whether the last two Chebyshev coefficients are negligible everywhere."""
-    waves = np.polynomial.chebyshev.chebvander(2 * nodes - 1, len(nodes) - 1)
-    last = np.linalg.inv(waves)[-2:]
-    tail = np.abs(np.einsum("cj,ijnk->icnk", last, table)).max(axis=(0, 1))
+    tail = np.abs(np.einsum("cj,ijnk->icnk", COEFFICIENTS[-2:], table)).max(axis=(0, 1))
     size = np.abs(table).max(axis=(0, 1))
     return bool((tail <= TAIL * np.maximum(size, 1e-6 * size.max(axis=0))).all())
 
 
-def _between(at: FloatArray, edges: FloatArray, nodes: FloatArray, table: FloatArray) -> FloatArray:
+def _between(at: FloatArray, edges: FloatArray, table: FloatArray) -> FloatArray:
     """The polynomials at any times inside, (*B, n, k)."""
     times = np.ravel(at)
     i = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(edges) - 2)
-    away = ((times - edges[i]) / (edges[i + 1] - edges[i]))[:, None] - nodes
-    hit = np.abs(away) < 1e-14
-    basis = _weights(len(nodes)) / np.where(hit, 1.0, away)
-    basis = np.where(hit.any(axis=1, keepdims=True), hit, basis)
-    basis = basis / basis.sum(axis=1, keepdims=True)
-    values = np.einsum("bj,bjnk->bnk", basis, table[i])
+    share = (times - edges[i]) / (edges[i + 1] - edges[i])
+    values = np.einsum("bj,bjnk->bnk", _polynomials(share) @ COEFFICIENTS, table[i])
     return np.asarray(values.reshape(*np.shape(at), *table.shape[2:]))
+
+
+NODES = (1 - np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)) / 2
+"""Shares of an interval where the equations hold."""
+COEFFICIENTS = np.linalg.inv(_polynomials(NODES))
+"""From values at the nodes to coefficients."""
+SLOPES = 2 * chebyshev.chebval(2 * NODES - 1, chebyshev.chebder(np.eye(DEGREE + 1))).T @ COEFFICIENTS
+"""From values at the nodes to derivatives there."""

@@ -6,9 +6,6 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
-from rotorid.regression import least_squares
-from rotorid.regression.estimate import Estimate
-from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.path import Path, at, half_square, negligible
 from rotorid.timedomain.methods.problem import Problem
@@ -39,7 +36,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
     theta = start.copy()
     r, K = problem.evaluate(theta)
     history, costs = [theta], [half_square(r)]
-    found = _step(problem, r, K)
+    found = problem.linear_fit(K, -r)
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
     for _ in range(max_iterations):
         new = theta + found.solution
@@ -54,7 +51,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
         history.append(theta)
         costs.append(half_square(r))
         small = negligible(step, theta, found, tolerance)
-        found = _step(problem, r, K)
+        found = problem.linear_fit(K, -r)
         if small:
             # a minimum, not only a short step: the next one is no longer either
             converged = negligible(found.solution, theta, found, 10 * tolerance)
@@ -63,9 +60,3 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
                 break
     r, _ = problem.evaluate(theta)
     return Path(at(found, theta, r), np.array(history), np.array(costs), converged, message)
-
-
-def _step(problem: Problem, r: FloatArray, K: FloatArray) -> Estimate:
-    return least_squares(
-        K, -r, names=problem.model.parameters, sigma=1.0 if problem.stated else None, rcond=RCOND
-    )

@@ -8,40 +8,20 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.nonlinear import NonlinearEstimate
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
-    """Iterations of one method.
+class Path(NonlinearEstimate):
+    """Iterations of one method; costs are NaN where they were not computed.
 
     Attributes
     ----------
-    estimate
-        Values, covariance, rank and null space at the end.
-    history
-        Parameters at the start and after each iteration, (iterations + 1, n).
-    costs
-        Half the sum of squared weighted residuals at each; NaN where it was not computed.
-    converged, message
-        Whether the last step was negligible, and in words.
-    at_bounds
-        Parameters that stand at a bound.
     trajectories
         Quasilinearization: the states (n, n_x) of each record at the start and after each iteration.
     """
 
-    estimate: Estimate
-    history: FloatArray
-    costs: FloatArray
-    converged: bool
-    message: str
-    at_bounds: tuple[str, ...] = ()
     trajectories: tuple[tuple[FloatArray, ...], ...] = ()
-
-    @property
-    def iterations(self) -> int:
-        """Number of steps."""
-        return len(self.history) - 1
 
     def after(self, before: FloatArray) -> Path:
         """The same, as the continuation of earlier steps, (k, n)."""

@@ -9,6 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import least_squares
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, Trajectory, simulate
 from rotorid.timedomain.models.model import OdeModel
 from rotorid.timedomain.models.record import Record, from_t0
@@ -185,6 +188,11 @@ class Problem:
     def jacobian(self, theta: FloatArray) -> FloatArray:
         """Derivatives (m, n)."""
         return self.evaluate(theta)[1]
+
+    def linear_fit(self, K: FloatArray, Y: FloatArray) -> Estimate:
+        """The step of the parameters from linearised rows K δ = Y, (m, n) and (m,)."""
+        sigma = 1.0 if self.stated else None
+        return least_squares(K, Y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
 
     def _table(self, record: Record) -> tuple[FloatArray, FloatArray, bool | None]:
         """Measured values and standard deviations (n, n_y); whether these are stated (None: no values)."""

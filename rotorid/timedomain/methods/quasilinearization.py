@@ -14,9 +14,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
-from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
 from rotorid.timedomain.methods.path import Path, at, half_square, negligible
@@ -145,7 +143,7 @@ def _collocated(
     model: OdeModel, theta: FloatArray, curve: Curve, record: Record, first: FloatArray
 ) -> tuple[FloatArray, Curve]:
     u = inputs_of(model, record)
-    constant = model.matrices(theta)[0] if model.linear_driven else None
+    constant = model.matrices(theta)[0, :, : len(model.states)] if model.linear_driven else None
 
     def equations(t: FloatArray) -> tuple[FloatArray, FloatArray]:
         x = curve(t)
@@ -172,8 +170,7 @@ def _solve(
     K, Y = problem.vector(slopes), problem.vector(outputs)
     if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
         raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
-    sigma = 1.0 if problem.stated else None
-    return least_squares(K, Y, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
+    return problem.linear_fit(K, Y)
 
 
 def _next(curve: Curve, step: FloatArray) -> Curve:

@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method
-from rotorid.regression import least_squares
 from rotorid.regression.nonlinear import nonlinear_least_squares
-from rotorid.regression.search import RCOND
 from rotorid.timedomain.methods.gauss_newton import gauss_newton
 from rotorid.timedomain.methods.path import Path, at, half_square
 from rotorid.timedomain.methods.problem import OutOfTime, Problem
@@ -58,7 +56,7 @@ def _levenberg_marquardt(search: Search, problem: Problem, start: FloatArray) ->
         max_iterations=search.max_iterations,
         near=search.loss == "linear",
     )
-    return Path(found.estimate, found.history, found.costs, found.converged, found.message, found.at_bounds)
+    return Path(**vars(found))
 
 
 def _gauss_newton(search: Search, problem: Problem, start: FloatArray) -> Path:
@@ -111,11 +109,9 @@ def _so_far(problem: Problem, start: FloatArray) -> Path:
     theta = start if problem.best is None else problem.best[1]
     r, J = problem.evaluate(theta)
     problem.limit = 0.0
-    sigma = 1.0 if problem.stated else None
-    found = least_squares(J, -r, names=problem.model.parameters, sigma=sigma, rcond=RCOND)
     words = (
         f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start "
         "nearer or take another method"
     )
     costs = np.array([np.nan, half_square(r)])
-    return Path(at(found, theta, r), np.stack([start, theta]), costs, False, words)
+    return Path(at(problem.linear_fit(J, -r), theta, r), np.stack([start, theta]), costs, False, words)

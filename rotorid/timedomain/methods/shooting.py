@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression.search import Search, drive
 from rotorid.timedomain.integration.simulate import SimulationError, simulate
 from rotorid.timedomain.methods.problem import OutOfTime, Problem
 from rotorid.timedomain.methods.trajectory import Curve
@@ -24,6 +25,8 @@ SAMPLES = 6
 """Of a piece, at least, by default."""
 STRICTNESS = (1.0, 10.0, 100.0)
 """Weights of the joints relative to the data, one search after the other."""
+TOLERANCE = 1e-6
+"""Of each search."""
 RTOL = 1e-7
 """Of the integration: this is only the way to a starting point."""
 
@@ -74,8 +77,6 @@ def shoot(
     OutOfTime
         The problem's limit of time has come.
     """
-    from scipy.optimize import least_squares
-
     model, n = problem.model, len(start)
     parts = _cut(problem.records, pieces)
     nodes = [curves[p.number](p.record.t[0]) for p in parts if p.first > 0]
@@ -89,18 +90,8 @@ def shoot(
     for weight in STRICTNESS:
         search.weight = weight
         search.forget()
-        found = least_squares(
-            search.residual,
-            z,
-            search.jacobian,
-            bounds=(low, high),
-            x_scale="jac",
-            xtol=1e-6,
-            ftol=1e-6,
-            gtol=1e-8,
-            max_nfev=max_iterations,
-        )
-        z = np.asarray(found.x)
+        way = Search(search.residual, search.jacobian, "linear", TOLERANCE)
+        z, _, _ = drive(way, z, low, high, None, "linear", stated=True, limit=max_iterations)
     return z[:n]
 
 

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.methods.path import Path
-from rotorid.timedomain.result import Minimum
+from rotorid.timedomain.methods.path import Path, half_square
 
 SAME = 1e-3
 """Relative difference of parameters below which two minima are one."""
 MOST_STARTS = 10_000
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where one or more starts ended.
+
+    Attributes
+    ----------
+    values
+        Parameters, by name.
+    cost
+        Half the sum of squared weighted residuals.
+    starts
+        How many starts ended here.
+    """
+
+    values: dict[str, float]
+    cost: float
+    starts: int
 
 
 def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) -> list[FloatArray]:
@@ -56,21 +75,17 @@ def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) 
 def merge(paths: Sequence[Path], names: tuple[str, ...]) -> tuple[Minimum, ...]:
     """Different minima, the best first."""
     kept: list[tuple[FloatArray, float, int]] = []
-    for path in sorted(paths, key=_cost):
-        theta = path.estimate.solution
+    ends = [(half_square(path.estimate.residuals), path.estimate) for path in paths]
+    for reached, found in sorted(ends, key=lambda end: end[0]):
+        theta = found.solution
         for i, (other, cost, count) in enumerate(kept):
             # parameters that are not determined may differ at the same cost
             near = np.abs(theta - other) <= SAME * np.maximum(np.abs(theta), np.abs(other)) + 1e-12
-            if near.all() or (not path.estimate.full_rank and abs(_cost(path) - cost) <= 1e-6 * cost):
+            if near.all() or (not found.full_rank and abs(reached - cost) <= 1e-6 * cost):
                 kept[i] = other, cost, count + 1
                 break
         else:
-            kept.append((theta, _cost(path), 1))
+            kept.append((theta, reached, 1))
     return tuple(
         Minimum(dict(zip(names, theta.tolist(), strict=True)), cost, count) for theta, cost, count in kept
     )
-
-
-def _cost(path: Path) -> float:
-    r = path.estimate.residuals
-    return 0.5 * float(r @ r)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import gain
 from rotorid.timedomain.integration.simulate import inputs_of, simulate
 from rotorid.timedomain.methods.problem import Problem
 from rotorid.timedomain.models.model import OdeModel, ode_model
@@ -52,7 +53,7 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
         miss = np.where(seen, y - model.h(t, x, theta, u), 0.0)
         slopes = np.where(seen[..., None], model.h_x(t, x, theta, u), 0.0)
         finite = np.isfinite(slopes).all() and np.isfinite(miss).all()
-        step = np.einsum("tij,tj->ti", np.linalg.pinv(slopes, rcond=1e-8), miss) if finite else None
+        step = np.einsum("tij,tj->ti", gain(slopes, rcond=1e-8), miss) if finite else None
         if step is None or not np.isfinite(step).all():
             raise ValueError(f"{record.name}: no states explain the measured outputs")
         x = x + step

@@ -53,9 +53,9 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float
         raise ValueError("the parameters must be finite numbers")
     if not np.isfinite(speed):
         raise ValueError(f"the speed must be a finite number in rad/s, not {speed}")
-    A, constant, _, _ = model.matrices(values)
-    B = model.input_matrices(values)[0] if model.inputs else np.zeros((len(model.states), 0))
     zero, none = np.zeros(len(model.states)), np.zeros(len(model.inputs))
+    table, n = model.matrices(values)[0], len(zero)
+    A, constant, B = table[:, :n], table[:, n], table[:, n + 1 :]
     C = model.h_x(0.0, zero, values, none)
     rest = model.h(0.0, zero, values, none)
     if constant.any() or rest.any():

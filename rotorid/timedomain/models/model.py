@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,42 +62,44 @@ class OdeModel:
     observed: tuple[Expression, ...] = field(repr=False)
     per_record: tuple[str, ...] = ()
     t0: float | str | None = None
+    rates_alone: ClassVar[bool] = True
+    """Whether `rates` are the whole right side."""
 
     def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Rates of the states, (*B, n_x)."""
-        return self._many(self._compiled_f, t, x, theta, u)
+        return self._rates("", t, x, theta, u)
 
     def f_x(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Their derivatives by the states, (*B, n_x, n_x)."""
-        return self._many(self._compiled_f_x, t, x, theta, u)
+        return self._rates("states", t, x, theta, u)
 
     def f_theta(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Their derivatives by the parameters, (*B, n_x, n_p)."""
-        return self._many(self._compiled_f_theta, t, x, theta, u)
+        return self._rates("parameters", t, x, theta, u)
 
     def h(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Outputs, (*B, n_y)."""
-        return self._many(self._compiled_h, t, x, theta, u)
+        return self._many("observed", "", t, x, theta, u)
 
     def h_x(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Their derivatives by the states, (*B, n_y, n_x)."""
-        return self._many(self._compiled_h_x, t, x, theta, u)
+        return self._many("observed", "states", t, x, theta, u)
 
     def h_theta(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
         """Their derivatives by the parameters at constant states, (*B, n_y, n_p)."""
-        return self._many(self._compiled_h_theta, t, x, theta, u)
+        return self._many("observed", "parameters", t, x, theta, u)
 
     def x0(self, theta: ArrayLike) -> FloatArray:
         """Initial states, (n_x,)."""
-        return self._compiled_x0.one(self._theta(theta).tolist())
+        return self._made("initial").one(self._theta(theta).tolist())
 
     def x0_theta(self, theta: ArrayLike) -> FloatArray:
         """Their derivatives by the parameters, (n_x, n_p)."""
-        return self._compiled_x0_theta.one(self._theta(theta).tolist())
+        return self._made("initial", "parameters").one(self._theta(theta).tolist())
 
     def rate(self, t: float, x: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
         """Rates at one point, quickly, (n_x,)."""
-        return self._compiled_f.one([t, *x.tolist(), *theta.tolist(), *u.tolist()])
+        return self._made("rates").one([t, *x.tolist(), *theta.tolist(), *u.tolist()])
 
     def point(self, t: float, x: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
         """f, f_x and f_θ at one point, quickly, (n_x, 1 + n_x + n_p)."""
@@ -125,10 +127,7 @@ class OdeModel:
         varying = {"t", *self.states, *self.inputs}
         if any(expressions.names(part) & varying for e in self.rates for part in signs(e)):
             return False  # such as sign(v): its derivative is 0, but it is not constant
-        slopes = [*self._a_exprs, *self._input_exprs]
-        if any(expressions.names(e) & varying for e in slopes):
-            return False
-        return not any(expressions.names(e) & varying for e in self._b_exprs)
+        return not any(expressions.names(e) & varying for e in self._affine)
 
     @cached_property
     def timed(self) -> bool:
@@ -140,8 +139,8 @@ class OdeModel:
         """Whether inputs stand in the rates."""
         return any(expressions.names(e) & set(self.inputs) for e in self.rates)
 
-    def matrices(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """A (n_x, n_x), b (n_x,), ∂A/∂θ (n_p, n_x, n_x), ∂b/∂θ (n_p, n_x) of a linear model.
+    def matrices(self, theta: ArrayLike) -> FloatArray:
+        """[A b B] of a linear model, then its derivatives by each parameter, (1 + n_p, n_x, n_x + 1 + n_u).
 
         Raises
         ------
@@ -150,13 +149,7 @@ class OdeModel:
         """
         if not self.linear_driven:
             raise ValueError("this model is not linear with constant coefficients; it has no matrices")
-        table = self._compiled_matrices.one(self._theta(theta).tolist())
-        return table[0, :, :-1], table[0, :, -1], table[1:, :, :-1], table[1:, :, -1]
-
-    def input_matrices(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """B (n_x, n_u) of a linear model with inputs, and ∂B/∂θ (n_p, n_x, n_u)."""
-        table = self._compiled_input_matrices.one(self._theta(theta).tolist())
-        return table[0], table[1:]
+        return self._compiled_affine.one(self._theta(theta).tolist())
 
     # -- expressions and their functions, made when needed
 
@@ -169,7 +162,13 @@ class OdeModel:
             )
         return values
 
-    def _many(self, made: Compiled, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
+    def _rates(self, by: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
+        """f, or its derivatives by the "states" or the "parameters"."""
+        return self._many("rates", by, t, x, theta, u)
+
+    def _many(
+        self, of: str, by: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike
+    ) -> FloatArray:
         times = np.asarray(t, dtype=float)
         batch = times.shape
         states = np.broadcast_to(np.asarray(x, dtype=float), (*batch, len(self.states)))
@@ -180,29 +179,38 @@ class OdeModel:
             *self._theta(theta).tolist(),
             *np.moveaxis(inputs, -1, 0),
         ]
-        return made.many(batch, arguments)
+        return self._made(of, by).many(batch, arguments)
+
+    def _made(self, of: str, by: str = "") -> Compiled:
+        """Of "rates", "initial" or "observed", or of their derivatives by "states" or "parameters"."""
+        if (of, by) not in self.machine:
+            exprs = getattr(self, of)
+            shape = (len(exprs), len(self._symbols[by])) if by else (len(exprs),)
+            arguments = self._symbols["parameters"] if of == "initial" else self._arguments
+            table = _jacobian(exprs, self._symbols[by]) if by else exprs
+            self.machine[of, by] = Compiled(arguments, table, shape)
+        made: Compiled = self.machine[of, by]
+        return made
 
     @cached_property
-    def _arguments(self) -> tuple[list[Any], list[Any], list[Any]]:
-        """Symbols: states, parameters, and all arguments."""
+    def _symbols(self) -> dict[str, list[Any]]:
+        """Of states, parameters and inputs."""
         import sympy
 
-        states = [sympy.Symbol(name) for name in self.states]
-        parameters = [sympy.Symbol(name) for name in self.parameters]
-        inputs = [sympy.Symbol(name) for name in self.inputs]
-        return states, parameters, [sympy.Symbol("t"), *states, *parameters, *inputs]
-
-    def _compile(self, exprs: Sequence[Any], shape: tuple[int, ...]) -> Compiled:
-        return Compiled(self._arguments[2], exprs, shape)
+        kinds = {"states": self.states, "parameters": self.parameters, "inputs": self.inputs}
+        return {kind: [sympy.Symbol(name) for name in names] for kind, names in kinds.items()}
 
     @cached_property
-    def _a_exprs(self) -> list[Any]:
-        return _jacobian(self.rates, self._arguments[0])
+    def _arguments(self) -> list[Any]:
+        """Symbols of the time, the states, the parameters and the inputs."""
+        import sympy
+
+        return [sympy.Symbol("t"), *(symbol for kind in self._symbols.values() for symbol in kind)]
 
     @cached_property
     def fixed_at_first(self) -> list[int]:
         """Outputs that known initial values fix at the first time: no parameter stands in them there."""
-        put = dict(zip(self._arguments[0], self.initial, strict=True))
+        put = dict(zip(self._symbols["states"], self.initial, strict=True))
         return [
             i
             for i, e in enumerate(self.observed if self.states else ())
@@ -210,14 +218,9 @@ class OdeModel:
         ]
 
     @cached_property
-    def machine(self) -> dict[str, Any]:
-        """Where an integration keeps what it has compiled of this model."""
+    def machine(self) -> dict[Any, Any]:
+        """What has been compiled of this model, by itself and by an integration."""
         return {}
-
-    @property
-    def rates_alone(self) -> bool:
-        """Whether `rates` are the whole right side."""
-        return True
 
     @cached_property
     def with_free_start(self) -> OdeModel:
@@ -237,96 +240,49 @@ class OdeModel:
             t0=None,
         )
 
-    @property
-    def _input_symbols(self) -> list[Any]:
-        return self._arguments[2][1 + len(self.states) + len(self.parameters) :]
+    @cached_property
+    def _affine(self) -> list[Any]:
+        """[A b B] row by row: slopes of the rates by states and inputs, and the rates where these are 0."""
+        states, inputs = self._symbols["states"], self._symbols["inputs"]
+        zero = dict.fromkeys([*states, *inputs], 0)
+        return [
+            e
+            for rate in self.rates
+            for e in (*_jacobian([rate], states), rate.subs(zero), *_jacobian([rate], inputs))
+        ]
 
     @cached_property
-    def _input_exprs(self) -> list[Any]:
-        return _jacobian(self.rates, self._input_symbols)
-
-    @cached_property
-    def _b_exprs(self) -> list[Any]:
-        """The rates at x = 0, u = 0 (only of use where A and B are constant)."""
-        zero = dict.fromkeys([*self._arguments[0], *self._input_symbols], 0)
-        return [e.subs(zero) for e in self.rates]
-
-    @cached_property
-    def _compiled_f(self) -> Compiled:
-        return self._compile(self.rates, (len(self.states),))
-
-    @cached_property
-    def _compiled_f_x(self) -> Compiled:
-        return self._compile(self._a_exprs, (len(self.states), len(self.states)))
-
-    @cached_property
-    def _compiled_f_theta(self) -> Compiled:
-        exprs = _jacobian(self.rates, self._arguments[1])
-        return self._compile(exprs, (len(self.states), len(self.parameters)))
+    def _compiled_affine(self) -> Compiled:
+        parameters, n = self._symbols["parameters"], len(self.states)
+        slopes = [e.diff(p) for p in parameters for e in self._affine]
+        shape = (1 + len(parameters), n, n + 1 + len(self.inputs))
+        return Compiled(parameters, [*self._affine, *slopes], shape)
 
     @cached_property
     def _compiled_point(self) -> Compiled:
-        states, parameters, _ = self._arguments
-        exprs = [e for rate in self.rates for e in (rate, *_jacobian((rate,), [*states, *parameters]))]
-        return self._compile(exprs, (len(states), 1 + len(states) + len(parameters)))
+        by = [*self._symbols["states"], *self._symbols["parameters"]]
+        exprs = [e for rate in self.rates for e in (rate, *_jacobian([rate], by))]
+        return Compiled(self._arguments, exprs, (len(self.states), 1 + len(by)))
 
     @cached_property
     def _compiled_augmented(self) -> Compiled | None:
         """The products f_x S written out, where they are few: quicker than matrices of this size."""
         import sympy
 
-        states, parameters, arguments = self._arguments
+        states, parameters, arguments = self._symbols["states"], self._symbols["parameters"], self._arguments
         n, k = len(states), len(parameters)
-        if sum(e != 0 for e in self._a_exprs) * k > UNROLLED:
+        rows = [_jacobian([rate], states) for rate in self.rates]
+        if not self.rates_alone or k * sum(e != 0 for row in rows for e in row) > UNROLLED:
             return None
         slopes = [[sympy.Dummy() for _ in parameters] for _ in states]
         exprs = list(self.rates)
-        for i, rate in enumerate(self.rates):
-            row = self._a_exprs[i * n : (i + 1) * n]
+        for rate, row in zip(self.rates, rows, strict=True):
             exprs += [
                 rate.diff(p) + sum(e * slopes[m][j] for m, e in enumerate(row) if e != 0)
                 for j, p in enumerate(parameters)
             ]
         symbols = [arguments[0], *states, *(s for row in slopes for s in row), *arguments[1 + n :]]
         return Compiled(symbols, exprs, (n * (1 + k),))
-
-    @cached_property
-    def _compiled_h(self) -> Compiled:
-        return self._compile(self.observed, (len(self.outputs),))
-
-    @cached_property
-    def _compiled_h_x(self) -> Compiled:
-        exprs = _jacobian(self.observed, self._arguments[0])
-        return self._compile(exprs, (len(self.outputs), len(self.states)))
-
-    @cached_property
-    def _compiled_h_theta(self) -> Compiled:
-        exprs = _jacobian(self.observed, self._arguments[1])
-        return self._compile(exprs, (len(self.outputs), len(self.parameters)))
-
-    @cached_property
-    def _compiled_x0(self) -> Compiled:
-        return Compiled(self._arguments[1], self.initial, (len(self.states),))
-
-    @cached_property
-    def _compiled_x0_theta(self) -> Compiled:
-        exprs = _jacobian(self.initial, self._arguments[1])
-        return Compiled(self._arguments[1], exprs, (len(self.states), len(self.parameters)))
-
-    @cached_property
-    def _compiled_matrices(self) -> Compiled:
-        n = len(self.states)
-        both = [
-            e for i in range(n) for e in (*self._a_exprs[i * n : (i + 1) * n], self._b_exprs[i])
-        ]  # [A b], row by row
-        tables = [both, *([e.diff(p) for e in both] for p in self._arguments[1])]
-        return Compiled(self._arguments[1], [e for table in tables for e in table], (len(tables), n, n + 1))
-
-    @cached_property
-    def _compiled_input_matrices(self) -> Compiled:
-        parameters, shape = self._arguments[1], (len(self.states), len(self.inputs))
-        tables = [self._input_exprs, *([e.diff(p) for e in self._input_exprs] for p in parameters)]
-        return Compiled(parameters, [e for table in tables for e in table], (len(tables), *shape))
 
 
 def _jacobian(exprs: Sequence[Any], by: Sequence[Any]) -> list[Any]:

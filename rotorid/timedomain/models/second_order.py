@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,19 +35,15 @@ class SecondOrderModel(OdeModel):
 
     inertia: tuple[Any, ...] = field(repr=False, default=())
 
-    def f(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
-        """Rates of the states, (*B, n_x)."""
-        return np.asarray(super().f(t, x, theta, u) @ self._inverse(theta)[0].T)
+    rates_alone: ClassVar[bool] = False
 
-    def f_x(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
-        """Their derivatives by the states, (*B, n_x, n_x)."""
-        return np.asarray(self._inverse(theta)[0] @ super().f_x(t, x, theta, u))
-
-    def f_theta(self, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike = ()) -> FloatArray:
-        """Their derivatives by the parameters, (*B, n_x, n_p)."""
-        inverse, slopes = self._inverse(theta)
-        bent = np.einsum("pij,...j->...ip", slopes, self.f(t, x, theta, u))
-        return np.asarray(inverse @ (super().f_theta(t, x, theta, u) - bent))
+    def _rates(self, by: str, t: ArrayLike, x: ArrayLike, theta: ArrayLike, u: ArrayLike) -> FloatArray:
+        table, (inverse, slopes) = super()._rates(by, t, x, theta, u), self._inverse(theta)
+        if not by:
+            return np.asarray(table @ inverse.T)
+        if by == "parameters":
+            table = table - np.einsum("pij,...j->...ip", slopes, self.f(t, x, theta, u))
+        return np.asarray(inverse @ table)
 
     def rate(self, t: float, x: FloatArray, theta: FloatArray, u: FloatArray) -> FloatArray:
         """Rates at one point, quickly, (n_x,)."""
@@ -60,37 +56,16 @@ class SecondOrderModel(OdeModel):
         table[:, 1 + len(x) :] -= inverse @ (slopes @ table[:, 0]).T
         return table
 
-    def matrices(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """A (n_x, n_x), b (n_x,), ∂A/∂θ (n_p, n_x, n_x), ∂b/∂θ (n_p, n_x) of a linear model."""
-        a, b, da, db = super().matrices(theta)
-        inverse, slopes = self._inverse(theta)
-        a, b = inverse @ a, inverse @ b
-        return a, b, inverse @ (da - slopes @ a), (db - slopes @ b) @ inverse.T
-
-    def input_matrices(self, theta: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """B (n_x, n_u) of a linear model with inputs, and ∂B/∂θ (n_p, n_x, n_u)."""
-        matrix, slopes_b = super().input_matrices(theta)
-        inverse, slopes = self._inverse(theta)
-        matrix = inverse @ matrix
-        return matrix, inverse @ (slopes_b - slopes @ matrix)
-
-    @cached_property
-    def _last(self) -> dict[bytes, tuple[FloatArray, FloatArray]]:
-        return {}
-
-    @property
-    def rates_alone(self) -> bool:
-        """No: E belongs to them."""
-        return False
-
-    @cached_property
-    def _compiled_augmented(self) -> None:
-        """Not written out: E is solved numerically."""
-        return None
+    def matrices(self, theta: ArrayLike) -> FloatArray:
+        """[A b B], then its derivatives by each parameter, (1 + n_p, n_x, n_x + 1 + n_u)."""
+        table, (inverse, slopes) = super().matrices(theta), self._inverse(theta)
+        table[0] = inverse @ table[0]
+        table[1:] = inverse @ (table[1:] - slopes @ table[0])
+        return table
 
     @cached_property
     def _compiled_inertia(self) -> Compiled:
-        n, parameters = len(self.states), self._arguments[1]
+        n, parameters = len(self.states), self._symbols["parameters"]
         slopes = [e.diff(p) for p in parameters for e in self.inertia]
         return Compiled(parameters, [*self.inertia, *slopes], (1 + len(parameters), n, n))
 
@@ -98,14 +73,14 @@ class SecondOrderModel(OdeModel):
         """E⁻¹ and ∂E/∂θ (n_p, n_x, n_x), kept for the latest parameters."""
         values = self._theta(theta)
         key = values.tobytes()
-        if key not in self._last:
+        if self.machine.get("inertia", [None])[0] != key:
             table = self._compiled_inertia.one(values.tolist())
             if not np.isfinite(table).all() or np.linalg.cond(table[0]) > 1e14:
                 shown = ", ".join(f"{n} = {v:.4g}" for n, v in zip(self.parameters, values, strict=True))
                 raise SimulationError(f"the mass matrix is singular at {shown or 'the known values'}")
-            self._last.clear()
-            self._last[key] = np.linalg.inv(table[0]), table[1:]
-        return self._last[key]
+            self.machine["inertia"] = key, np.linalg.inv(table[0]), table[1:]
+        _, inverse, slopes = self.machine["inertia"]
+        return inverse, slopes
 
 
 def second_order(  # noqa: PLR0913

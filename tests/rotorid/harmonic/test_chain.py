@@ -6,7 +6,7 @@ from harmonic_cases import simulate
 
 from rotorid.harmonic import identify
 from rotorid.harmonic.experiments import AmplitudeErrors
-from rotorid.harmonic.model import harmonic_model
+from rotorid.harmonic.operator_equations import harmonic_model
 
 N = 20
 ERRORS = AmplitudeErrors(relative=0.001, phase=0.001)

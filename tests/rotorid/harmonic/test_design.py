@@ -10,7 +10,7 @@ from harmonic_cases import STATED, simulate, task51, two_masses
 
 from rotorid.harmonic.design import d_optimal, design
 from rotorid.harmonic.experiments import AmplitudeErrors
-from rotorid.harmonic.model import harmonic_model
+from rotorid.harmonic.operator_equations import harmonic_model
 from rotorid.harmonic.output_error import output_error
 
 

@@ -1,5 +1,6 @@
 """Lifting and merging: what data can see at best, in words."""
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -7,10 +8,12 @@ import pytest
 from harmonic_cases import FEEDBACK, PUMP, ROTOR
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sympy import Rational, Symbol
 
+from rotorid.expressions import ExpressionError, parse
 from rotorid.harmonic import harmonic_model
 from rotorid.harmonic.features import combination_words
-from rotorid.harmonic.polynomial import add, multiply, power, times
+from rotorid.harmonic.polynomial import difference
 
 
 @pytest.mark.parametrize(
@@ -75,29 +78,40 @@ def test_words(terms, words):
     assert combination_words({m: {(): Fraction(x)} for m, x in terms.items()}) == words
 
 
-NAMES = st.sampled_from("abc")
-MONOMIALS = st.lists(st.tuples(NAMES, st.integers(-2, 3)), max_size=3).map(
-    lambda parts: times((), tuple(sorted((n, e) for n, e in dict(parts).items() if e)))
-)
-POLYNOMIALS = st.dictionaries(MONOMIALS, st.fractions(-5, 5, max_denominator=7).filter(bool), max_size=4)
 POINT = {"a": Fraction(2, 3), "b": Fraction(-5, 4), "c": Fraction(7)}
+EXPRESSIONS = st.recursive(
+    st.sampled_from(["a", "b", "c", "2", "0.3", "(a + 1)", "(b - c)", "sqrt(b)"]),
+    lambda inner: st.one_of(
+        st.tuples(inner, st.sampled_from("+-*/"), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
+        st.tuples(inner, st.integers(-2, 3)).map(lambda t: f"({t[0]})**{t[1]}"),
+    ),
+    max_leaves=6,
+)
 
 
-def value(polynomial):
-    total = Fraction(0)
-    for monomial, x in polynomial.items():
-        for name, e in monomial:
-            x *= POINT[name] ** e
-        total += x
-    return total
-
-
-@given(POLYNOMIALS, POLYNOMIALS, st.integers(0, 3))
+@given(EXPRESSIONS)
 @settings(deadline=None, max_examples=100)
-def test_polynomial_arithmetic_agrees_with_numbers(a, b, n):
-    assert value(add(a, b, -1)) == value(a) - value(b)
-    assert value(multiply(a, b)) == value(a) * value(b)
-    assert value(power(a, n)) == value(a) ** n
+def test_what_is_multiplied_out_agrees_with_numbers(text):
+    """F·(expression) − 1 over the denominators is 0 where F is the inverse of the expression there."""
+    try:
+        expression = parse(f"F*({text})")
+        polynomial, _ = difference(expression, parse("1"), lambda _: Fraction(3, 5))
+    except (ExpressionError, ValueError, ZeroDivisionError):
+        return  # such as a division by zero
+    value = expression.replace(lambda e: e.is_Pow and not e.exp.is_Integer, lambda _: Rational(3, 5))
+    value = value.subs({name: Rational(str(x)) for name, x in POINT.items()})
+    if not value.is_finite:
+        return
+    slope = value.coeff(Symbol("F"))
+    point = {**POINT, "F": 1 / Fraction(int(slope.p), int(slope.q))} if slope else POINT
+    total = sum(
+        (
+            x * math.prod(point.get(name, 0) ** e for name, e in monomial)
+            for monomial, x in polynomial.items()
+        ),
+        Fraction(0),
+    )
+    assert total == 0 or not slope
 
 
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(2, 5), st.integers(2, 5))

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
-from rotorid.harmonic.model import harmonic_model
-from rotorid.harmonic.operator import operator_of
+from rotorid.harmonic.operator_equations import harmonic_model
 from rotorid.harmonic.output_error import output_error
 
 EVERYTHING = ("c1", "c", "c2", "a1", "a", "a2")
@@ -58,7 +57,7 @@ def test_the_jacobian_of_forced_amplitudes_is_exact(seed):
     rng = np.random.default_rng(seed)
     model, truth, w, inputs = two_masses(EVERYTHING)
     data = simulate(model, truth, w, inputs, STATED, rng, stated=STATED)
-    comparison = compare(operator_of(model), data)
+    comparison = compare(model, data)
     x = truth * (1 + 0.05 * rng.standard_normal(len(truth)))
     J = comparison.jacobian(x)
     expected = numeric_jacobian(comparison.residual, x)
@@ -72,7 +71,7 @@ def test_the_jacobian_of_products_of_parameters_is_exact():
     )  # fmt: skip
     x = np.array([9.0, 0.6, 0.7])
     data = simulate(model, np.array([10, 0.5, 0.8]), np.array([1.0, 2.0, 3.0]), {"f": 1.0})
-    comparison = compare(operator_of(model), data)
+    comparison = compare(model, data)
     expected = numeric_jacobian(comparison.residual, x)
     np.testing.assert_allclose(comparison.jacobian(x), expected, atol=1e-8 * np.abs(expected).max())
 
@@ -80,7 +79,7 @@ def test_the_jacobian_of_products_of_parameters_is_exact():
 @pytest.mark.parametrize("estimate", [("c1", "c2", "c3"), ("c1", "c2", "c3", "m2", "m3")])
 def test_the_jacobian_of_natural_modes_is_exact(estimate):
     model, truth, w, shapes = chain3(estimate)
-    comparison = compare(operator_of(model), vibrations(model, w, shapes))
+    comparison = compare(model, vibrations(model, w, shapes))
     x = truth * (1 + 0.02 * np.sin(np.arange(len(truth))))
     expected = numeric_jacobian(comparison.residual, x)
     np.testing.assert_allclose(
@@ -91,7 +90,7 @@ def test_the_jacobian_of_natural_modes_is_exact(estimate):
 def test_predicted_amplitudes_are_those_of_the_model():
     model, truth, w, inputs = two_masses(EVERYTHING)
     data = simulate(model, truth, w, inputs)
-    Z, _ = operator_of(model).forced(truth, w, np.full((len(w), 1), 100.0 + 0j))
+    Z, _ = model.forced(truth, w, np.full((len(w), 1), 100.0 + 0j))
     np.testing.assert_allclose(Z, np.stack([data.signals["X1"], data.signals["X2"]], 1), rtol=1e-12)
 
 

@@ -157,12 +157,12 @@ def test_the_form_with_settings(tmp_path):
     )
     book = openpyxl.load_workbook(path)
     keys = [cell.value for cell in book["settings"]["A"]]
-    assert read_job(path).conventions.phase == "lead"
+    assert read_job(path).conventions.labels.phase == "lead"
     for key, value in (("phase", "lag"), ("errors.phase_deg", "1,5")):
         book["settings"].cell(keys.index(key) + 1, 2).value = value
     book.save(path)
     job = read_job(path)
-    assert (job.conventions.phase, job.left_out) == ("lag", ("1",))
+    assert (job.conventions.labels.phase, job.left_out) == ("lag", ("1",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
     sheet = tmp_path / "sheet.xlsx"
     sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.timedomain import Record, SimulationError, ode_model, simulate
-from rotorid.timedomain.integration.matrix_exponential import expm_and_derivatives
+from rotorid.timedomain.integration.propagation import expm_and_derivatives
 
 CHAIN_START = {"y1": 0.5, "v1": 0.1, "y2": -0.2, "v2": -0.1, "y3": 0.3, "v3": 0.1}
 
@@ -338,7 +338,6 @@ def test_an_output_without_value_is_an_error():
         ({"method": "euler"}, "integrator 'euler' is not known: one of auto, expm"),
         ({"method": "expm"}, "expm solves linear models"),
         ({"rtol": 0.0}, "rtol must be between"),
-        ({"atol": -1.0}, "atol must be above 0"),
         ({"theta": [1.0]}, "theta must be 3 finite numbers"),
         ({"theta": [1.0, np.nan, 1.0]}, "theta must be 3 finite numbers"),
         ({"record": [0, 2, 1]}, "the times must increase"),
