@@ -1,6 +1,6 @@
 """The proof: every printed number of the references beside what the program computes now.
 
-`validate()` asks each provider (`rotor`, `masses`, `lessons`, `time_records`, `balancing`) for its rows.
+`validate()` asks each provider (`PROVIDERS`, a module each) for its rows.
 Nothing is stored but what is printed; all else is computed by the public functions when it is asked for.
 """
 
@@ -181,11 +181,11 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
             raise ValueError(
                 f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
             )
-    from rotorid.validation import balancing, equivalent_masses, identification, rotor, time_records
+    from rotorid.validation import balancing, formula_50, identification, rotor, time_records
 
     rows = {
         "rotor": rotor.rows,
-        "masses": equivalent_masses.rows,
+        "masses": formula_50.rows,
         "lessons": identification.rows,
         "time_records": time_records.rows,
         "balancing": balancing.rows,

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from rotorid.validation import PROVIDERS, equivalent_masses
+from rotorid.validation import PROVIDERS, formula_50
 
 KEYS = {"source", "quantity", "printed", "computed", "difference", "tolerance", "status", "note"}
 
@@ -50,9 +50,9 @@ def test_text_ends_with_the_counts(cli, some):
 
 
 def test_numbers_that_differ_end_with_status_1_and_are_named(cli, some, monkeypatch, tmp_path):
-    right = equivalent_masses.equivalent_masses
+    right = formula_50.equivalent_masses
     monkeypatch.setattr(
-        "rotorid.validation.equivalent_masses.equivalent_masses", lambda a, *more: right(a * 1.01, *more)
+        "rotorid.validation.formula_50.equivalent_masses", lambda a, *more: right(a * 1.01, *more)
     )
     table = tmp_path / "numbers.csv"
     outcome = cli("validate", "--output", table)

@@ -17,7 +17,7 @@ mpl.use("Agg")
 def drawn(monkeypatch):
     """Figures that were drawn, in order."""
     figures = []
-    monkeypatch.setattr(pictures, "inline_svg", lambda figure, _: figures.append(figure) or "")
+    monkeypatch.setattr(rotor_figures, "inline_svg", lambda figure, _: figures.append(figure) or "")
     return figures
 
 

@@ -18,7 +18,7 @@ import fem.matrices.elements
 from rotorid.reduction import equivalent_masses
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
-from rotorid.validation import PROVIDERS, Group, Validation, equivalent_masses, row, validate
+from rotorid.validation import PROVIDERS, Group, Validation, formula_50, row, validate
 from rotorid.validation.row import half_unit, number, printed_table, tables
 
 DATA = Path(__file__).parents[2] / "data"
@@ -208,10 +208,10 @@ def test_known_errata(proof, source, quantity, printed, corrected):
 
 
 def test_the_condition_numbers_of_the_reasons():
-    exact = equivalent_masses.of_rotor(read_rotor(sample_data() / "rotor23.csv"))
+    exact = formula_50.of_rotor(read_rotor(sample_data() / "rotor23.csv"))
     for modes, reason, condition in (
-        (1, equivalent_masses.THREE_DIGITS, 63),
-        (2, equivalent_masses.TWO_MODES, 18),
+        (1, formula_50.THREE_DIGITS, 63),
+        (2, formula_50.TWO_MODES, 18),
     ):
         assert f"condition number {condition})" in reason
         estimate = equivalent_masses(exact.alpha, exact.omega[:modes], exact.shapes[:, :modes])
@@ -263,7 +263,7 @@ def unstretched(function):
             8,
         ),
         (
-            "rotorid.validation.equivalent_masses.natural_frequencies",
+            "rotorid.validation.formula_50.natural_frequencies",
             lambda f: scaled(f, 1.00001),
             "masses",
             6,
@@ -385,7 +385,7 @@ def test_a_group_that_fails_is_said_and_the_others_are_shown(cli, monkeypatch):
 
     for module in (balancing, identification, time_records):
         monkeypatch.setattr(module, "rows", list)
-    monkeypatch.setattr(masses, "rows", broken)
+    monkeypatch.setattr(formula_50, "rows", broken)
     found = rotorid.validation.validate(["masses", "rotor"])
     assert not found.holds
     assert [group.failure for group in found.groups] == ["KeyError: 'a table is gone'", ""]
