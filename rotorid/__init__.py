@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from rotorid.regression import stack as stack
     from rotorid.regression import stretch as stretch
     from rotorid.regression import unstretch as unstretch
-    from rotorid.regression.estimate import Combination as Combination
     from rotorid.regression.estimate import Estimate as Estimate
+    from rotorid.regression.undetermined_combinations import Combination as Combination
     from rotorid.tables import InputError as InputError
     from rotorid.tables import Job as Job
     from rotorid.tables import read_compliance as read_compliance

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
     from matplotlib.figure import Figure
 
-    from rotorid.workflows.outcome import Outcome
+    from rotorid.workflows.result_provenance import Outcome
 
 _O = TypeVar("_O", bound="DataclassInstance")
 _R = TypeVar("_R", bound="Outcome")
@@ -73,7 +73,7 @@ def deliver(
     """
     from rotorid.cli.verbose import note
     from rotorid.tables.reader.problems import printable
-    from rotorid.tables.reader.writing import table_bytes, write_files
+    from rotorid.tables.reader.table_writing import table_bytes, write_files
 
     with busy(what):
         found = work()

@@ -28,8 +28,9 @@ from rotorid.harmonic.polynomial_solutions import System
 from rotorid.harmonic.regression_rows import Rows, build_rows, row_covariance, whiten
 from rotorid.harmonic.result import FoundCombination, Identification
 from rotorid.regression import least_squares
-from rotorid.regression.estimate import Estimate, echelon
+from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
+from rotorid.regression.undetermined_combinations import echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 

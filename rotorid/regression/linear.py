@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor
+from rotorid.regression.estimate import Estimate, coverage_factor
+from rotorid.regression.undetermined_combinations import WORD_TOLERANCE, Combination
 
 __all__ = [
     "Combination",

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
-from rotorid.tables.job.keys import JOB
-from rotorid.tables.reader.key import Key, file_schema
+from rotorid.tables.job.job_keys import JOB
+from rotorid.tables.reader.settings_keys import Key, file_schema
 
 FILES: dict[str, tuple[str, Sequence[Key]]] = {"job": ("Job file of rotorid", JOB)}
 """What the file is, and its keys, by the names that `rotorid schema` takes."""

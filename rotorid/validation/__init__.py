@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.text import listing, sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
-from rotorid.workflows.outcome import Outcome, provenance
+from rotorid.workflows.result_provenance import Outcome, provenance
 
 if TYPE_CHECKING:
     import pandas as pd

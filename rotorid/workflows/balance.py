@@ -15,7 +15,7 @@ from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.other_conventions import with_contradiction, with_other_readings
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     )
     from rotorid.base.registry import Method
     from rotorid.tables import Job
-    from rotorid.tables.job.source import JobSource
+    from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
 
     JobGiven = Job | Path | str | Sequence[Path | str]
@@ -253,7 +253,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     from balancing import compare_check
-    from rotorid.tables.job.source import JobSource
+    from rotorid.tables.job.job_as_written import JobSource
 
     options = options or BalanceOptions()
     _check(options)
@@ -304,8 +304,8 @@ def _check(options: BalanceOptions) -> None:
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
     from rotorid.tables import Job
+    from rotorid.tables.job.job_as_written import JobSource
     from rotorid.tables.job.job_data import Overrides
-    from rotorid.tables.job.source import JobSource
 
     stored = None if options.influence is None else Path(options.influence)
     errors = options.amplitude_error, options.phase_error, options.run_error
@@ -320,7 +320,7 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
 
 def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.source import JobSource
+    from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.option_quantities import limited
 
     if isinstance(source, JobSource):

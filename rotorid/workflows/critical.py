@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,7 +13,7 @@ from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.option_values import number, pairs
-from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -268,7 +268,7 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
 
 def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
-    from rotorid.tables.reader.number import NotANumber, check_size
+    from rotorid.tables.reader.decimal_numbers import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
         if name not in outputs:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.suggestions import one_of
 from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.option_values import Speeds, speeds
-from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,7 +22,7 @@ from rotorid.workflows.option_values import (
     option_name,
     rising_speeds,
 )
-from rotorid.workflows.outcome import log, provenance, workflow
+from rotorid.workflows.result_provenance import log, provenance, workflow
 
 if TYPE_CHECKING:
     from fem import Rotor

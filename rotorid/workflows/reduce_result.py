@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.text import counted
 from rotorid.workflows.option_values import one_of
-from rotorid.workflows.outcome import Outcome
+from rotorid.workflows.result_provenance import Outcome
 
 if TYPE_CHECKING:
     import pandas as pd

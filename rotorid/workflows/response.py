@@ -21,7 +21,7 @@ from rotorid.workflows.option_values import (
     rising_speeds,
     sensors,
 )
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.input_checks import changed
 from rotorid.workflows.option_values import degrees, option_name, pairs
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

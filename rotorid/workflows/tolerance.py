@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid.workflows.outcome import Found, provenance, workflow
+from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

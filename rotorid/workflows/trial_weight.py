@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from rotorid.workflows.input_checks import changed, job_source
 from rotorid.workflows.option_values import Names, degrees, names, number, one_of, option_name
-from rotorid.workflows.outcome import Outcome, log, provenance, workflow
+from rotorid.workflows.result_provenance import Outcome, log, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,7 +181,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     from balancing.data.conventions import Labels
     from balancing.trial_weight import trial_from_force
     from rotorid.tables.reader import units
-    from rotorid.tables.runs.conventions import as_angles, as_phase
+    from rotorid.tables.runs.stated_conventions import as_angles, as_phase
     from rotorid.workflows.option_quantities import mass, size, speed_with_unit
 
     missing = [name for name in ("speed", "radius") if getattr(options, name) is None]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.input_checks import job_source
 from rotorid.workflows.option_values import Nodes, nodes
-from rotorid.workflows.outcome import Found, provenance, workflow
+from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance

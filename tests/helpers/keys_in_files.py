@@ -1,17 +1,17 @@
 """The tables of keys of a job in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
 
 from rotorid.samples import sample_data
-from rotorid.tables.job import keys
-from rotorid.tables.reader.key import key_lines
+from rotorid.tables.job import job_keys
+from rotorid.tables.reader.settings_keys import key_lines
 
 PAGE = sample_data().parent / "docs" / "files.md"
 TABLES = {
-    "key": keys.JOB,
-    "key of [errors]": keys.ERRORS,
-    "key of [key_phasor]": keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": keys.VECTOR,
-    "key of [planes.NAME]": keys.PLANE,
-    "key of [sensors.NAME]": keys.SENSOR,
+    "key": job_keys.JOB,
+    "key of [errors]": job_keys.ERRORS,
+    "key of [key_phasor]": job_keys.KEY_PHASOR,
+    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
+    "key of [planes.NAME]": job_keys.PLANE,
+    "key of [sensors.NAME]": job_keys.SENSOR,
 }
 
 

@@ -122,7 +122,7 @@ def _write_template(path: Path, files: Sequence[Path]) -> None:
         filled in already.
     """
     from rotorid.tables.job.workbook_template import template_bytes
-    from rotorid.tables.reader.writing import write_bytes
+    from rotorid.tables.reader.table_writing import write_bytes
 
     if files:
         raise ValueError(

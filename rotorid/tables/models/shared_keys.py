@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from rotorid.tables.reader.number import LARGEST
+from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:

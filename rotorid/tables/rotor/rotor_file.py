@@ -13,7 +13,7 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.rotor.bearing import bearing_tables, read_support
-from rotorid.tables.rotor.plausible import warn_of_value
+from rotorid.tables.rotor.rotor_plausibility import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
 
 _TINY = sys.float_info.min

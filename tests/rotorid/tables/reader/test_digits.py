@@ -14,7 +14,7 @@ from balancing import estimate_influence
 from balancing.correction.refine_coefficients import refine
 from balancing.data.trials import ReadingErrors
 from rotorid.tables import read_job, read_trials
-from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 from rotorid.tables.reader.digits import written_steps
 from rotorid.tables.reader.grid import Shown

@@ -10,10 +10,10 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
 
 from rotorid.tables import read_harmonic_model, read_ode_model, read_rotor, read_trials
-from rotorid.tables.reader import grid, input_file, text_file, workbook
+from rotorid.tables.reader import excel_workbook, grid, input_file, text_file
+from rotorid.tables.reader.excel_workbook import read_workbook
 from rotorid.tables.reader.input_file import each_file_once, file_content
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.reader.workbook import read_workbook
 
 
 @pytest.fixture
@@ -37,18 +37,18 @@ def words(path):
     ],
 )
 def test_a_workbook_beyond_a_limit(book, monkeypatch, limit, value, expected):
-    monkeypatch.setattr(workbook, limit, value)
+    monkeypatch.setattr(excel_workbook, limit, value)
     assert expected in words(book)
 
 
-@pytest.mark.parametrize(("size", "most"), [(1_000_000, 500_000), (20_000_000, workbook.MOST_UNPACKED)])
+@pytest.mark.parametrize(("size", "most"), [(1_000_000, 500_000), (20_000_000, excel_workbook.MOST_UNPACKED)])
 def test_a_bomb_is_not_unpacked(book, monkeypatch, size, most):
     stream = io.BytesIO(book.read_bytes())
     with zipfile.ZipFile(stream, "a", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("xl/media/x.bin", b"\0" * size)
     book.write_bytes(stream.getvalue())
-    monkeypatch.setattr(workbook, "MOST_UNPACKED", most)
-    monkeypatch.setattr(workbook, "_sheets", lambda *_: pytest.fail("read"))
+    monkeypatch.setattr(excel_workbook, "MOST_UNPACKED", most)
+    monkeypatch.setattr(excel_workbook, "_sheets", lambda *_: pytest.fail("read"))
     assert f"{size // 10**6} MB" in words(book)
 
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.job.keys import CELLS, PLANE, SENSOR, TABLES
+from rotorid.tables.job.job_keys import CELLS, PLANE, SENSOR, TABLES
 from rotorid.tables.reader.columns import REMARKS, sheet_source
+from rotorid.tables.reader.decimal_numbers import NotANumber, decimal_comma, parse_number
+from rotorid.tables.reader.excel_workbook import is_workbook, read_workbook
 from rotorid.tables.reader.grid import BadCell, Cell, Grid, Row, is_comment, make_grid, show
-from rotorid.tables.reader.number import NotANumber, decimal_comma, parse_number
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.reader.workbook import is_workbook, read_workbook
 
 NAMED = {"planes": ("plane", PLANE), "sensors": ("sensor", SENSOR)}
 """Sheets with a row for each plane or sensor: the column of its name, and keys that are columns."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rotorid.base.suggestions import did_you_mean, suggest
 from rotorid.tables import read_trials
 from rotorid.tables.reader import units
-from rotorid.tables.reader.number import NotANumber, parse_number, thousands_or_decimals
+from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number, thousands_or_decimals
 from rotorid.tables.reader.problems import InputError, Problem, Problems
 
 

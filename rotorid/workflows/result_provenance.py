@@ -1,4 +1,4 @@
-"""What every workflow gives: a document with its provenance, a text, a table; and how its work is told."""
+"""Result of a workflow: a document with its provenance (version, hashes of files, options), text, table."""
 
 from __future__ import annotations
 

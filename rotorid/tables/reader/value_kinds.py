@@ -9,8 +9,8 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.key import Key, Kind, object_schema, take
-from rotorid.tables.reader.number import NotANumber, check_size, has_decimal_comma, parse_number
+from rotorid.tables.reader.decimal_numbers import NotANumber, check_size, has_decimal_comma, parse_number
+from rotorid.tables.reader.settings_keys import Key, Kind, object_schema, take
 from rotorid.tables.reader.toml_file import Section
 
 _TEXT = {"type": "string"}

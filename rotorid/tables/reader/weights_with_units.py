@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from rotorid.tables.reader import units
-from rotorid.tables.reader.key import Quantity
+from rotorid.tables.reader.settings_keys import Quantity
 
 
 def in_job_units(weight: Quantity, unit: str, radius: float | None) -> tuple[float, ...] | None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.tables.reader.pages import Page, book_bytes
+from rotorid.tables.reader.excel_pages import Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problem
 
 if TYPE_CHECKING:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from rotorid.tables.job.job_data import Job, Overrides
-from rotorid.tables.job.keys import LARGEST, TABLES
+from rotorid.tables.job.job_from_excel import WrittenJob, open_job
+from rotorid.tables.job.job_keys import LARGEST, TABLES
 from rotorid.tables.job.readings import overriding_errors
-from rotorid.tables.job.workbook_reading import WrittenJob, open_job
 from rotorid.tables.reader.columns import read_grid
 from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.key import Quantity
 from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.settings_keys import Quantity
 from rotorid.tables.reader.text_file import read_bytes
 
 _SHEET = {"influence": "influence", "weights": "weights", "check_weights": "weights"}

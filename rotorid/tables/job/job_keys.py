@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from rotorid.tables.reader import kinds, units
-from rotorid.tables.reader.key import Key, Kind
-from rotorid.tables.reader.kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
+from rotorid.tables.reader import units, value_kinds
+from rotorid.tables.reader.settings_keys import Key, Kind
 from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.runs.conventions import (
+from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, TURN, number, plain_number
+from rotorid.tables.runs.stated_conventions import (
     DEFAULT_TOLERANCE,
     LARGEST_TOLERANCE,
     PHASES,
@@ -180,7 +180,9 @@ def by_speed(what: str, example: str, *, above_zero: bool, alone: bool) -> Kind:
         single = None if isinstance(value, (str, dict)) or not alone else plain(value, above_zero=above_zero)
         if single is not None:
             return {"": single}
-        value = kinds.entries(section, key, value, f'{example}, in a sheet "3000: 20; 4500: 30"', "speed")
+        value = value_kinds.entries(
+            section, key, value, f'{example}, in a sheet "3000: 20; 4500: 30"', "speed"
+        )
         if not isinstance(value, dict) or not value:
             if key not in section.refused:
                 section.complain(key, example)
@@ -251,8 +253,8 @@ _ARCS = Kind(
     "[[20, 60], [300, 340]]",
     "name",
 )
-_ANGLES = kinds.numbers(_DEG, "0; 30; 75")
-_COUNTS = kinds.numbers(_STOCK, "4; 4; 2")
+_ANGLES = value_kinds.numbers(_DEG, "0; 30; 75")
+_COUNTS = value_kinds.numbers(_STOCK, "4; 4; 2")
 _NAMES = Kind(
     _hole_names,
     {"anyOf": [{"type": "array", "items": {"type": ["string", "integer"]}, "minItems": 1}, TEXT.schema]},
@@ -287,7 +289,7 @@ _PLANE = (
 HOLES = (
     Key(
         "holes",
-        kinds.whole("the number of holes, equally spaced", 1, MOST_HOLES),
+        value_kinds.whole("the number of holes, equally spaced", 1, MOST_HOLES),
         "a number of equally spaced holes",
     ),
     Key("first_hole_deg", TURN, "angle of the first of them, default 0", default=0.0),
@@ -295,20 +297,20 @@ HOLES = (
     Key("hole_names", _NAMES, "names of the holes instead of the numbers 1, 2, …"),
     Key(
         "available_g available_g_mm",
-        kinds.numbers(_AVAILABLE, "5; 10; 20", above_zero=True),
+        value_kinds.numbers(_AVAILABLE, "5; 10; 20", above_zero=True),
         "weights, in any unit, of which each can be mounted in a hole",
         units.WEIGHT,
     ),
     Key("step_g step_g_mm", ABOVE_ZERO, "or any weight in such steps", units.WEIGHT),
     Key(
         "per_hole",
-        kinds.whole("how many weights one hole takes", 1, 100),
+        value_kinds.whole("how many weights one hole takes", 1, 100),
         "how many weights one hole takes, default 1",
         default=1,
     ),
     Key(
         "taken",
-        kinds.by_name(_TAKEN, "3: 10; 5: 20"),
+        value_kinds.by_name(_TAKEN, "3: 10; 5: 20"),
         "weights that are in holes already, by number or name of the hole",
         default={},
     ),
@@ -344,7 +346,7 @@ ERRORS = (
     Key("run_percent", number(0.0), "what changes from run to run, one standard deviation, percent"),
     Key("run_floor", number(0.0), "the same at amplitude 0, in the unit of the readings"),
 )
-_STATED = kinds.table(ERRORS)
+_STATED = value_kinds.table(ERRORS)
 KEY_PHASOR = (
     Key(
         "angle_deg",
@@ -368,7 +370,7 @@ VECTOR = (
         required="the phase at slow speed, counted as the readings count it",
     ),
 )
-_VECTORS = kinds.named(VECTOR)
+_VECTORS = value_kinds.named(VECTOR)
 JOB = (
     Key("runs", FILE, "the runs table, relative to the job file"),
     Key("weights", FILE, "the weights table"),
@@ -382,7 +384,7 @@ JOB = (
         "a runs table of one run at slow speed, to be subtracted from every reading; or "
         "`[slow_roll.SENSOR]`, see below",
     ),
-    Key("key_phasor", kinds.table(KEY_PHASOR), "where the key phasor stands, see below"),
+    Key("key_phasor", value_kinds.table(KEY_PHASOR), "where the key phasor stands, see below"),
     Key(
         "speed_weights",
         by_speed(
@@ -396,22 +398,22 @@ JOB = (
     ),
     Key(
         "phase",
-        kinds.choice(PHASES),
+        value_kinds.choice(PHASES),
         "whether a positive phase leads or lags; most instruments show lag, the angle that the rotor turns "
         "from the pulse to the positive peak; unstated: lead, the answer says so and what lag gives",
     ),
     Key(
         "angles",
-        kinds.choice(STATED_ANGLES),
+        value_kinds.choice(STATED_ANGLES),
         "how angles on the rotor count: with rotation, against rotation, or clockwise or counter-clockwise "
         "with `rotation`; unstated: with rotation, named so where an angle other than 0° and 180° is written",
     ),
     Key(
         "rotation",
-        kinds.choice(ROTATIONS),
+        value_kinds.choice(ROTATIONS),
         "how the rotor turns, seen from the same end as the angles",
     ),
-    Key("view", kinds.choice(VIEWS), "the end from which that is seen"),
+    Key("view", value_kinds.choice(VIEWS), "the end from which that is seen"),
     Key(
         "speed_tolerance_percent",
         number(0.0, LARGEST_TOLERANCE),
@@ -424,8 +426,8 @@ JOB = (
         "one standard deviation of a reading, see below; unstated and unmeasured ones are assumed (2 % and "
         "2° of a reading, 2 % from run to run) and named so; the digits in which readings are written count",
     ),
-    Key("planes", kinds.named(PLANE), "see below", default={}),
-    Key("sensors", kinds.named(SENSOR), "see below", default={}),
+    Key("planes", value_kinds.named(PLANE), "see below", default={}),
+    Key("sensors", value_kinds.named(SENSOR), "see below", default={}),
 )
 CELLS = {name: key.kind.cell for keys in (JOB, PLANE, SENSOR) for key in keys for name in key.names}
 CELLS["station"] = "name"

@@ -5,27 +5,27 @@ from __future__ import annotations
 import pytest
 from cases import each_of
 
-from rotorid.tables.reader import kinds, units
-from rotorid.tables.reader.key import Key, Quantity, file_schema, key_lines, object_schema, take
+from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.tables.reader.settings_keys import Key, Quantity, file_schema, key_lines, object_schema, take
 from rotorid.tables.reader.toml_file import Section
 
 WEIGHT = {**units.MASS, **units.UNBALANCE}
 INNER = (
-    Key("size", kinds.number(0.0, 10.0), "how large", required="the size"),
-    Key("name", kinds.TEXT, "a label", default="none"),
+    Key("size", value_kinds.number(0.0, 10.0), "how large", required="the size"),
+    Key("name", value_kinds.TEXT, "a label", default="none"),
 )
 KEYS = (
-    Key("most_g most_g_mm", kinds.ABOVE_ZERO, "largest weight", WEIGHT),
-    Key("amplitude", kinds.number(0.0), "`amplitude_<unit>` too", units.vibration),
-    Key("kind", kinds.choice(("one", "two")), "which", default="one"),
-    Key("use", kinds.FLAG, "`false`: not used", default=True),
-    Key("holes", kinds.whole("the number of holes", 1, 9), "how many"),
-    Key("angles_deg", kinds.numbers("angles, such as [0, 90]", "0; 90"), "where"),
-    Key("taken", kinds.by_name('weights, such as { "3" = 10 }', "3: 10; 5: 20"), "what is there"),
-    Key("model", kinds.table(INNER), "one table"),
-    Key("planes", kinds.named(INNER), "tables by name"),
-    Key("disc", kinds.each(INNER), "many tables"),
+    Key("most_g most_g_mm", value_kinds.ABOVE_ZERO, "largest weight", WEIGHT),
+    Key("amplitude", value_kinds.number(0.0), "`amplitude_<unit>` too", units.vibration),
+    Key("kind", value_kinds.choice(("one", "two")), "which", default="one"),
+    Key("use", value_kinds.FLAG, "`false`: not used", default=True),
+    Key("holes", value_kinds.whole("the number of holes", 1, 9), "how many"),
+    Key("angles_deg", value_kinds.numbers("angles, such as [0, 90]", "0; 90"), "where"),
+    Key("taken", value_kinds.by_name('weights, such as { "3" = 10 }', "3: 10; 5: 20"), "what is there"),
+    Key("model", value_kinds.table(INNER), "one table"),
+    Key("planes", value_kinds.named(INNER), "tables by name"),
+    Key("disc", value_kinds.each(INNER), "many tables"),
 )
 
 
