@@ -1,4 +1,4 @@
-"""Peaks of a response: critical speed, amplification factor and separation margin after API 684.
+"""Peaks of a response after API 684: critical speed, amplification factor, separation margin.
 
 Definitions of API Recommended Practice 684 (2nd edition, 2005, standard paragraphs SP6.8.2) and API 617: the
 critical speed N_c is that of the peak; the amplification factor is AF = N_c / (N₂ − N₁), N₁ and N₂ the speeds

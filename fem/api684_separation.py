@@ -1,4 +1,4 @@
-"""Separation of critical speeds from the operating range (API 684)."""
+"""Separation margin of critical speeds from the operating range (API 684)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which modes a Campbell diagram shows: followed over speed, so many as asked for, with speeds between.
+"""Modes that a Campbell diagram shows: followed over speed, so many as asked for, with speeds between.
 
 Over bearing tables two crossings of the 1× line may lie between two speeds: there speeds are added.
 """

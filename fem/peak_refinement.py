@@ -1,4 +1,4 @@
-"""More speeds around the peaks of a response, so that the steps asked for do not matter."""
+"""Refined speeds around the peaks of a response, so that the steps asked for do not matter."""
 
 from __future__ import annotations
 

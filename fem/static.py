@@ -184,10 +184,10 @@ def _solve(rotor: Rotor, A: Matrices, forces: FloatArray, speed: float, spin: bo
         band[middle - 2 * w - 1 : middle + 2 * w : 2, 1::2] = B  # row x, column y
         band[middle - 2 * w + 1 : middle + 2 * w + 2 : 2, 0::2] = -B
     for support in rotor.supports:
-        D, foot = support.dynamic_stiffness(0.0, speed).real, 2 * A.deflection(support.node)
+        D, supported = support.dynamic_stiffness(0.0, speed).real, 2 * A.deflection(support.node)
         for p in (0, 1):
             for q in (0, 1):
-                band[middle + p - q, foot + q] += D[p, q]
+                band[middle + p - q, supported + q] += D[p, q]
     size = forces.shape[2]
     rhs = np.asfortranarray(np.moveaxis(forces, 0, 1).reshape(2 * A.size, size))
     _, _, X, info = dgbsv(wide, wide, band, rhs)

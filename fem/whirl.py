@@ -144,7 +144,7 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     values, x, y = in_both_planes(values, shapes)
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
     x, y = x.T / size, y.T / size
-    warnings = told(P.planes, real, still, values.size, n)
+    warnings = missing_modes(P.planes, real, still, values.size, n)
     return WhirlModes(float(speeds[0]), values, x, y, real, solution.error, rotor, warnings)
 
 
@@ -162,7 +162,7 @@ def in_both_planes(
     return np.where(values.imag < 0, values.conj(), values), x, y
 
 
-def told(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
+def missing_modes(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
     """What is not among the modes."""
     texts = []
     if found < n:
@@ -224,5 +224,5 @@ def checked_number(rotor: Rotor, n: int | None) -> int:
 
 def available_modes(rotor: Rotor) -> int:
     """How many modes can oscillate at most: two for each unknown of a plane that moves mass."""
-    feet = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
-    return 2 * (finite_modes(assemble(rotor)) + feet)
+    pedestals = sum(s.pedestal is not None and s.pedestal.mass > 0 for s in rotor.supports)
+    return 2 * (finite_modes(assemble(rotor)) + pedestals)

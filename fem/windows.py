@@ -1,4 +1,4 @@
-"""Ranges of speed in which a rotor has no steady response."""
+"""Ranges of speed in which a rotor is unstable and has no steady response."""
 
 from __future__ import annotations
 

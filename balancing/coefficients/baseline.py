@@ -1,4 +1,4 @@
-"""Which vibration is to be corrected, and how well it is known: that of the runs, or of new ones."""
+"""Initial vibration to be corrected, and how well it is known: that of the runs, or of new readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the runs themselves tell how phases and angles go together.
+"""Whether the runs themselves confirm or contradict the stated phase and angle conventions.
 
 Runs obey Y_run = Y₀ + W T_run. Phases that lag, taken for leading ones, are the conjugates of the readings,
 and conj(Y_run) = Ȳ₀ + W̄ T̄_run: such runs fit the conjugate weights, as where angles count the other way.

@@ -1,4 +1,4 @@
-"""Whether runs that should show the same vibration do: runs with the same weights mounted."""
+"""Repeatability: whether runs with the same weights mounted show the same vibration."""
 
 from __future__ import annotations
 

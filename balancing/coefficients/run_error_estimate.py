@@ -1,4 +1,4 @@
-"""How large the errors between runs are: restricted likelihood on a grid.
+"""Estimate of the run-to-run error, from redundant runs: restricted likelihood on a grid.
 
 Data are the residuals e of redundant runs, free of all coefficients (restricted likelihood), and those of
 the corrected reading, Y₀ + W D, free of D. For a complex normal error of covariance Σ

@@ -1,4 +1,4 @@
-"""Errors between runs: what the same rotor with the same weights shows another time.
+"""Run-to-run errors: what the same rotor with the same weights shows another time.
 
 Mounting, thermal state, drift and what is not linear change a whole run, however often it is read. A reading
 Y of a run has, besides its own error, one of the variance p²|Y|² + w²|W T|² + f² in each direction, in

@@ -1,4 +1,4 @@
-"""Whether the trial weights did enough, and whether the runs agree with each other."""
+"""Whether the trial weights changed the vibration enough, and whether the runs agree with each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planes that measured or computed coefficients tell apart only by their errors."""
+"""Planes that measured or computed coefficients tell apart only by their errors: refused or warned of."""
 
 from __future__ import annotations
 

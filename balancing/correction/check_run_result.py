@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_result import DUST
+from balancing.correction.correction_result import ROUNDING
 from balancing.data.conventions import Labels
 from balancing.data.result_columns import known, reading_columns, rms, vector_columns, weight_rows
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -165,7 +165,7 @@ class CheckComparison:
         R, S, C = self.achieved.shape
         labels = self.labels
         before = np.broadcast_to(self.before, (R, S, C))
-        dust = DUST * float(np.abs(self.before).max()) * labels.vibration_scale
+        rounding = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
         blocks: Sequence[Any] | FloatArray = [None] * (R * S * C)
         if self.covariance is not None:
             blocks = labels.vibration_covariance(self.covariance).reshape(-1, 2, 2)
@@ -175,10 +175,10 @@ class CheckComparison:
                 replace(column, values=list(column.values) * R)
                 for column in reading_columns(self.speeds, self.sensors)
             ),
-            *vector_columns(labels, "before", before, dust),
-            *vector_columns(labels, "predicted", self.predicted, dust),
-            *vector_columns(labels, "achieved", self.achieved, dust),
-            *vector_columns(labels, "difference", self.difference, dust),
+            *vector_columns(labels, "before", before, rounding),
+            *vector_columns(labels, "predicted", self.predicted, rounding),
+            *vector_columns(labels, "achieved", self.achieved, rounding),
+            *vector_columns(labels, "difference", self.difference, rounding),
             Column("covariance", blocks),
             Column(
                 "distance",

@@ -1,4 +1,4 @@
-"""What is assumed about phases and angles, what the runs say to it, and what the other reading would give."""
+"""Assumed phase and angle conventions in words: what the runs say to them, what others would give."""
 
 from __future__ import annotations
 

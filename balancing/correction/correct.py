@@ -18,13 +18,13 @@ from balancing.correction.correction_result import Correction
 from balancing.correction.correction_warnings import (
     EMPTY,
     binding,
-    cautions,
     left_out,
     notes,
     reading_names,
+    warnings_of,
 )
-from balancing.correction.mount_decision import Stakes, coarse, judged, remedies
-from balancing.correction.region_coverage import optimism, uncertain
+from balancing.correction.mount_decision import Inputs, coarse, decide_to_mount, remedies
+from balancing.correction.region_coverage import too_small, uncertain
 from balancing.correction.selected_planes import plane_indices, rows_of
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
@@ -92,7 +92,7 @@ def correct(  # noqa: PLR0913
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
         stated or measured errors by a χ² test at 95 % (`balancing.coefficients.identifiability`). Errors that
-        are assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do,
+        are assumed refuse nothing (`Correction.decision` says what they mean): the digits of the readings do,
         or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
@@ -110,12 +110,12 @@ def correct(  # noqa: PLR0913
     rows = rows_of(row_weights, influence.W.shape[:2], used)
     felt = W if rows is None else W[rows > 0]  # what weights of 0 leave says how well planes are told apart
     kept = None if limits is None else limits.pick(used, chosen)
-    stakes = Stakes(influence, start, used, chosen, rows, kept)
+    inputs = Inputs(influence, start, used, chosen, rows, kept)
     soft = strength is not None or keep is not None
     asked = method
     if method is None:
         method = "weighted" if start.covariance is not None and not soft else "least-squares"
-    unclear, unclear_regions = ((), ()) if soft else _resolved(stakes, part, felt, method, refuse=refuse)
+    unclear, unclear_regions = ((), ()) if soft else _resolved(inputs, part, felt, method, refuse=refuse)
     planes_told = conditioning(felt, names)
     errors = stack_errors(influence, start, used, chosen)
     stack = Stack(
@@ -175,29 +175,29 @@ def correct(  # noqa: PLR0913
     )
     std, factor = result.mass_std, result.coverage_factor
     widths = None if std is None or factor is None else factor * std
-    result = replace(result, counsel=judged(stakes, D, widths, soft=soft, remove=remove))
+    result = replace(result, decision=decide_to_mount(inputs, D, widths, soft=soft, remove=remove))
     warnings, words = influence.warnings + start.warnings, influence.notes
-    if result.counsel.word == "mount":
-        warnings += unclear + unclear_regions + fitted.warnings + cautions(result, felt, alike=not unclear)
+    if result.decision.word == "mount":
+        warnings += unclear + unclear_regions + fitted.warnings + warnings_of(result, felt, alike=not unclear)
         warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
         words += notes(result) + coarse(influence)
-    else:  # the counsel says what these would
+    else:  # the decision says what these would
         warnings = tuple(w for w in warnings if w not in influence.contradictions)
-        warnings += fitted.warnings + cautions(result, felt, alike=False, rising=False)
+        warnings += fitted.warnings + warnings_of(result, felt, alike=False, rising=False)
     return _with_words(result, warnings, words)
 
 
 def _resolved(
-    stakes: Stakes, part: Influence, felt: ComplexArray, method: str, *, refuse: bool
+    inputs: Inputs, part: Influence, felt: ComplexArray, method: str, *, refuse: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Refuse planes that act alike; what is unclear about the planes, and about regions of the weights."""
-    names, counts = stakes.names, None if stakes.row_weights is None else stakes.row_weights > 0
+    names, counts = inputs.names, None if inputs.row_weights is None else inputs.row_weights > 0
     check_planes(felt, names)
-    unclear = check_resolution(part, refuse=refuse, counts=counts, remedies=partial(remedies, stakes))
-    if part.covariance is None or stakes.start.covariance is None or unclear or method == "weighted":
+    unclear = check_resolution(part, refuse=refuse, counts=counts, remedies=partial(remedies, inputs))
+    if part.covariance is None or inputs.start.covariance is None or unclear or method == "weighted":
         return unclear, ()
     coefficients = part.covariance[..., 2:, 2:].reshape(-1, 2 * len(names), 2 * len(names))
-    small = optimism(felt, coefficients if counts is None else coefficients[counts], names)
+    small = too_small(felt, coefficients if counts is None else coefficients[counts], names)
     return (), (small,) if small else ()
 
 

@@ -1,4 +1,4 @@
-"""Errors of the readings that a correction is made of: how they go on into its weights and a check run."""
+"""Errors of the readings and coefficients of a correction together, for its weights and a check run."""
 
 from __future__ import annotations
 

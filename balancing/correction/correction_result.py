@@ -12,7 +12,7 @@ from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.convention_assumptions import OtherReading, assumptions, contradiction
 from balancing.correction.correction_words import error_document, error_words, method_words
-from balancing.correction.mount_decision import Counsel
+from balancing.correction.mount_decision import MountDecision
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.reading_errors import Source
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-DUST = 1e-12
+ROUNDING = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 INVISIBLE = 1e-9
 """Those below this share are zero to a reader."""
@@ -104,7 +104,7 @@ class Correction:
         What the runs say about the relation of phases to angles; None: they were not asked.
     others
         What the same numbers give if a convention that is assumed is otherwise.
-    counsel
+    decision
         Whether to mount the weights, and what to do instead.
     """
 
@@ -139,7 +139,7 @@ class Correction:
     remove: tuple[str, ...] = ()
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
-    counsel: Counsel = field(default_factory=Counsel)
+    decision: MountDecision = field(default_factory=MountDecision)
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -221,7 +221,7 @@ class Correction:
         new = np.array(residuals[4].values)
         return plain(
             {
-                "judgement": self.counsel.to_dict(self.labels),
+                "judgement": self.decision.to_dict(self.labels),
                 "method": self.method,
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
@@ -280,7 +280,7 @@ class Correction:
         test = self.convention_test
         contradicted = 0 if test is None else len(contradiction(test, self.labels))
         blocks = [
-            "\n".join(wrap(line, "  ") for line in self.counsel.lines()),
+            "\n".join(wrap(line, "  ") for line in self.decision.lines()),
             *(wrap(f"Warning: {w}", "  ") for w in self.warnings[:contradicted]),
             wrap(" ".join(assumptions(self.labels, test, self.others))),
             *(wrap(f"Warning: {w}", "  ") for w in self.warnings[contradicted:]),
@@ -310,19 +310,19 @@ class Correction:
         blocks: Sequence[Any] | FloatArray = [None] * self.before.size
         if covariance is not None:
             blocks = self.labels.vibration_covariance(covariance).reshape(-1, 2, 2)
-        return (*self.vibration_columns(DUST), Column("after_covariance", blocks))
+        return (*self.vibration_columns(ROUNDING), Column("after_covariance", blocks))
 
-    def vibration_columns(self, dust: float, after: ComplexArray | None = None) -> tuple[Column, ...]:
+    def vibration_columns(self, rounding: float, after: ComplexArray | None = None) -> tuple[Column, ...]:
         """Speed, sensor, vibration before and after, one row a reading.
 
         Parameters
         ----------
-        dust
+        rounding
             Amplitudes after, up to this share of the largest one before, are nothing.
         after
             In place of the prediction, (S, C).
         """
-        nothing = dust * float(np.abs(self.before).max()) * self.labels.vibration_scale
+        nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
         return (
             *reading_columns(self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),
@@ -448,7 +448,7 @@ class Correction:
         old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
         before = f"rms {three_figures(rms(old))}"
         checked = None if self.check_rms is None else figures(self.check_rms * scale, 2)
-        if new.max() <= DUST * old.max():
+        if new.max() <= ROUNDING * old.max():
             if checked is None:
                 return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
             return f"{before} → below {checked} in 95 of 100 check runs"
@@ -488,7 +488,7 @@ class Correction:
 
 
 def small(value: float, scale: float) -> str:
-    """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
+    """A predicted amplitude; rounding of an exact solution is zero to a reader."""
     return "0" if value <= INVISIBLE * scale else three_figures(value)
 
 

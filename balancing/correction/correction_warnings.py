@@ -1,4 +1,4 @@
-"""What to beware of in a correction, in words."""
+"""Warnings of a correction, in words."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _at_end(weight: complex, start: float, width: float) -> bool:
     return bool((np.abs(away) < 1e-6).any())
 
 
-def cautions(result: Correction, W: ComplexArray, *, alike: bool, rising: bool = True) -> tuple[str, ...]:
+def warnings_of(result: Correction, W: ComplexArray, *, alike: bool, rising: bool = True) -> tuple[str, ...]:
     """Planes that act nearly alike, planes without weights, a poor fit, readings that rise."""
     out = []
     if alike and result.condition_number > ILL_CONDITIONED:

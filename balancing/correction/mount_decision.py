@@ -1,4 +1,4 @@
-"""Whether to mount a correction at all, and what to do instead.
+"""Decision whether to mount a correction at all, and what to do instead.
 
 Mounted, the weights D leave Y₀ + W D, of which the errors of Y₀ and W are a part: with A = (Y₀ W), z = (1, D)
 and the covariance of A at each reading, the mean square over N readings is
@@ -14,7 +14,7 @@ mounting where the errors eat half of what is promised,
 
 or where fewer planes with weights a third as large leave hardly more. In simulated jobs of one to four
 planes, with errors of up to 2 % and trial weights of 0.3 to 1.5 times the correction, few are told so, and
-what is proposed then truly leaves less than the weights (`tests/balancing/correction/test_counsel.py`). The
+what is proposed then truly leaves less than the weights (`test_mount_decision.py`). The
 weighted fit is told so more often than least squares: where planes act alike or readings are few, the most
 likely weights can be far larger than the true ones.
 """
@@ -86,7 +86,7 @@ class Choice:
 
 
 @dataclass(frozen=True, eq=False)
-class Counsel:
+class MountDecision:
     """One judgement of a correction.
 
     Attributes
@@ -140,7 +140,7 @@ class Counsel:
 
 
 @dataclass(frozen=True, eq=False)
-class Stakes:
+class Inputs:
     """What the weights of a job are worth.
 
     Attributes
@@ -243,19 +243,19 @@ class Stakes:
         return float(np.abs(trials.weights[:, trials.planes.index(name)]).max()) or None
 
 
-def judged(
-    stakes: Stakes,
+def decide_to_mount(
+    inputs: Inputs,
     weights: ComplexArray,
     widths: FloatArray | None,
     *,
     soft: bool = False,
     remove: Sequence[str] = (),
-) -> Counsel:
+) -> MountDecision:
     """Whether to mount a correction, and what to do instead.
 
     Parameters
     ----------
-    stakes
+    inputs
         The job.
     weights, widths
         Of all its planes, (P,), and half the 95 % intervals of their sizes; None: unknown.
@@ -264,54 +264,54 @@ def judged(
     remove
         Planes where material is taken away.
     """
-    before = stakes.before
-    whole = stakes.choice(range(len(weights)), weights)
-    fewer = stakes.fewer()
+    before = inputs.before
+    whole = inputs.choice(range(len(weights)), weights)
+    fewer = inputs.fewer()
     calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
-    fighting = any(_effect(whole, stakes) >= FIGHTING * _effect(c, stakes) for c in calm)
-    if not weights.any() or (stakes.sound(whole) and not fighting):
-        return Counsel("mount", before=before, expected=whole.expected, choices=fewer)
-    contradictions = stakes.influence.contradictions
+    fighting = any(_effect(whole, inputs) >= FIGHTING * _effect(c, inputs) for c in calm)
+    if not weights.any() or (inputs.sound(whole) and not fighting):
+        return MountDecision("mount", before=before, expected=whole.expected, choices=fewer)
+    contradictions = inputs.influence.contradictions
     instead: tuple[str, ...]
     if contradictions:
         instead = ("Instead: mend the table, or measure these runs again until they agree.",)
-        cause = "; ".join((*contradictions, _outlook(whole, stakes)))
-        return Counsel("measure again", cause, instead, before, whole.expected, fewer)
-    cause = "; ".join((*_causes(stakes, weights, widths, remove), _outlook(whole, stakes)))
-    instead = remedies(stakes, fewer, soft=soft)
-    return Counsel("do not mount", cause, instead, before, whole.expected, fewer)
+        cause = "; ".join((*contradictions, _outlook(whole, inputs)))
+        return MountDecision("measure again", cause, instead, before, whole.expected, fewer)
+    cause = "; ".join((*_causes(inputs, weights, widths, remove), _outlook(whole, inputs)))
+    instead = remedies(inputs, fewer, soft=soft)
+    return MountDecision("do not mount", cause, instead, before, whole.expected, fewer)
 
 
-def remedies(stakes: Stakes, fewer: Sequence[Choice] | None = None, *, soft: bool = False) -> tuple[str, ...]:
+def remedies(inputs: Inputs, fewer: Sequence[Choice] | None = None, *, soft: bool = False) -> tuple[str, ...]:
     """What to do instead of mounting weights in all the planes, in sentences with numbers.
 
     Parameters
     ----------
-    stakes
+    inputs
         The job.
     fewer
         Its choices of fewer planes, if they are known.
     soft
         Whether a ridge was tried.
     """
-    weak = _weak(stakes)
-    alike = len(stakes.chosen) > 1 and not weak
-    best = _proposed(stakes.fewer() if fewer is None else fewer, stakes)
-    words = [] if best is None else [f"{_only(best, stakes)} would leave {_left(best, stakes)}"]
+    weak = _weak(inputs)
+    alike = len(inputs.chosen) > 1 and not weak
+    best = _proposed(inputs.fewer() if fewer is None else fewer, inputs)
+    words = [] if best is None else [f"{_only(best, inputs)} would leave {_left(best, inputs)}"]
     if alike and not soft:
-        words += _ridge(stakes)
-    words += [_trial(p, stakes) for p in weak if stakes.trial_weight(p)]
-    if coarse(stakes.influence):
+        words += _ridge(inputs)
+    words += [_trial(p, inputs) for p in weak if inputs.trial_weight(p)]
+    if coarse(inputs.influence):
         words.append("read the instrument in a range that shows more digits")
     if alike:
-        words.append(_separating(stakes))
+        words.append(_separating(inputs))
     return tuple(f"{'Or' if i else 'Instead'}: {w}." for i, w in enumerate(words))
 
 
-def _proposed(choices: Sequence[Choice], stakes: Stakes) -> Choice | None:
+def _proposed(choices: Sequence[Choice], inputs: Inputs) -> Choice | None:
     """The sound one with the smallest 95 % bound, if that is not much above the vibration before."""
-    sound = [c for c in choices if stakes.sound(c) and stakes.most(c) < WORTH * stakes.before]
-    return min(sound, key=stakes.most, default=None)
+    sound = [c for c in choices if inputs.sound(c) and inputs.most(c) < WORTH * inputs.before]
+    return min(sound, key=inputs.most, default=None)
 
 
 def coarse(influence: Influence) -> tuple[str, ...]:
@@ -331,32 +331,32 @@ def _shown(labels: Labels, size: float, digits: int = 3) -> str:
     return f"{figures(size * labels.vibration_scale, digits)} {labels.vibration_unit}".rstrip()
 
 
-def _effect(choice: Choice, stakes: Stakes) -> float:
+def _effect(choice: Choice, inputs: Inputs) -> float:
     """Root mean square effect of the largest weight."""
-    columns = [1 + stakes.names.index(p) for p in choice.planes]
-    return float((np.abs(choice.weights) * np.linalg.norm(stakes.forms[0][:, columns], axis=0)).max())
+    columns = [1 + inputs.names.index(p) for p in choice.planes]
+    return float((np.abs(choice.weights) * np.linalg.norm(inputs.forms[0][:, columns], axis=0)).max())
 
 
-def _weak(stakes: Stakes) -> list[int]:
-    return [int(p) for p in np.flatnonzero(stakes.clearness() < WEAK)]
+def _weak(inputs: Inputs) -> list[int]:
+    return [int(p) for p in np.flatnonzero(inputs.clearness() < WEAK)]
 
 
 def _causes(
-    stakes: Stakes, weights: ComplexArray, widths: FloatArray | None, remove: Sequence[str]
+    inputs: Inputs, weights: ComplexArray, widths: FloatArray | None, remove: Sequence[str]
 ) -> list[str]:
     """What makes the weights uncertain: digits, trial weights, planes that act alike, or little to gain."""
-    labels, names, weak = stakes.start.labels, stakes.names, _weak(stakes)
-    found = list(coarse(stakes.influence))
+    labels, names, weak = inputs.start.labels, inputs.names, _weak(inputs)
+    found = list(coarse(inputs.influence))
     for p in weak:
-        trial = stakes.trial_weight(p)
+        trial = inputs.trial_weight(p)
         of = "" if trial is None else f" of its trial weight ({labels.weight_words(trial)})"
         width = "" if widths is None else f" ± {labels.weight_words(float(f'{widths[p]:.2g}'))} (95 %)"
         found.append(
             f"the weight in plane {names[p]!r} is {labels.weight_words(abs(weights[p]))}{width}, for the "
-            f"effect{of} is only {stakes.clearness()[p]:.2g} times its error"
+            f"effect{of} is only {inputs.clearness()[p]:.2g} times its error"
         )
     if not weak and len(names) > 1:
-        alike = acting_alike(stakes.W)
+        alike = acting_alike(inputs.W)
         mass, angle = labels.weight(weights)
         at = [f"{(angle[p] + 180 * (names[p] in remove)) % 360:.0f}°" for p in alike]
         each = [f"{figures(mass[p], 3)} {labels.weight_unit}".rstrip() for p in alike]
@@ -366,8 +366,8 @@ def _causes(
     return found or ["the weights promise little"]
 
 
-def _outlook(whole: Choice, stakes: Stakes) -> str:
-    labels, before = stakes.start.labels, stakes.before
+def _outlook(whole: Choice, inputs: Inputs) -> str:
+    labels, before = inputs.start.labels, inputs.before
     promised = _shown(labels, whole.rms) if whole.rms > 1e-9 * before else "0"
     return (
         f"with the weights, expect rms {_shown(labels, whole.expected)} rather than {promised}; without them "
@@ -375,50 +375,50 @@ def _outlook(whole: Choice, stakes: Stakes) -> str:
     )
 
 
-def _only(choice: Choice, stakes: Stakes) -> str:
+def _only(choice: Choice, inputs: Inputs) -> str:
     planes = listing(map(repr, choice.planes), "and")
     named = f"plane {planes} alone" if len(choice.planes) == 1 else f"only planes {planes}"
-    mass = ", ".join(stakes.start.labels.weight_words(float(m)) for m in np.abs(choice.weights))
+    mass = ", ".join(inputs.start.labels.weight_words(float(m)) for m in np.abs(choice.weights))
     return f"{named} (--planes {','.join(choice.planes)}; {mass})"
 
 
-def _left(choice: Choice, stakes: Stakes) -> str:
-    labels = stakes.start.labels
+def _left(choice: Choice, inputs: Inputs) -> str:
+    labels = inputs.start.labels
     return (
-        f"rms {_shown(labels, choice.rms)}, at most {_shown(labels, stakes.most(choice))} with 95 %, of "
-        f"{_shown(labels, stakes.before)}"
+        f"rms {_shown(labels, choice.rms)}, at most {_shown(labels, inputs.most(choice))} with 95 %, of "
+        f"{_shown(labels, inputs.before)}"
     )
 
 
-def _ridge(stakes: Stakes) -> list[str]:
-    if stakes.limits is not None and stakes.limits.any:
+def _ridge(inputs: Inputs) -> list[str]:
+    if inputs.limits is not None and inputs.limits.any:
         return []
-    planes = range(len(stakes.chosen))
+    planes = range(len(inputs.chosen))
     tried = [
-        stakes.choice(planes, ridge(stakes.W, stakes.Y, s, stakes.row_weights).weights) for s in STRENGTHS
+        inputs.choice(planes, ridge(inputs.W, inputs.Y, s, inputs.row_weights).weights) for s in STRENGTHS
     ]
-    best = _proposed(tried, stakes)
+    best = _proposed(tried, inputs)
     if best is None:
         return []
-    return [f"--ridge {STRENGTHS[tried.index(best)]:g} would leave {_left(best, stakes)}"]
+    return [f"--ridge {STRENGTHS[tried.index(best)]:g} would leave {_left(best, inputs)}"]
 
 
-def _trial(p: int, stakes: Stakes) -> str:
+def _trial(p: int, inputs: Inputs) -> str:
     """A trial weight whose effect is clear of its error."""
-    now, ratio = stakes.trial_weight(p), float(stakes.clearness()[p])
+    now, ratio = inputs.trial_weight(p), float(inputs.clearness()[p])
     assert now is not None
-    labels, name, needed = stakes.start.labels, stakes.names[p], now * CLEAR / ratio
-    if stakes.limits is not None and needed > stakes.limits.max_weight[p]:
-        most = labels.weight_words(float(stakes.limits.max_weight[p]))
+    labels, name, needed = inputs.start.labels, inputs.names[p], now * CLEAR / ratio
+    if inputs.limits is not None and needed > inputs.limits.max_weight[p]:
+        most = labels.weight_words(float(inputs.limits.max_weight[p]))
         return f"leave plane {name!r} out: a clear trial weight would be larger than its largest, {most}"
     size = labels.weight_words(float(f"{needed:.2g}"))
     return f"repeat the trial run of plane {name!r} with {'at least' if ratio < 2 else 'about'} {size}"
 
 
-def _separating(stakes: Stakes) -> str:
+def _separating(inputs: Inputs) -> str:
     """Readings that tell apart the planes that act alike: of a speed that was left out, or none."""
-    influence = stakes.influence
-    planes = [stakes.chosen[p] for p in acting_alike(stakes.W)]
+    influence = inputs.influence
+    planes = [inputs.chosen[p] for p in acting_alike(inputs.W)]
     named = listing((repr(influence.planes[p]) for p in planes), "and")
 
     def apart(used: list[int]) -> float:
@@ -431,8 +431,8 @@ def _separating(stakes: Stakes) -> str:
             return 0.0
         return resolution(part.W.reshape(-1, n), covariance).ratio
 
-    now = apart(stakes.used)
-    others = {s: apart([s]) for s in range(len(influence.speeds)) if s not in stakes.used}
+    now = apart(inputs.used)
+    others = {s: apart([s]) for s in range(len(influence.speeds)) if s not in inputs.used}
     best = max(others, key=lambda s: others[s], default=None)
     if best is not None and others[best] > max(2 * now, WEAK):
         return (

@@ -36,7 +36,7 @@ MOVED_AMPLITUDE = 0.5
 MOVED_ANGLE = np.deg2rad(45)
 """Change of its phase, rad, above which it is named."""
 
-_DUST = 1e-9
+_ROUNDING = 1e-9
 """Coefficients below this share of the plane's largest one are none."""
 _TIMES = 10.0
 _NAMED = 3
@@ -310,10 +310,10 @@ def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
     words = []
     for p, plane in enumerate(alone.planes):
         old, new = alone.W[..., p], refined.W[..., refined.planes.index(plane)]
-        dust = _DUST * max(float(np.abs(old).max()), float(np.abs(new).max()))
-        for s, c in np.argwhere((np.abs(old) > dust) | (np.abs(new) > dust)):
-            change = abs(new[s, c]) / max(abs(old[s, c]), dust) - 1.0
-            both = min(abs(old[s, c]), abs(new[s, c])) > dust
+        rounding = _ROUNDING * max(float(np.abs(old).max()), float(np.abs(new).max()))
+        for s, c in np.argwhere((np.abs(old) > rounding) | (np.abs(new) > rounding)):
+            change = abs(new[s, c]) / max(abs(old[s, c]), rounding) - 1.0
+            both = min(abs(old[s, c]), abs(new[s, c])) > rounding
             turn = float(np.angle(new[s, c] * np.conj(old[s, c]))) if both else 0.0
             if abs(change) <= MOVED_AMPLITUDE and abs(turn) <= MOVED_ANGLE:
                 continue

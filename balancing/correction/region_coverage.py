@@ -1,4 +1,4 @@
-"""Where the 95 % region of the weights is too small, in words.
+"""Coverage of the 95 % region of the weights: where it is too small, in words.
 
 First-order regions hold where errors of the weights are small against the weights: D goes as 1/W, and what a
 large error does to it is no ellipse. The fit by errors ("weighted") therefore goes by the relative error of
@@ -54,7 +54,7 @@ def relative_error(D: ArrayLike, covariance: ArrayLike) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(np.asarray(covariance))[-1] / size)) if size else np.inf
 
 
-def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str]) -> str:
+def too_small(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str]) -> str:
     """Warn of a 95 % region of least squares that is too small; empty where it is honest.
 
     Parameters

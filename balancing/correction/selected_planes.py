@@ -1,4 +1,4 @@
-"""Which planes and readings take part in a correction."""
+"""Planes selected for a correction, and the weights of the readings in its least squares."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 KNEE = 3.0
 """A point is a knee where weight does on average at least so many times as much before it as behind it."""
-DUST = 1e-6
+ROUNDING = 1e-6
 """A weight below this share of the total is what the solver leaves of zero."""
 
 
@@ -196,7 +196,7 @@ def trade_off(
     while 1 < len(found) < points:
         place, budget = _longest([t for t, _, _ in found], [v for _, v, _ in found])
         D = solve_cone(problem(K, y, w, minmax=criterion == "max", budget=budget)).weights
-        D = np.where(np.abs(D) > DUST * budget, D, 0.0)
+        D = np.where(np.abs(D) > ROUNDING * budget, D, 0.0)
         found.insert(place, (budget, objective(D), D))
     return _result(planes, K, y, found, criterion, labels or Labels(), weighted=bool(np.ptp(w) > 0))
 

@@ -1,4 +1,4 @@
-"""How a job's vibrations and weights are written: units and conventions, to print results in.
+"""Phase and angle conventions of a job, with its units: signs of lead and lag, in and out.
 
 Inside, every vibration is a complex amplitude with positive phase = lead, every weight is complex with
 its angle counted with the rotation. Only a `Labels` object, made where files are read, knows how the

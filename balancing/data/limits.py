@@ -1,4 +1,4 @@
-"""What a correction must keep to: largest weights and amplitudes, angles where nothing can be mounted."""
+"""Limits of a correction: largest weights and amplitudes, forbidden angles."""
 
 from __future__ import annotations
 

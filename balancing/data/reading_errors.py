@@ -1,4 +1,4 @@
-"""How well a reading is known: stated errors, repeated readings, and how the two combine.
+"""Errors of a reading: stated, from repeated readings, and how the two combine.
 
 A reading Y has a standard deviation `amplitude`·|Y| along itself (radial), `phase`·|Y| across it
 (tangential), and `floor` in both directions, added in quadrature.

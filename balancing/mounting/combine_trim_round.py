@@ -1,4 +1,4 @@
-"""Weights as hands mount them: two fixed masses, several weights as one, trimming, rounding.
+"""Weights combined into one, trimmed, rounded to a scale, or split into two fixed masses at free angles.
 
 Every weight is complex, kg or kg·m, its angle counted with the rotation. Nothing here knows holes: pieces in
 holes are found in `balancing.mounting.split`.

@@ -1,4 +1,4 @@
-"""Weights that can really be mounted, chosen together: what makes the vibration itself smallest.
+"""Discrete weights of all planes chosen together: pieces in holes that leave the smallest vibration.
 
 Every plane takes sums of pieces in holes (or free amounts in steps); over all planes together
 

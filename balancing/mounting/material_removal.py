@@ -1,4 +1,4 @@
-"""Material taken away: drilled holes and grinding, opposite to where a weight would be added.
+"""Material removal instead of weights: drilled holes and grinding, opposite to where a weight would be added.
 
 A correction D is always the equivalent *added* unbalance, kg·m with its angle counted with the rotation.
 Taking the unbalance u away at the angle φ changes the rotor by −u e^{iφ}; so D is done by u = |D| at

@@ -1,4 +1,4 @@
-"""Vectors that can be made in one plane: what every such set offers, and the search for the nearest ones.
+"""Vectors that can be mounted in one plane: what every such set offers, and the search for the nearest ones.
 
 `balancing.mounting.piece_sums` makes them of pieces in holes, `balancing.mounting.free_amounts` of free
 amounts in steps. One given weight (`balancing.mounting.split`) and the joint search over planes

@@ -1,4 +1,4 @@
-"""Pictures of a correction. Nothing here is ever shown or saved: the caller does.
+"""Polar pictures of a correction: vibration before and after, weights. Nothing is ever shown or saved here.
 
 In every polar picture of weights the rotor turns counter-clockwise, or as the job says it turns seen from the
 stated end; angles are written as the job counts them, so with "against rotation" (or lag phases) the numbers

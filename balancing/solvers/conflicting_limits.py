@@ -1,4 +1,4 @@
-"""Limits that cannot be met: which of them conflict, and the least relaxation that works, in words.
+"""Conflicting limits that cannot all be met: which they are, and the least relaxation that works, in words.
 
 The least factor for the amplitudes is the optimum of the min–max problem of |rᵢ| / Lᵢ within the limits of
 weights and angles; the least factor for the weights that of |D_p| / M_p within those of amplitudes and

@@ -1,4 +1,4 @@
-"""The ways to weights: which method solves the stacked equations, and what its answer is worth.
+"""Methods of correction (registry): each solves the stacked equations; a new method goes here.
 
 Every method gets the same stack `Y + W D` and gives weights, their covariance and what it can certify.
 """

@@ -1,4 +1,4 @@
-"""Weights at allowed angles only: forbidden arcs become sectors, and branch and bound chooses among them.
+"""Forbidden angles of weights: allowed arcs become sectors, and branch and bound chooses among them.
 
 What is left of the circle is a union of arcs; one of up to π is a convex sector, a wider one is the union of
 two half planes. The program without sectors comes first. Where a weight of its solution stands at a forbidden

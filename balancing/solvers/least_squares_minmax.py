@@ -1,4 +1,4 @@
-"""One entry for every way to choose correction weights: closed form where nothing is limited, else cones."""
+"""Least squares, formulas (33), (40), and min–max: closed form where nothing is limited, else cones."""
 
 from __future__ import annotations
 

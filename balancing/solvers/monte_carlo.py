@@ -1,4 +1,4 @@
-"""Errors of weights that no formula gives: solve again for readings drawn from their errors."""
+"""Monte Carlo errors of weights that no formula gives: solve again for readings drawn from their errors."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def equations_of_motion(rotor: Rotor, *, speed: float = 0.0, plane: str = "both"
         for node in range(1, rotor.n_nodes + 1)
         for kind in (kinds if node < rotor.n_nodes else kinds[:2])
     ]
-    names += [f"foot_{axis}{int(i) + 1}" for axis in "xy" for i in P.feet]
+    names += [f"foot_{axis}{int(i) + 1}" for axis in "xy" for i in P.pedestals]
     kept = np.arange(len(names))
     if plane == "x":
         in_x = np.array([name.split("_")[-1].startswith("x") for name in names])

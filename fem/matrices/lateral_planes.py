@@ -35,9 +35,9 @@ class Planes:
         2: unknowns x and y, real matrices; 1: the complex coordinate z, complex matrices.
     rows
         Unknown of the deflection at each support, from 0, shape (s,).
-    feet
+    pedestals
         Which supports stand on a pedestal, shape (f,).
-    foot_mass, foot_stiffness, foot_damping
+    pedestal_mass, pedestal_stiffness, pedestal_damping
         Of the pedestals, shapes (f, planes).
     tilting
         (unknown of a slope, N·m/rad) for each support that holds the slope.
@@ -47,10 +47,10 @@ class Planes:
     A: Matrices
     planes: int
     rows: IndexArray
-    feet: IndexArray
-    foot_mass: FloatArray
-    foot_stiffness: FloatArray
-    foot_damping: FloatArray
+    pedestals: IndexArray
+    pedestal_mass: FloatArray
+    pedestal_stiffness: FloatArray
+    pedestal_damping: FloatArray
     tilting: tuple[tuple[int, float], ...]
 
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
@@ -129,7 +129,7 @@ class Quadratic:
         """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
         if self.P.planes == 1:
             return vectors
-        d, f = self.basis.shape[1], len(self.P.feet)
+        d, f = self.basis.shape[1], len(self.P.pedestals)
         out = vectors.copy()
         out[..., d : 2 * d] *= -1
         out[..., 2 * d + f :] *= -1
@@ -161,10 +161,10 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
         A=A,
         planes=p,
         rows=np.array([A.stride * (s.node - 1) for s in supports], dtype=np.intp),
-        feet=np.array([i for i, _ in stands], dtype=np.intp),
-        foot_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
-        foot_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
-        foot_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
+        pedestals=np.array([i for i, _ in stands], dtype=np.intp),
+        pedestal_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
+        pedestal_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
+        pedestal_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
         tilting=tuple(
             (A.stride * (s.node - 1) + 1, s.tilting_stiffness) for s in supports if s.tilting_stiffness > 0
         ),
@@ -175,7 +175,7 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
     """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
     from scipy.linalg import block_diag
 
-    d, p, f = basis.shape[1], P.planes, len(P.feet)
+    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
     flat = strain.reshape(-1, d)
     damped = (np.sqrt(P.rotor.material_damping)[:, None] * strain).reshape(-1, d)
@@ -187,24 +187,24 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
     # Force in x from y, and with the opposite sign in y from x; or the same of z.
     across = np.array([[0.0, 1.0], [-1.0, 0.0]]) if p == 2 else np.array([[-1j]])
 
-    def planes(sides: AnyArray, shaft: FloatArray, feet: FloatArray) -> AnyArray:
+    def planes(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        return np.asarray(block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(feet.T.ravel())))
+        return np.asarray(block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(pedestals.T.ravel())))
 
     along, none = np.eye(p), np.zeros((f, p))
     # What a support feels: motion of its node against the ground or the foot, in each plane.
     felt = np.zeros((len(P.rows), p, p * (d + f)))
     for plane in range(p):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.feet, plane, p * d + plane * f + np.arange(f)] = -1.0
+        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
     ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
     return Quadratic(
         P=P,
         basis=basis,
-        M=planes(along, M, P.foot_mass),
-        D0=planes(along, B, P.foot_damping),
+        M=planes(along, M, P.pedestal_mass),
+        D0=planes(along, B, P.pedestal_damping),
         D1=planes(across, G, none),
-        K0=planes(along, K, P.foot_stiffness),
+        K0=planes(along, K, P.pedestal_stiffness),
         K1=planes(across, B, none),
         ties=ties,
     )

@@ -1,4 +1,4 @@
-"""What the supports of a rotor do at synchronous vibration: dynamic stiffness at nodes, over speed."""
+"""Dynamic stiffness of the supports at synchronous vibration, at their nodes, over speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The conservative rotor K φ = λ M φ, λ = ω², that critical speeds and receptances start from.
+"""Undamped rotor with its supports as stiffness and mass: K φ = λ M φ, λ = ω², for critical speeds.
 
 At synchronous whirl the gyroscopic moment is an inertia: forward, z = Z e^{iωt}, the mass is M − G, backward
 M + G. Either is real and symmetric; M − G may be indefinite (thin discs), and then some forward modes have

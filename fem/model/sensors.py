@@ -1,4 +1,4 @@
-"""Where and in which direction vibration is read."""
+"""Sensors of a rotor model: where and in which direction vibration is read."""
 
 from __future__ import annotations
 

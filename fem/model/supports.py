@@ -1,4 +1,4 @@
-"""What holds a rotor: bearings, seals and the pedestals under them."""
+"""Bearings, seals and the pedestals under them: the kinds of supports; a new kind goes here."""
 
 from __future__ import annotations
 

@@ -166,27 +166,27 @@ def prepare(
     """
     at = supported(rotor, speeds)
     reference = _reference(rotor, A, at)
-    feet = np.array([A.deflection(node) for node in reference], dtype=np.intp)
+    held = np.array([A.deflection(node) for node in reference], dtype=np.intp)
     varies = {support.node for support in rotor.supports if not support.plain}
     change = np.abs(_change(at, reference)).max(axis=(0, 2, 3), initial=0.0) > 0
     moving = np.flatnonzero(change | np.array([node in varies for node in reference], dtype=bool))
-    feet = feet[moving]
+    held = held[moving]
     top = float(speeds.max())
 
     pencil = one_plane(rotor, A, 1, reference)
     spectra = [_modes_for(pencil, top)]
-    both = np.concatenate((rows, feet))
-    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, feet))), top)
+    both = np.concatenate((rows, held))
+    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
     backward = None
     beta = _uniform(rotor)
-    if at.planes == 2 and forward is not None and feet.size:
+    if at.planes == 2 and forward is not None and held.size:
         if beta is None:
             forward = None
         else:
             behind = pencil if not rotor.model.gyroscopic else one_plane(rotor, A, -1, reference)
             if behind is not pencil:
                 spectra.append(_modes_for(behind, top))
-            backward = _series(behind, spectra[-1], both, _units(A, feet), top)
+            backward = _series(behind, spectra[-1], both, _units(A, held), top)
             forward = None if backward is None else forward
     return Receptance(
         rotor, A, rows, loads, reference, moving, forward, backward, tuple(spectra), beta or 0.0

@@ -194,7 +194,7 @@ def _differ(all_found: ComplexArray, improved: ComplexArray) -> BoolArray:
 
 def _padded(Q: Quadratic, X: ComplexArray) -> ComplexArray:
     """Vectors of a basis in a larger one that begins with it."""
-    p, d, f = Q.P.planes, Q.basis.shape[1], len(Q.P.feet)
+    p, d, f = Q.P.planes, Q.basis.shape[1], len(Q.P.pedestals)
     old = X.shape[-1] // p - f
     if old == d:
         return X.copy()

@@ -44,7 +44,7 @@ def solve_banded(
     if planes == 2:
         mass[:, 1::2] = _wide(whirling_mass(A, -1), planes)[:, 1::2]
         lag[:, 1::2] = 2 * _wide(A.material, planes)[:, 1::2]
-    feet = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
+    supported = np.array([A.deflection(node) for node in at.nodes], dtype=np.intp)
 
     # One load more, with a little of everything: it excites a mode that the given loads do not.
     probe = np.zeros(A.size)
@@ -59,7 +59,7 @@ def solve_banded(
             band += 1j * omega * lag
         for p in range(planes):
             for q in range(planes):
-                np.add.at(band[2 * width + p - q], planes * feet + q, at.stiffness[k, :, p, q])
+                np.add.at(band[2 * width + p - q], planes * supported + q, at.stiffness[k, :, p, q])
         _, _, X, info = zgbsv(width, width, band, rhs, overwrite_ab=True)
         if info != 0 or not np.isfinite(X).all():
             raise unlimited(float(omega))
@@ -72,7 +72,7 @@ def solve_banded(
         for plane, part in enumerate(parts):
             part[k] = X[planes * rows + plane, :-1]
             probes[:, plane, k] = X[plane::planes, -1]
-    _check_limited(rotor, A, at, feet, probe, probes, speeds)
+    _check_limited(rotor, A, at, supported, probe, probes, speeds)
     size = np.abs(parts[0]).max(axis=(1, 2))
     suspects = {int(np.argmin(speeds)), int(np.argmax(speeds)), int(np.argmax(size))}
     errors = {k: _sensitivity(A, loads, deflection(k)[::planes, :-1]) for k in suspects}
@@ -115,7 +115,7 @@ def _check_limited(
     rotor: Rotor,
     A: Matrices,
     at: Supported,
-    feet: IndexArray,
+    supported: IndexArray,
     probe: FloatArray,
     X: ComplexArray,
     speeds: FloatArray,
@@ -134,7 +134,7 @@ def _check_limited(
         for part in (X[:, plane].real, X[:, plane].imag):
             energy += np.einsum("is,is->s", part, multiply(A.shaft, part))
             energy += inertia * np.einsum("is,is->s", part, multiply(A.mass, part))
-        held = np.abs(at.stiffness[:, :, plane, plane]) * np.abs(X[feet, plane]).T ** 2
+        held = np.abs(at.stiffness[:, :, plane, plane]) * np.abs(X[supported, plane]).T ** 2
         energy += held.sum(axis=1)
     wrong = work <= AT_CRITICAL * energy
     if wrong.any():

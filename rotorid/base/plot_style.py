@@ -1,4 +1,4 @@
-"""What the pictures share: colours, line styles, axes."""
+"""Style of all pictures: colours, line styles, axes."""
 
 from __future__ import annotations
 

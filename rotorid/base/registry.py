@@ -1,4 +1,4 @@
-"""Methods of a kind, each told once: its name, one sentence for help and documents, and what does it."""
+"""Registry of methods: each told once with name, one sentence for help and documents, and function."""
 
 from __future__ import annotations
 

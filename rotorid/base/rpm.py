@@ -1,4 +1,4 @@
-"""Speeds and angles as people read them: revolutions per minute and degrees."""
+"""Speeds in rpm and angles in degrees, as people read them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The known name nearest to a misspelt one, for messages."""
+"""Suggestions for misspelt names: the nearest known name, for messages (did you mean)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that choose one of a few: help from the registries, and the nearest one for a misspelt one."""
+"""Options that choose one of a few: help from the registries, a suggestion for a misspelt one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that several commands have, each declared once."""
+"""Common options: those that several commands have, each declared once."""
 
 from __future__ import annotations
 

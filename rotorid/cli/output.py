@@ -1,4 +1,4 @@
-"""Where a result goes: terminal or JSON, picture, table, sheet, all of them or none."""
+"""Output of a command: terminal or JSON, picture, table, sheet, all of them or none."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which frequencies should be measured? Expected standard deviations, and a D-optimal choice.
+"""Design of experiments: which frequencies to measure, expected standard deviations, a D-optimal choice.
 
 With guessed parameters and stated errors the information of each candidate frequency is known beforehand:
 M_i = J_iᵀ J_i with J_i the derivatives of its amplitudes over their errors. The covariance of the

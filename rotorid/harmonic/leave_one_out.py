@@ -1,4 +1,4 @@
-"""How much a single experiment decides: the estimate without it, from its leverage."""
+"""Leave-one-out: the estimate without a single experiment, from its leverage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Equations as features: Σ P_f(parameters)·f = 0 with f = p^k · amplitude, and what data can see of the P_f.
+"""Combinations of parameters that harmonic data determine: equations as features, Σ P_f(parameters)·f = 0.
 
 The monomials of the parameters are lifted into new unknowns ([S] 1.8). The matrix of their coefficients
 (features × monomials, known numbers inserted, exact rationals) has a row space: its reduced echelon form

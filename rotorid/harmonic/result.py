@@ -1,4 +1,4 @@
-"""What an identification found: parameters with intervals, and what the data cannot tell."""
+"""Result of an identification: parameters with intervals, and what the data cannot tell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where output error begins: values with which the equations hold best, amplitudes that are hidden apart."""
+"""Starting values of output error: equations hold best with them, amplitudes that are hidden apart."""
 
 from __future__ import annotations
 

@@ -374,16 +374,16 @@ def _in_order(C: _Condensed, T: FloatArray) -> FloatArray:
     ties to the rotor: that one stays at rest.
     """
     waves, tilts = C.pencil.waves[0], C.pencil.tilts[0]
-    feet: dict[int, list[int]] = {
+    pedestals: dict[int, list[int]] = {
         node: list(range(int(w) + 1, int(t)))
         for node, (w, t) in enumerate(zip(waves, tilts, strict=True), start=1)
         if t > w + 1
     }
     shaft = np.ones(C.pencil.size, dtype=bool)
-    shaft[[i for places in feet.values() for i in places]] = False
+    shaft[[i for places in pedestals.values() for i in places]] = False
     own: list[Any] = []
     for support in C.plane.supports:
         if support.pedestal is not None:
             tied = bool(np.any(np.asarray(support.stiffness) != 0))
-            own.append(T[feet[support.node].pop(0)] if tied else np.zeros(T.shape[1]))
+            own.append(T[pedestals[support.node].pop(0)] if tied else np.zeros(T.shape[1]))
     return np.vstack([T[shaft], *own])

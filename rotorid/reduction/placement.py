@@ -1,4 +1,4 @@
-"""Where to put the masses: every choice of nodes ranked by frequencies and shapes; the book's rule."""
+"""Placement of the masses: every choice of nodes ranked by frequencies and shapes; the book's rule."""
 
 from __future__ import annotations
 

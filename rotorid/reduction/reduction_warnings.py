@@ -1,4 +1,4 @@
-"""What to say of a reduction before anyone trusts it."""
+"""Warnings of a reduction: masses, frequencies and shapes that should not be trusted."""
 
 from __future__ import annotations
 

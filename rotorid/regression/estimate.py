@@ -1,4 +1,4 @@
-"""What an estimation found, and what the data do not say: the result of every regression."""
+"""Estimate of a regression: values, covariance, intervals, and what the data do not determine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else.
+"""Linear least squares `K θ = Y`: the one kernel of every estimation problem of this project.
 
 Complex equations become real rows in one of two ways:
 

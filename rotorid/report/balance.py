@@ -90,7 +90,7 @@ def balance_report(
         whole,
         title=f"Balancing sheet: {name}",
         warnings=_warnings(document),
-        judgement=result.counsel.lines(),
+        judgement=result.decision.lines(),
         provenance=provenance,
         job_files=[path.name for path in job.files],
         text=text,

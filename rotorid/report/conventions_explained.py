@@ -1,4 +1,4 @@
-"""What the numbers of a job mean: words, and two small figures, for a reader who has only the sheet."""
+"""Conventions of a job explained on its sheet: words and two small figures, for who has only the sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must be known before the numbers of a fit are used."""
+"""Diagnostics of a fit: warnings and notes before its numbers are used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a fit to time records found."""
+"""Result of a fit to time records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which influence coefficients a job is balanced with: measured, stored, computed, or several together."""
+"""Choice of influence coefficients that a job is balanced with: measured, stored, computed, or combined."""
 
 from __future__ import annotations
 

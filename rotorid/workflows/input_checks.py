@@ -1,4 +1,4 @@
-"""What a workflow is given: its options, checked and as JSON has them; rotors and jobs, read from files."""
+"""Checks of what a workflow is given: options, as JSON has them, too; rotors and jobs read from files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Quantities with units as people write them, one reader for each kind: 500kg, 8mm, 35g@120, left=100mm.
+"""Quantities of options with units, one reader for each kind: 500kg, 8mm, 35g@120, left=100mm.
 
 From Python they are given in SI: kg, m, N, rad/s, kg·m; complex weights count their angle with the rotation.
 """

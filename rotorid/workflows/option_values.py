@@ -1,4 +1,4 @@
-"""Options as people write them, one reader for each kind: speeds, ranges, nodes, sensors, names, pairs.
+"""Values of options as people write them: speeds, ranges, nodes, sensors, names, pairs, a reader each.
 
 Each takes a text of the command line or, from Python, what it stands for, in SI. Weights, lengths and other
 quantities with units are read by `rotorid.workflows.option_quantities`.

@@ -1,4 +1,4 @@
-"""What the runs of a job say about its conventions, and what it would be under other ones."""
+"""Other conventions for a job: what its runs say about the stated ones, and what others would give."""
 
 from __future__ import annotations
 

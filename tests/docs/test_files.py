@@ -10,8 +10,8 @@ import rotorid
 from rotorid.expressions import FUNCTIONS
 from rotorid.samples import sample_data
 from rotorid.tables.data import modes_table as modes
-from rotorid.tables.job import keys as jobkeys
-from rotorid.tables.job import workbook_reading as jobbook
+from rotorid.tables.job import job_from_excel as jobbook
+from rotorid.tables.job import job_keys as jobkeys
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.rotor import bearing
 from rotorid.tables.rotor import rotor_table as rotor

@@ -1,4 +1,4 @@
-"""What a small rotor is made of: static shapes, modal damping, supports without mass condensed."""
+"""Condensation of a rotor to a few nodes: static shapes, modal damping, supports without mass."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def external_damping(rotor: fem.Rotor, quadratic: Quadratic, ratios: tuple[float
 
     lowest = max((support.speeds[0] for support in rotor.supports if support.speeds), default=0.0)
     at_rest = quadratic.at(np.array([lowest]))[1][0] - lowest * quadratic.K1
-    d, f = quadratic.basis.shape[1], len(quadratic.P.feet)
+    d, f = quadratic.basis.shape[1], len(quadratic.P.pedestals)
     for plane, axis in enumerate("xy"):
         own = np.concatenate((plane * d + np.arange(d), 2 * d + plane * f + np.arange(f)))
         K, M = at_rest[np.ix_(own, own)], quadratic.M[np.ix_(own, own)]

@@ -1,4 +1,4 @@
-"""The small model's response to unbalance beside the full rotor's: what the reduction costs in running."""
+"""Unbalance response of the small model beside the full rotor's: what the reduction costs in running."""
 
 from __future__ import annotations
 

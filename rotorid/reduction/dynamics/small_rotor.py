@@ -258,7 +258,7 @@ class SmallRotor:
 
     def _order(self) -> list[tuple[str, int]]:
         """Names of the unknowns, and where they stand in `quadratic`."""
-        d, n, feet = len(self.kept), len(self.nodes), self.quadratic.P.feet
+        d, n, pedestals = len(self.kept), len(self.nodes), self.quadratic.P.pedestals
         out = [
             (f"{axis}{self.kept[k]}", plane * d + k)
             for part in (range(n), range(n, d))
@@ -266,9 +266,9 @@ class SmallRotor:
             for k in part
         ]
         out += [
-            (f"foot_{axis}{int(foot) + 1}", 2 * d + plane * len(feet) + k)
+            (f"foot_{axis}{int(node) + 1}", 2 * d + plane * len(pedestals) + k)
             for plane, axis in enumerate("xy")
-            for k, foot in enumerate(feet)
+            for k, node in enumerate(pedestals)
         ]
         return out
 

@@ -1,4 +1,4 @@
-"""The small model's modes at many speeds, in the form in which `fem` holds the full rotor's."""
+"""Whirl of the small rotor at many speeds, in the form in which `fem` holds the full rotor's."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def equations(small: SmallRotor) -> Quadratic:
     Q = small.quadratic
     if not small.rotor.symmetric:
         return replace(Q, D0=Q.D0 + small.external)
-    d, feet = Q.basis.shape[1], len(Q.P.feet)
-    in_x = np.concatenate((np.arange(d), 2 * d + np.arange(feet)))
+    d, pedestals = Q.basis.shape[1], len(Q.P.pedestals)
+    in_x = np.concatenate((np.arange(d), 2 * d + np.arange(pedestals)))
     pick = np.ix_(in_x, in_x)
     one = project(both_planes(small.rotor), Q.basis)
     return replace(one, M=Q.M[pick], D0=one.D0 + small.external[pick])

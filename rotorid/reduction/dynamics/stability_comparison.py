@@ -1,4 +1,4 @@
-"""Whether the small model loses stability where the full rotor does."""
+"""Stability of the small model beside the full rotor's: speeds at which both lose it."""
 
 from __future__ import annotations
 

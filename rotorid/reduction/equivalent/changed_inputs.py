@@ -1,4 +1,4 @@
-"""What given changes of the inputs of formula (50) do to masses and frequencies."""
+"""Changed inputs of formula (50): what they do to masses and frequencies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masses at given nodes: the rotor's frequencies exactly, or its shapes, or how much of both."""
+"""Trade-off of masses at given nodes: the rotor's frequencies exactly, or its shapes, or how much of both."""
 
 from __future__ import annotations
 

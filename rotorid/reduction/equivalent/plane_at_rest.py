@@ -1,4 +1,4 @@
-"""Where formula (50) looks at a rotor: at which nodes, and in the plane x at rest."""
+"""Rotor at rest in one plane with the chosen nodes, as formula (50) takes it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A job as it is written: a job file, or a workbook with sheets of tables, planes, sensors and settings."""
+"""Jobs from Excel workbooks and job files, as written: sheets of tables, planes, sensors, settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The results of a balancing job as sheets of a workbook; they are for reading and are not read back."""
+"""Results of a balancing job as sheets of an Excel workbook; they are for reading and are not read back."""
 
 from __future__ import annotations
 

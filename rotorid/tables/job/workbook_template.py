@@ -1,4 +1,4 @@
-"""An empty workbook to fill in at the machine: headers, explanations, allowed values, an example."""
+"""Template: an empty Excel workbook to fill in at the machine, with headers, explanations, allowed values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A balancing job and its results as one workbook, from which the job can be read back unchanged."""
+"""Writing a balancing job and its results as one Excel workbook, from which the job reads back unchanged."""
 
 from __future__ import annotations
 

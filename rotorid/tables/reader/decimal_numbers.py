@@ -1,4 +1,4 @@
-"""A number from the text of a cell: strictly, or a reason why not."""
+"""Decimal numbers from the text of a cell, with point or comma: strictly, or a reason why not."""
 
 from __future__ import annotations
 

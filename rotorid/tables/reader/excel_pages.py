@@ -1,4 +1,4 @@
-"""Pages of a workbook for people: bold headers that stay in sight, names as text, explanations, choices."""
+"""Excel pages for people: bold headers that stay in sight, names as text, explanations, choices."""
 
 from __future__ import annotations
 

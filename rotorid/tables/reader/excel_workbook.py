@@ -1,4 +1,4 @@
-"""Workbooks (.xlsx): sheets into rows of cells."""
+"""Excel workbooks (.xlsx): sheets into rows of cells."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every complaint about an input file: what was found where, and what was expected."""
+"""Problems of an input file: messages with file, row and column, what was found and what was expected."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text files as spreadsheets and people write them: bytes into rows of cells."""
+"""Text files (.csv and the like) as people write them: encoding, separator, decimal comma, rows of cells."""
 
 from __future__ import annotations
 

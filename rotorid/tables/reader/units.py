@@ -1,4 +1,4 @@
-"""Units: the last part of a column's name, and how its numbers become SI."""
+"""Units (mm, mil, g, oz, rpm …): the last part of a column's name, and how its numbers become SI."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings about rotors unlike any that was built, with the unit that was probably meant."""
+"""Plausibility of a rotor: warnings about values unlike any that was built, with the unit probably meant."""
 
 from __future__ import annotations
 

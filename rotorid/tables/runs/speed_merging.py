@@ -1,4 +1,4 @@
-"""Speeds of different runs that count as one."""
+"""Merging of speeds: those of different runs that count as one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a job counts phases and angles, and how large its errors are said to be."""
+"""Stated conventions of a job: how it counts phases and angles, and how large its errors are said to be."""
 
 from __future__ import annotations
 

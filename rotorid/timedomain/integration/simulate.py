@@ -1,4 +1,4 @@
-"""Simulation of a model over a record's times, with the sensitivities to all parameters."""
+"""Simulation of a model over a record's times with its sensitivities: chooses the integrator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One search for the parameters, by one of the methods, within a limit of time."""
+"""Methods of `fit` (registry), and one search for the parameters by one of them, within a limit of time."""
 
 from __future__ import annotations
 

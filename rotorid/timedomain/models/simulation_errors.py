@@ -1,4 +1,4 @@
-"""What a simulation cannot do."""
+"""Errors of a simulation: states that overflow or are not numbers."""
 
 from __future__ import annotations
 

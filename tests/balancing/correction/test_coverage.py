@@ -17,7 +17,7 @@ from repetitions import highest_share, lowest_share, repetitions
 from scipy.special import chdtri
 
 from balancing import UndeterminedError, estimate_influence
-from balancing.correction.region_coverage import clearness, optimism, relative_error, uncertain
+from balancing.correction.region_coverage import clearness, relative_error, too_small, uncertain
 from balancing.solvers.effective_variance import effective_variance
 from rotorid.regression import stretch
 
@@ -153,17 +153,17 @@ def test_large_errors_of_the_weights_are_named():
 
 def test_the_words_name_the_weak_plane():
     W, C = coefficients([0.01, 0.9])
-    words = optimism(W, C, ("drive", "fan"))
+    words = too_small(W, C, ("drive", "fan"))
     assert "the effect of plane 'fan' is only 1." in words
     assert "contained the truth in 40 to 65 % of simulated jobs" in words
     assert "repeat the trial run of plane 'fan'" in words
-    assert optimism(W, coefficients([0.01, 0.01])[1], ("drive", "fan")) == ""
+    assert too_small(W, coefficients([0.01, 0.01])[1], ("drive", "fan")) == ""
 
 
 def test_the_words_name_planes_that_act_alike():
     W, C = coefficients([0.1, 0.1])
     W[:, 1] = W[:, 0] * (1 + 1j) + 0.15 * W[:, 1]
-    words = optimism(W, C, ("drive", "fan"))
+    words = too_small(W, C, ("drive", "fan"))
     assert "planes 'drive' and 'fan' act so much alike (condition number" in words
     assert "use the weighted method, which is more honest here" in words
     assert "leave a plane out" in words
@@ -172,7 +172,7 @@ def test_the_words_name_planes_that_act_alike():
 def test_exact_coefficients_are_never_optimistic():
     W, C = coefficients([0.0, 0.0])
     assert clearness(W, C) == np.inf
-    assert optimism(W, C, ("A", "B")) == ""
+    assert too_small(W, C, ("A", "B")) == ""
 
 
 def test_clearness_is_that_of_the_effect_for_one_plane():

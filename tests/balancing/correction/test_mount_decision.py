@@ -9,7 +9,7 @@ from cases import each_of
 
 from balancing import Influence, Limits, ReadingErrors, UndeterminedError, correct, estimate_influence
 from balancing.coefficients.baseline import starting_point
-from balancing.correction.mount_decision import Stakes, remedies
+from balancing.correction.mount_decision import Inputs, remedies
 from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import error_form, prediction_covariance
 
@@ -48,8 +48,8 @@ def test_good_jobs_are_not_warned_of(method, share):
     for i in range(50):
         trials, W, Y0 = simulated(rng, errors=ERRORS if i % 2 else None)
         c = correct(estimate_influence(trials), refuse=False, method=method)
-        words.append(c.counsel.word)
-        worse += c.counsel.word == "mount" and np.linalg.norm(Y0 + W @ c.weights) > np.linalg.norm(Y0)
+        words.append(c.decision.word)
+        worse += c.decision.word == "mount" and np.linalg.norm(Y0 + W @ c.weights) > np.linalg.norm(Y0)
     assert words.count("mount") >= share * len(words)
     assert worse == 0
 
@@ -62,11 +62,11 @@ def test_where_weights_fight_what_is_proposed_is_better():
         if W.shape[-1] == 1:
             continue
         c = correct(estimate_influence(trials), refuse=False)
-        if c.counsel.word == "mount":
+        if c.decision.word == "mount":
             continue
-        ours.append(left(W, Y0, c.planes, c.counsel.choices[0]))
+        ours.append(left(W, Y0, c.planes, c.decision.choices[0]))
         theirs.append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
-        assert c.counsel.instead
+        assert c.decision.instead
     assert len(ours) > 20
     assert np.mean(ours) < 0.4 * np.mean(theirs)
     assert np.mean(np.array(ours) < theirs) > 0.9
@@ -82,7 +82,7 @@ def test_weak_trial_weights_are_told_from_good_ones():
             c = correct(estimate_influence(trials), method="least-squares")
         except UndeterminedError:
             continue
-        found[c.counsel.word].append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
+        found[c.decision.word].append(np.linalg.norm(Y0 + W @ c.weights) / np.linalg.norm(Y0))
     assert min(len(each) for each in found.values()) > 15
     assert np.mean(np.array(found["mount"]) < 1) == 1
     assert np.median(found["do not mount"]) > 2 * np.median(found["mount"])
@@ -116,7 +116,7 @@ def test_what_is_assumed_refuses_nothing():
     assert known.known_covariance is None
     for method in (None, "weighted", "least-squares"):
         c = correct(known, method=method)
-        assert c.counsel.word == "do not mount"
+        assert c.decision.word == "do not mount"
         assert c.covariance is not None
     stated = estimate_influence(alike(ERRORS))
     np.testing.assert_array_equal(stated.known_covariance, stated.covariance)
@@ -142,19 +142,19 @@ def test_a_speed_that_was_left_out_separates_the_planes():
     known = estimate_influence(alike(speeds=(100.0, 200.0)))
     alone = correct(known, speeds=[100.0])
     assert any(
-        "use 1909.86 rpm too, a speed left out, where planes 'A' and 'B'" in w for w in alone.counsel.instead
+        "use 1909.86 rpm too, a speed left out, where planes 'A' and 'B'" in w for w in alone.decision.instead
     )
-    assert correct(known).counsel.word == "mount"
+    assert correct(known).decision.word == "mount"
 
 
 def test_limits_leave_choices_and_trial_weights_out():
     trials = alike(trial=0.02, separate=1.0)
     known = estimate_influence(trials)
-    stakes = Stakes(known, starting_point(known, None), [0], [0, 1])
-    free = remedies(stakes)
+    inputs = Inputs(known, starting_point(known, None), [0], [0, 1])
+    free = remedies(inputs)
     assert any("repeat the trial run of plane 'A' with" in w for w in free)
     limits = Limits(np.array([0.05, 0.05]) * GRAM, np.full((1, 5), np.inf), ((), ()))
-    bound = replace(stakes, limits=limits)
+    bound = replace(inputs, limits=limits)
     assert not bound.fewer()
     assert any(
         "leave plane 'A' out: a clear trial weight would be larger than its largest" in w
@@ -173,7 +173,7 @@ def test_runs_that_disagree_ask_for_measuring_again():
     known = estimate_influence(again)
     assert "runs 'run 0' and 'again'" in known.contradictions[0]
     c = correct(known, refuse=False)
-    assert c.counsel.word == "measure again"
+    assert c.decision.word == "measure again"
     assert c.summary().startswith("Measure again: runs 'run 0' and 'again' have the same weights")
     assert not any("same weights mounted" in w for w in c.warnings)
 
@@ -186,17 +186,17 @@ def test_weights_that_fight_without_known_errors(turn, word):
     known = Influence(np.array([100.0]), ("1", "2", "3"), ("A", "B"), W, baseline=[[1, 1.05, 1]])
     c = correct(known)
     assert c.covariance is None
-    assert c.counsel.word == word
+    assert c.decision.word == word
     if word != "mount":
-        assert c.counsel.cause.startswith("planes 'A' and 'B' act alike, and their weights fight each other")
-        assert c.counsel.instead[0].startswith("Instead: plane ")
+        assert c.decision.cause.startswith("planes 'A' and 'B' act alike, and their weights fight each other")
+        assert c.decision.instead[0].startswith("Instead: plane ")
         assert c.to_dict()["judgement"]["fewer_planes"][0]["rms_after"] < 0.1
 
 
 def test_a_good_correction_says_nothing():
     trials, *_ = simulated(np.random.default_rng(6))
     c = correct(estimate_influence(trials))
-    assert c.counsel.lines() == ()
+    assert c.decision.lines() == ()
     assert c.to_dict()["judgement"]["word"] == "mount"
     assert c.to_dict()["judgement"]["cause"] is None
     assert "Do not mount" not in c.summary()

@@ -11,7 +11,7 @@ from balancing_data import bruel_kjaer, feese_grazier, job, synthetic
 from matplotlib.figure import Figure
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.plots import polar as plots
+from balancing.plots import correction_polar as plots
 from rotorid.plots import plot
 
 ERRORS = ReadingErrors(0.02, np.deg2rad(1))
