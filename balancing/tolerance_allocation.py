@@ -1,4 +1,4 @@
-"""How the permissible unbalance of a rigid rotor is shared by two planes (ISO 21940-11).
+"""Allocation of the permissible unbalance of a rigid rotor to two planes (ISO 21940-11).
 
 **Tolerance planes** (the clauses on allocation to tolerance planes) are the bearing planes, at a and b, with
 the centre of mass at c. An unbalance U_per at c loads them like the static weight, by the levers

@@ -1,4 +1,4 @@
-"""At which angle a first trial weight goes, from the phase of the initial reading and the expected lag.
+"""Angle of a first trial weight, from the phase of the initial reading and the expected lag.
 
 A reading with phase φ (positive = lead) at a sensor at the angle α is A cos(ωt + φ), with t = 0 when the
 mark passes the key phasor, at the angle κ; angles count with the rotation. At time t the mark stands at κ +

@@ -1,4 +1,4 @@
-"""A sensible first trial weight: how much, where, and what it should do to the readings.
+"""First trial weight: how large, where, and what it should do to the readings.
 
 **Amount from the force.** A weight m at the radius r turns into the force m r ω²; a first trial weight
 makes a fraction f (10 %) of the load that the plane carries, m r ω² = f · load, with load = m_rotor g /

@@ -1,4 +1,4 @@
-"""What data tell apart: runs the planes, readings their weights; and if they do not, why, in words.
+"""Identifiability: whether runs tell the planes apart, and readings their weights; if not, why, in words.
 
 Columns are compared after scaling to length 1 (`separation`). Where coefficients have errors, `resolution`
 asks whether the weakest combination of the planes has an effect at all, or only errors.

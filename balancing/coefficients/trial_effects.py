@@ -1,4 +1,4 @@
-"""Whether the trial weights changed the vibration enough, and whether the runs agree with each other."""
+"""Effect of the trial weights on the vibration: large enough, and whether the runs agree with each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a check run shows what was predicted: the difference against the errors of both.
+"""Check run against its prediction: the difference compared with the errors of both.
 
 A reading in a check run with weights T mounted is predicted as Y₀ + W T. It differs from that by the errors
 of the prediction, dY₀ + dW T, by its own, which repeated readings reduce, and by what its run has of its own

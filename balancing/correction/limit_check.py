@@ -1,4 +1,4 @@
-"""One residual unbalance or reading against its limit: pass, fail, or not decidable with these readings.
+"""Check of one residual unbalance or reading against its limit: pass, fail, or not decidable.
 
 What is judged is a complex number with errors: a residual unbalance, or a reading. With its covariance V and
 the radius ρ of the 95 % region (`balancing.correction.correct.region_radius`) it lies in the ellipse

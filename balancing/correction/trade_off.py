@@ -1,4 +1,4 @@
-"""How much vibration how much weight takes away: the residual over the total weight of all planes."""
+"""Trade-off of residual vibration against total weight of all planes."""
 
 from __future__ import annotations
 

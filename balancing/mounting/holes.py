@@ -1,4 +1,4 @@
-"""What can be mounted in one plane: positions (holes), pieces, what is there already.
+"""Holes of one plane: positions, pieces, what is mounted there already.
 
 Angles count with the rotation, in rad; weights are kg (mass at the plane's radius) or kg·m (unbalance).
 A hole in which something is mounted cannot be used further. What is mounted is part of the readings already,

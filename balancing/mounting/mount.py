@@ -1,4 +1,4 @@
-"""A correction as it can really be mounted: pieces in holes, all planes together."""
+"""Mounting a correction: pieces in holes, chosen for all planes together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One given weight on the holes of one plane: the nearest vector that can be mounted.
+"""Split of one given weight on the holes of one plane: the nearest vector that can be mounted.
 
 The vector Σ_h a_h e^{iφ_h} nearest to a target, where a_h is what can stand in hole h, is found exactly: the
 free holes are dealt in turn to two halves, all sums of each half are listed (equal ones once, with the fewest

@@ -1,4 +1,4 @@
-"""How well the readings tell the planes apart: singular values, rank, planes that act alike, in words."""
+"""Conditioning of the planes by the readings: singular values, rank, planes that act alike, in words."""
 
 from __future__ import annotations
 

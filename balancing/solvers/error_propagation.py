@@ -1,4 +1,4 @@
-"""How errors of the readings go through the corrections: first order, through W and through Y₀.
+"""Propagation of the readings' errors into the corrections: first order, through W and through Y₀.
 
 The corrections D = −W⁺ Y₀ satisfy Wᴴ r = 0 with the residual r = Y₀ + W D. Its differential,
 dWᴴ r + Wᴴ (dY₀ + dW D + W dD) = 0, gives

@@ -1,4 +1,4 @@
-"""Whether an identified model can be right: what it leaves of the readings, signs of passive elements."""
+"""Plausibility of an identified model: what it leaves of the readings, signs of passive elements."""
 
 from __future__ import annotations
 

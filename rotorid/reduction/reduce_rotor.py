@@ -1,4 +1,4 @@
-"""A rotor reduced to masses at chosen nodes."""
+"""Reduction of a rotor to masses at chosen nodes."""
 
 from __future__ import annotations
 

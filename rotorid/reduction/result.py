@@ -1,4 +1,4 @@
-"""A reduced rotor beside the rotor itself."""
+"""Result of a reduction: the reduced rotor beside the rotor itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What only the balancing sheet shows, as JSON types in the job's units: runs, coefficients, 95 % widths."""
+"""Data that only the balancing sheet shows, in the job's units: runs, coefficients, 95 % widths."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all sheets share: the page, figures inside it, and numbers that say where they come from."""
+"""Page that all sheets share: figures inside it, and numbers that say where they come from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a record determines of a nonlinear model instead of its parameters: sums, products, or neither.
+"""Combinations of parameters that a record determines of a nonlinear model: sums, products, or neither.
 
 The null space of the sensitivities is a direction at the values found. Where the outputs stay what they are
 along the straight line in that direction, linear combinations are determined; where they stay along a line

@@ -1,4 +1,4 @@
-"""What residuals point at: offset, drift and hum of the sensors, and wrong initial values.
+"""Causes that residuals point at: offset, drift and hum of the sensors, wrong initial values.
 
 Each of them is a column beside the sensitivities to the parameters. It is named where it takes more of the
 residuals than chance would let it, counting neighbouring residuals that are still correlated without it.

@@ -1,4 +1,4 @@
-"""What the residuals of a fit tell: are they noise, and is it the same noise everywhere?
+"""Tests of the residuals of a fit: are they noise, and is it the same noise everywhere?
 
 A series is one output of one record. Every series is judged by itself: the outputs may have other units.
 """

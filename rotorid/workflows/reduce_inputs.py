@@ -1,4 +1,4 @@
-"""What `reduce` takes: measured modes at the masses, errors, shares."""
+"""Inputs of `reduce`: measured modes at the masses, errors, shares."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `reduce` gives: the masses, what was asked for beside them, and the small model as files."""
+"""Result of `reduce`: the masses, what was asked for beside them, and the small model as files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the small model loses stability, found as `fem.stability_threshold` finds it of the full rotor."""
+"""Threshold of instability of the small model, found as `fem.stability_threshold` finds the full rotor's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What errors of the inputs do to the masses of formula (50) and to the frequencies of the small model.
+"""Uncertainty of the masses of formula (50) and of the small model's frequencies, from errors of the inputs.
 
 All of this is first order (derivatives: `rotorid.reduction.equivalent.mass_sensitivity`); the result compares
 it with exact recomputation and says where it is poor.

@@ -1,4 +1,4 @@
-"""What a method found: the way it went and the kernel's judgement at its end."""
+"""History of the iterations of a fit, and the kernel's judgement at their end."""
 
 from __future__ import annotations
 

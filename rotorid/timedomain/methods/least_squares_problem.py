@@ -1,4 +1,4 @@
-"""A fit as a least-squares problem: residuals and their derivatives over all records."""
+"""Least-squares problem of a fit: residuals and their derivatives over all records."""
 
 from __future__ import annotations
 
