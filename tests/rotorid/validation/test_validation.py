@@ -278,7 +278,7 @@ def unstretched(function):
             100,
         ),
         (
-            "rotorid.timedomain.integration.matrix_exponential._pade",
+            "rotorid.timedomain.integration.matrix_exponential.expm_and_derivatives",
             lambda f: scaled(f, 1.0001),
             "time_records",
             50,
