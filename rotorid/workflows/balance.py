@@ -53,56 +53,65 @@ def choices() -> dict[str, Sequence[Method[Any]]]:
 
 @dataclass(frozen=True)
 class BalanceOptions:
-    """Options of `balance`.
+    """Options of `balance`; conventions and errors stand in place of what the job says.
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the readings count; default: weighted where their errors are known, else least-squares.
-    influence
+    influence : FILE
         Stored influence coefficients.
-    coefficients
+    coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.
-    model_error
+    model_error : PERCENT
         Standard deviation of computed coefficients; combined: 20 if not given.
-    amplitude_error, phase_error, run_error, phase, angles
-        In place of what the job says, errors in percent and degrees.
-    planes
+    amplitude_error : PERCENT
+        Standard deviation of a reading's amplitude.
+    phase_error : DEGREES
+        Standard deviation of a reading's phase.
+    run_error : PERCENT
+        Standard deviation of what changes from run to run, percent of a reading.
+    phase : lead|lag
+        What a positive phase means.
+    angles : DIRECTION
+        How angles count: with rotation, against rotation, or clockwise and counter-clockwise where the job
+        states its rotation.
+    planes : LIST
         Use these planes only.
-    speeds
+    speeds : LIST
         Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.
-    max_mass
+    max_mass : MASS
         Largest weight of every plane, 5g; or left=5g,right=3g.
-    limit
+    limit : SENSOR=VALUE
         Largest amplitude of a sensor; VALUE alone: of all. May be repeated.
-    ridge
+    ridge : STRENGTH
         Small weights where planes act alike: 0.01 … 0.1, or auto.
-    truncate
+    truncate : NUMBER
         Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
     split
         Choose pieces in the holes of the job, all planes together (a picture of discs).
-    split_seconds
+    split_seconds : SECONDS
         For the proof that no choice is better.
     refine
         Add the job's check runs to its trial runs: coefficients and trim from all of them.
     history
         All runs and check runs of the job in one table, too.
-    best_planes
+    best_planes : K
         Use the best K planes, after comparing all choices.
     trade_off
         Residual against total weight, too (a second picture).
-    grade
+    grade : GRADE
         Judge the planes by ISO 21940-11: G0.4 to G4000.
-    rotor_mass
+    rotor_mass : MASS
         For --grade, such as 500kg.
-    service_speed
+    service_speed : SPEED
         For --grade, such as 3000rpm.
-    positions
+    positions : LIST
         For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.
-    bearings
+    bearings : A,B
         For --positions, 0mm,700mm.
-    centre
+    centre : POSITION
         For --positions: of the centre of mass.
     """
 

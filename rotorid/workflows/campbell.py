@@ -28,7 +28,7 @@ class CampbellOptions:
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm.
     number
         How many modes, by default 6; forward and backward whirl count apart.
-    operating
+    operating : A:B
         Operating speeds, such as 5300:6500rpm.
     """
 

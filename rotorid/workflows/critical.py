@@ -30,7 +30,7 @@ class CriticalOptions:
         Estimate by refinement how far off the mesh makes each.
     speed_map
         Critical speeds over the stiffness of the bearings, too; the picture is of them then.
-    operating
+    operating : A:B
         Operating speeds, such as 5300:6500rpm.
     """
 

@@ -35,32 +35,32 @@ class FitOptions:
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the parameters are searched.
-    integrator
+    integrator : NAME
         How the equations are solved.
-    loss
+    loss : LOSS
         What a residual counts.
-    start
+    start : LIST
         Starting values instead of the model's: k=2,d=0.1; the others stay.
-    starts
+    starts : N
         Begin from several places, to find other minima.
-    seed
+    seed : N
         Other places to start from; default: 0.
-    max_iterations
+    max_iterations : N
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
-    max_seconds
+    max_seconds : S
         Limit of the search; what it has found by then has no intervals.
-    trajectory
+    trajectory : model|data
         Where quasilinearization (default: model) and multiple shooting (default: data) begin: the model's own
         solution, or the measured outputs.
-    pieces
+    pieces : N
         Of each record in multiple shooting; default: 12, or fewer for a short one.
-    rtol
+    rtol : X
         Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
-    sigma
+    sigma : LIST
         Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
         from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
     """

@@ -31,17 +31,17 @@ class IdentifyOptions:
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the coefficients are found.
-    loss
+    loss : LOSS
         Of output error.
-    amplitude_error
+    amplitude_error : PERCENT
         One standard deviation of an amplitude, in percent; before that of the model.
-    phase_error
+    phase_error : DEGREES
         One standard deviation of a phase, in degrees; before that of the model.
-    design
+    design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
-    choose
+    choose : N
         How many of them; default: as many as the parameters, at least 2.
     """
 

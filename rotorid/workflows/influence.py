@@ -27,11 +27,11 @@ class InfluenceOptions:
     Attributes
     ----------
     planes
-        Correction planes: "7,12,18", or nodes and stations.
+        Correction planes: nodes or stations, such as 7,12,18.
     sensors
-        "2:45,22:45", or nodes and stations with angles from x in degrees.
+        Sensors: nodes or stations, each with its angle from x in degrees: 2:45,22:45 (without: 0).
     speeds
-        "1000:6000:50rpm", or rad/s.
+        FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:6000:50rpm.
     """
 
     planes: Nodes

@@ -20,17 +20,17 @@ class ToleranceOptions:
 
     Attributes
     ----------
-    mass
+    mass : MASS
         Of the rotor, such as 500kg.
-    speed
+    speed : SPEED
         Highest service speed, such as 3000rpm.
-    grade
+    grade : GRADE
         Balance quality grade, G0.4 to G4000.
-    planes
+    planes : LIST
         One or two correction planes, with positions along the shaft or without: left=100mm,right=600mm.
-    bearings
+    bearings : A,B
         Positions of both bearings, 0mm,700mm; default: the planes are the tolerance planes.
-    centre
+    centre : POSITION
         Of the centre of mass, such as 350mm.
     """
 

@@ -33,43 +33,46 @@ class TrialWeightOptions:
 
     Attributes
     ----------
-    rotor_mass
+    rotor_mass : MASS
         Of the rotor, such as 500kg.
-    bearing_load
+    bearing_load : FORCE
         Carried at the plane, such as 2500N.
-    carried_by
+    carried_by : N
         Planes that share the mass of the rotor.
-    speed
+    speed : SPEED
         Such as 3000rpm.
-    radius
+    radius : RADIUS
         Where the weight goes, 200mm.
-    fraction
+    fraction : PERCENT
         Force of the weight, of the load (without a job).
-    share
+    share : PERCENT
         Change, of the largest reading (with a job).
-    plane
+    plane : LIST
         Planes of the job; default: all of them.
-    mass
+    mass : MASS
         Try this weight, with a job: what would it do?
-    max_mass
+    max_mass : MASS
         Largest weight of the plane, 30g.
-    reading_phase
+    reading_phase : DEGREES
         Of the largest initial reading, no job.
-    lag
+    lag : below|at|above|DEGREES
         Speed against the critical one, or the lag.
-    critical
+    critical : SPEED
         Critical speed, in place of --lag: 2400rpm.
-    damping
+    damping : RATIO
         Damping ratio at the critical speed.
-    sensor_angle
+    sensor_angle : DEGREES
         Where the sensor is (without a job).
-    key_phasor
+    key_phasor : DEGREES
         Where the key phasor is (without a job).
-    measures
+    measures : QUANTITY
         displacement, velocity, acceleration (without a job).
-    phase, angles
-        What a positive phase means, and how angles count.
-    unit
+    phase : lead|lag
+        What a positive phase means.
+    angles : DIRECTION
+        How angles count: with rotation, against rotation, or clockwise and counter-clockwise where the job
+        states its rotation.
+    unit : UNIT
         Of the result without a job: g, oz, kg, mg or lb.
     """
 

@@ -32,13 +32,13 @@ class UnbalanceOptions:
     ----------
     stations
         Nodes or stations where unbalance may be: 6,9,12.
-    method
+    method : METHOD
         How the unbalance follows from the readings.
-    modes
+    modes : K
         Of the rotor, for modal: 1 … K.
-    ridge
+    ridge : STRENGTH
         For ridge; default: from the errors.
-    model_error
+    model_error : PERCENT
         Standard deviation of the coefficients.
     """
 

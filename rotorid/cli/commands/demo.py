@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption
-from rotorid.cli.output import chosen, deliver, json_text
+from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
@@ -24,7 +23,9 @@ def demo(
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SAMPLES)}.")
     ] = DemoOptions.sample,
     show: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
-    json: JsonOption = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")
+    ] = False,
 ) -> None:
     """Write a sample to DIR, run its commands on it, and say where the pictures are.
 
@@ -33,9 +34,9 @@ def demo(
     Example: rotorid demo demo --sample holes
     """
     if show:
-        deliver("samples", samples, as_json=json)
+        Destination(json).deliver("samples", samples)
         return
-    made = work(folder, chosen(DemoOptions, locals()))
+    made = work(folder, DemoOptions(sample))
     if json:
         typer.echo(json_text(made.run(_document).document))
         return
