@@ -98,7 +98,7 @@ def _parameters(
         if field.default is dataclasses.MISSING:
             default = inspect.Parameter.empty
         typed = found if default is not None else found | None
-        annotation: Any = Annotated[typed, option, choices]  # type: ignore[valid-type]
+        annotation: Any = Annotated[typed, option, choices]
         yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
 
 
