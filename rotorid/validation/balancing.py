@@ -2,8 +2,8 @@
 
 The two-plane example of Brüel & Kjær's application note 17-227 and the weights left in of Feese and Grazier
 are the jobs `sample_data/bk_two_plane` and `sample_data/left_in`. The readings of the other examples are
-given here and in `data/foiles_min_max.csv`. The numbers of example 6 of the note, of Feese and Grazier, and of
-Foiles, Allaire and Gunter are those that the public tests of hsbalance quote.
+given here and in `data/foiles_min_max.csv`. The numbers of example 6 of the note, of Feese and Grazier, and
+of Foiles, Allaire and Gunter are those that the public tests of hsbalance quote.
 """
 
 from __future__ import annotations
