@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.given import file_of
+from rotorid.workflows.given import check_choices, file_of
 from rotorid.workflows.other_readings import with_contradiction, with_other_readings
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.outcome import Parts, provenance, workflow
 from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.verdict import judge
 
@@ -145,7 +145,7 @@ class BalanceOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Balance(Outcome):
+class Balance(Parts):
     """A correction, and what was asked for beside it.
 
     Attributes
@@ -170,9 +170,11 @@ class Balance(Outcome):
     curve: TradeOff | None
     history: History | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        parts = {
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The correction, and what was asked for beside it."""
+        return {
+            "": self.result,
             "mounting": self.mounted,
             "check": self.check,
             "verdict": self.verdict,
@@ -180,16 +182,13 @@ class Balance(Outcome):
             "trade_off": self.curve,
             "history": self.history,
         }
-        known = {key: part.to_dict() for key, part in parts.items() if part is not None}
-        return {**self.result.to_dict(), **known}
 
     def summary(self) -> str:
         """For the terminal."""
-        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve, self.history)
-        blocks = [part.summary() for part in parts if part is not None]
+        text = super().summary()
         if self.result.limits is not None and (self.subsets or self.curve):
-            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
-        return "\n\n".join(blocks)
+            text += "\n\nThe comparison of planes and the trade-off do not look at the limits."
+        return text
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
@@ -291,10 +290,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
 
 def _check(options: BalanceOptions) -> None:
     """Refuse options that are not known or do not go together, before anything is read."""
-    from rotorid.base.registry import find
-
-    if options.method is not None:
-        find(choices()["method"], options.method, "--method")
+    check_choices(options, choices())
     if options.coefficients is not None:
         one_of(options.coefficients, "--coefficients", KINDS)
     if options.ridge is not None and options.truncate is not None:
@@ -414,8 +410,8 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
-    from balancing.iso21940 import tolerance
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.quantities import positions
+    from rotorid.workflows.tolerance import permissible
 
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
     along = (options.positions, options.bearings, options.centre)
@@ -431,13 +427,9 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
     at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
     if set(at) != set(planes):
         raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
-    return tolerance(
-        mass(weight, "--rotor-mass"),
-        speed_with_unit(speed, "--service-speed"),
-        grade,
-        planes=at,
-        bearings=None if options.bearings is None else two_positions(options.bearings),
-        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
+    shaft = at, options.bearings, options.centre
+    return permissible(
+        weight, speed, grade, *shaft, mass_option="--rotor-mass", speed_option="--service-speed"
     )
 
 

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
-from rotorid.workflows.given import file_of
-from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.given import check_choices, file_of
+from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
 from rotorid.workflows.parameters import number, pairs
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from rotorid.base.registry import Method
@@ -90,22 +89,15 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RecordFit(Outcome):
+class RecordFit(Parts):
     """What the fit found."""
 
     fit: Fit
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return self.fit.to_dict()
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.fit.summary()
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per parameter."""
-        return self.fit.to_frame()
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The fit."""
+        return {"": self.fit}
 
     def figure(self) -> Figure:
         """Record and model, residuals, sensitivities, iterations."""
@@ -177,10 +169,7 @@ def fit(
 
 def _check(options: FitOptions) -> None:
     """Refuse names that are not known, and options that the method or the integrator would not look at."""
-    from rotorid.base.registry import names
-
-    for option, known in choices().items():
-        one_of(getattr(options, option), f"--{option}", names(known))
+    check_choices(options, choices())
     if options.trajectory is not None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):

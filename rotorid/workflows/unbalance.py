@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import job_source
+from rotorid.workflows.given import check_choices, job_source
 from rotorid.workflows.outcome import Found, provenance, workflow
 from rotorid.workflows.parameters import Nodes, nodes
 
@@ -74,10 +74,10 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     """
     from balancing.coefficients.from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
-    from rotorid.base.registry import find
     from rotorid.workflows.coefficients import computed
 
-    method = find(choices()["method"], options.method, "--method").name
+    check_choices(options, choices())
+    method = options.method
     if (options.modes is not None) != (method == "modal"):
         raise ValueError("--method modal and --modes K belong together")
     if options.ridge is not None and method != "ridge":
