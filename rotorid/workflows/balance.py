@@ -427,10 +427,8 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
     at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
     if set(at) != set(planes):
         raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
-    shaft = at, options.bearings, options.centre
-    return permissible(
-        weight, speed, grade, *shaft, mass_option="--rotor-mass", speed_option="--service-speed"
-    )
+    said = "--rotor-mass", "--service-speed"
+    return permissible(weight, speed, grade, at, options.bearings, options.centre, names=said)
 
 
 def _trade_off(result: Correction, influence: Influence, job: Job) -> TradeOff:

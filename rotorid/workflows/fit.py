@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
-from rotorid.workflows.given import check_choices, file_of
+from rotorid.workflows.given import check_choices, file_of, refuse
 from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
 from rotorid.workflows.parameters import number, pairs
 
@@ -174,10 +174,10 @@ def _check(options: FitOptions) -> None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):
             raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
-    if options.pieces is not None and options.method != "multiple-shooting":
-        raise ValueError("--pieces belongs to --method multiple-shooting")
-    if options.seed is not None and options.starts == 1:
-        raise ValueError("--seed belongs to --starts N: it chooses the other places to begin from")
+    if options.method != "multiple-shooting":
+        refuse(options, ("pieces",), "belongs to --method multiple-shooting")
+    if options.starts == 1:
+        refuse(options, ("seed",), "belongs to --starts N: it chooses the other places to begin from")
     if options.rtol is None:
         return
     if not 1e-13 <= options.rtol <= 0.01:

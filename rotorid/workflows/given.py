@@ -75,6 +75,19 @@ def changed(options: DataclassInstance) -> dict[str, object]:
     return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
 
 
+def refuse(options: DataclassInstance, needless: Collection[str], why: str) -> None:
+    """Refuse the first of these options that is given: with the others it means nothing.
+
+    Raises
+    ------
+    ValueError
+        Its name and `why`.
+    """
+    for name in changed(options):
+        if name in needless:
+            raise ValueError(f"{option_name(name)} {why}")
+
+
 def check_choices(options: DataclassInstance, choices: Mapping[str, Sequence[Method[Any]]]) -> None:
     """Refuse names that no registry has, with the nearest one; None is the default."""
     for option, known in choices.items():

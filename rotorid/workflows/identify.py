@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, file_of
+from rotorid.workflows.given import check_choices, file_of, refuse
 from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
 from rotorid.workflows.parameters import Speeds, speeds
 
@@ -146,10 +146,10 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
     check_choices(options, choices())
     if not measured and options.design is None:
         raise ValueError(_NO_DATA)
-    if options.loss != "linear" and options.method != "output-error":
-        raise ValueError("--loss belongs to --method output-error: linear regression has none")
-    if options.choose is not None and options.design is None:
-        raise ValueError("--choose belongs to --design FIRST:LAST:STEP")
+    if options.method != "output-error":
+        refuse(options, ("loss",), "belongs to --method output-error: linear regression has none")
+    if options.design is None:
+        refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
 
 
 def _errors(

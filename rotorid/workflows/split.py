@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import changed
+from rotorid.workflows.given import changed, refuse
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import degrees, option_name, pairs
 
@@ -216,10 +216,10 @@ def _way(options: SplitOptions, *, single: bool) -> str:
         )
     way = ways[0] if ways else ""
     for name, belongs in _BELONGS.items():
-        if name in given and way not in belongs:
+        if way not in belongs:
             needed = " or ".join(option_name(one) for one in belongs if one)
             how = f"only with {needed}" if needed else f"not with {option_name(way)}"
-            raise ValueError(f"{option_name(name)} means something {how}")
+            refuse(options, (name,), f"means something {how}")
     return way
 
 

@@ -79,7 +79,7 @@ def permissible(
     *,
     names: tuple[str, str] = ("--mass", "--speed"),
 ) -> Tolerance:
-    """The tolerance of a rotor from quantities as people write them; complaints name these options of the first two.
+    """The tolerance of a rotor from quantities as people write them; `names` of the first two for complaints.
 
     Raises
     ------

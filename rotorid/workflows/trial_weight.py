@@ -8,9 +8,9 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rotorid.workflows.given import changed, job_source
+from rotorid.workflows.given import job_source, refuse
 from rotorid.workflows.outcome import Outcome, log, provenance, workflow
-from rotorid.workflows.parameters import Names, degrees, names, number, one_of, option_name
+from rotorid.workflows.parameters import Names, degrees, names, number, one_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,11 +159,11 @@ def trial_weight(
     )
     files: Sequence[Path] = ()
     if job is None:
-        _refuse(options, _WITH_JOB, "needs a job with coefficients")
+        refuse(options, _WITH_JOB, "needs a job with coefficients")
         found = [_from_force(options, carried)]
     else:
         why = "is for a trial weight without a job, which has phases, speeds and coefficients"
-        _refuse(options, _WITHOUT_JOB, why)
+        refuse(options, _WITHOUT_JOB, why)
         read = job_source(job, options.phase, options.angles)
         found, files = _from_job(read, options, carried), read.files
     first = found[0]
@@ -171,12 +171,6 @@ def trial_weight(
         if value is not None:
             log.info("%s = %.6g", name, value)
     return TrialWeights(weights=tuple(found), provenance=provenance(files, options))
-
-
-def _refuse(options: TrialWeightOptions, needless: Sequence[str], why: str) -> None:
-    for name in changed(options):
-        if name in needless:
-            raise ValueError(f"{option_name(name)} {why}")
 
 
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:

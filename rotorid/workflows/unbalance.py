@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, job_source
+from rotorid.workflows.given import check_choices, job_source, refuse
 from rotorid.workflows.outcome import Found, provenance, workflow
 from rotorid.workflows.parameters import Nodes, nodes
 
@@ -80,8 +80,8 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     method = options.method
     if (options.modes is not None) != (method == "modal"):
         raise ValueError("--method modal and --modes K belong together")
-    if options.ridge is not None and method != "ridge":
-        raise ValueError("--ridge is an option of --method ridge")
+    if method != "ridge":
+        refuse(options, ("ridge",), "is an option of --method ridge")
     read = job_source(job)
     if read.rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')

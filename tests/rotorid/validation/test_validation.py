@@ -266,7 +266,7 @@ def unstretched(function):
             100,
         ),
         (
-            "rotorid.timedomain.integration.matrix_exponential._pade",
+            "rotorid.timedomain.integration.propagation.expm_and_derivatives",
             lambda f: scaled(f, 1.0001),
             "time_records",
             50,
