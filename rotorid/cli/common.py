@@ -26,7 +26,7 @@ _TYPES: dict[str, Any] = {"bool": bool, "int": int, "float": float, "Path": Path
 
 
 def command(
-    options: type,
+    options: type | None = None,
     *,
     names: Mapping[str, Sequence[str]] | None = None,
     least: Mapping[str, float] | None = None,
@@ -40,7 +40,7 @@ def command(
     Parameters
     ----------
     options
-        The dataclass of the workflow's options.
+        The dataclass of the workflow's options; None for a command without.
     names
         What is typed instead of `--field`.
     least
@@ -48,7 +48,7 @@ def command(
     to
         Which fields of `Destination` the command has.
     """
-    own = [*_parameters(options, names or {}, least or {})]
+    own = [] if options is None else [*_parameters(options, names or {}, least or {})]
     where = [one for one in _parameters(Destination, {}, {}) if one.name in to]
 
     def decorate(function: Command) -> Command:
@@ -60,8 +60,10 @@ def command(
 
         @functools.wraps(function)
         def wrapper(**given: Any) -> None:  # noqa: ANN401 - what typer has read
-            made = _taken(options, given), _taken(Destination, given)
-            function(**given, options=made[0], to=made[1])
+            if options is not None:
+                given["options"] = _taken(options, given)
+            given["to"] = _taken(Destination, given)
+            function(**given)
 
         only = inspect.Parameter.KEYWORD_ONLY
         told = [parameter.replace(kind=only) for parameter in told]

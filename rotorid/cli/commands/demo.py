@@ -9,12 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
+from rotorid.cli.common import command
 from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
 
 
+@command(to=("json",))
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
@@ -23,9 +25,8 @@ def demo(
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SAMPLES)}.")
     ] = DemoOptions.sample,
     show: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
-    json: Annotated[
-        bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")
-    ] = False,
+    *,
+    to: Destination,
 ) -> None:
     """Write a sample to DIR, run its commands on it, and say where the pictures are.
 
@@ -34,10 +35,10 @@ def demo(
     Example: rotorid demo demo --sample holes
     """
     if show:
-        Destination(json).deliver("samples", samples)
+        to.deliver("samples", samples)
         return
     made = work(folder, DemoOptions(sample))
-    if json:
+    if to.json:
         typer.echo(json_text(made.run(_document).document))
         return
     for heading, command in made.told():
