@@ -41,9 +41,9 @@ def demo(
     if to.json:
         typer.echo(json_text(made.run(_document).document))
         return
-    for heading, command in made.told():
+    for heading, words in made.told():
         typer.echo(heading)
-        _run(command)
+        _run(words)
         typer.echo("")
     typer.echo(made.summary())
 
