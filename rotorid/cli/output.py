@@ -75,7 +75,7 @@ class Destination:
         """
         from rotorid.cli.verbose import note
         from rotorid.tables.reader.problems import printable
-        from rotorid.tables.reader.writing import table_bytes, write_files
+        from rotorid.tables.reader.table_writing import table_bytes, write_files
 
         plot, output = self.plot, self.output
         files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = [

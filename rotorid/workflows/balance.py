@@ -12,11 +12,10 @@ from warnings import catch_warnings
 
 from rotorid.workflows.balance_verdict import judge
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.given import check_choices, file_of
-from rotorid.workflows.other_readings import with_contradiction, with_other_readings
-from rotorid.workflows.outcome import Parts, provenance, workflow
-from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
-from rotorid.workflows.verdict import judge
+from rotorid.workflows.input_checks import check_choices, file_of
+from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
+from rotorid.workflows.other_conventions import with_contradiction, with_other_readings
+from rotorid.workflows.result_provenance import Parts, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -417,7 +416,7 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
-    from rotorid.workflows.quantities import positions
+    from rotorid.workflows.option_quantities import positions
     from rotorid.workflows.tolerance import permissible
 
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed

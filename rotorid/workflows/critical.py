@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Band, band
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Band, band
+from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,13 +50,13 @@ class Separation:
 
     def to_dict(self) -> dict[str, Any]:
         """Distances as JSON types."""
-        from fem.separation import separation
+        from fem.api684_separation import separation
 
         return separation(self.speeds, self.operating)
 
     def summary(self) -> str:
         """In words."""
-        from fem.separation import separation_text
+        from fem.api684_separation import separation_text
 
         return separation_text(self.to_dict())
 

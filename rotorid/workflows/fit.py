@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
-from rotorid.workflows.given import check_choices, file_of, refuse
-from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
-from rotorid.workflows.parameters import number, pairs
+from rotorid.workflows.input_checks import check_choices, file_of, refuse
+from rotorid.workflows.option_values import number, pairs
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, file_of, refuse
-from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
-from rotorid.workflows.parameters import Speeds, speeds
+from rotorid.workflows.input_checks import check_choices, file_of, refuse
+from rotorid.workflows.option_values import Speeds, speeds
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

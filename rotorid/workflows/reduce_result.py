@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.text import counted
-from rotorid.workflows.outcome import Parts
-from rotorid.workflows.parameters import one_of
+from rotorid.workflows.option_values import one_of
+from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import changed, refuse
-from rotorid.workflows.outcome import Outcome, provenance, workflow
-from rotorid.workflows.parameters import degrees, option_name, pairs
+from rotorid.workflows.input_checks import changed, refuse
+from rotorid.workflows.option_values import degrees, option_name, pairs
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -87,7 +87,7 @@ def permissible(
         For a quantity or a grade that cannot be.
     """
     from balancing.iso21940 import tolerance as of_numbers
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.option_quantities import length, mass, positions, speed_with_unit, two_positions
 
     return of_numbers(
         mass(rotor_mass, names[0]),

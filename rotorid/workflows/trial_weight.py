@@ -8,9 +8,9 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rotorid.workflows.given import job_source, refuse
-from rotorid.workflows.outcome import Outcome, log, provenance, workflow
-from rotorid.workflows.parameters import Names, degrees, names, number, one_of
+from rotorid.workflows.input_checks import job_source, refuse
+from rotorid.workflows.option_values import Names, degrees, names, number, one_of
+from rotorid.workflows.result_provenance import Outcome, log, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd

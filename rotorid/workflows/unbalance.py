@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, job_source, refuse
-from rotorid.workflows.outcome import Found, provenance, workflow
-from rotorid.workflows.parameters import Nodes, nodes
+from rotorid.workflows.input_checks import check_choices, job_source, refuse
+from rotorid.workflows.option_values import Nodes, nodes
+from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import WITH_REPORT, command
+from rotorid.cli.common_options import WITH_REPORT, command
 from rotorid.cli.output import TABLES, Destination, check_targets
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import WITH_REPORT, command
+from rotorid.cli.common_options import WITH_REPORT, command
 from rotorid.cli.output import STATE_SPACES, Destination
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
