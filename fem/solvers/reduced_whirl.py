@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.matrices.lateral_planes import Planes, Quadratic, project
-from fem.solvers.full_band import WholeBand
+from fem.solvers.full_band import Factored, WholeBand
 from fem.solvers.quadratic import Solutions, polish, solve
 from fem.solvers.whirl_basis import Reference, enlarge, reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
@@ -244,13 +244,19 @@ def _true_vectors(
     out = []
     for i, (value, speed) in enumerate(zip(values, speeds, strict=True)):
         factored = band.factor(complex(value), float(speed))
-        # One step is enough: the value is known to more digits than the vector needs.
-        right = factored.solve(band.inertia(Q.expand(X[i])))
-        columns = [band.planes(right).T]
+        columns = [_iterated(band, factored, Q.expand(X[i])).T]
         if not mirrored:
             reduced = value * value * Q.M + value * D[i] + stiffness[i]
             start = np.linalg.svd(reduced.T)[2][-1].conj()
-            left = factored.solve(band.inertia(Q.expand(start)), transposed=True)
-            columns.append(band.planes(left).T)
+            columns.append(_iterated(band, factored, Q.expand(start), transposed=True).T)
         out.append(np.hstack(columns))
     return out
+
+
+def _iterated(
+    band: WholeBand, factored: Factored, x: ComplexArray, *, transposed: bool = False
+) -> ComplexArray:
+    """Two steps of inverse iteration on the mass: one is not enough beside strongly damped modes."""
+    for _ in range(2):
+        x = band.planes(factored.solve(band.inertia(x / np.linalg.norm(x)), transposed=transposed))
+    return x

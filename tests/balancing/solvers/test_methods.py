@@ -17,7 +17,7 @@ from balancing import (
     estimate_influence,
     unbalance,
 )
-from balancing.correction import correction_result
+from balancing.correction import correction_words
 from balancing.solvers import methods
 from balancing.solvers.effective_variance import effective_variance
 from fem.model import supports
@@ -264,7 +264,7 @@ def test_a_method_is_one_entry(monkeypatch):
         "the answer is that of least squares",
         methods.find(methods.METHODS, "least-squares", "").function,
     )
-    for module in (methods, correction_result):
+    for module in (methods, correction_words):
         monkeypatch.setattr(module, "METHODS", (*methods.METHODS, mine))
     trials, _ = job()
     influence = estimate_influence(trials)
