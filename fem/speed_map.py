@@ -15,7 +15,7 @@ from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
 from fem.solvers.roots import bracketed_root
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
@@ -80,22 +80,24 @@ class SpeedMap:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; one list of speeds per mode."""
-        return {
-            "stiffness_N_per_m": self.stiffness.tolist(),
-            "critical_speeds_rad_s": [floats(row) for row in self.speeds.T],
-            "free_rad_s": floats(self.free),
-            "pinned_rad_s": floats(self.pinned),
-            "intersections": [
-                {
-                    "support": item.support,
-                    "direction": item.direction,
-                    "mode": item.mode,
-                    "speed_rad_s": item.speed,
-                    "stiffness_N_per_m": item.stiffness,
-                }
-                for item in self.intersections
-            ],
-        }
+        return plain(
+            {
+                "stiffness_N_per_m": self.stiffness,
+                "critical_speeds_rad_s": self.speeds.T,
+                "free_rad_s": self.free,
+                "pinned_rad_s": self.pinned,
+                "intersections": [
+                    {
+                        "support": item.support,
+                        "direction": item.direction,
+                        "mode": item.mode,
+                        "speed_rad_s": item.speed,
+                        "stiffness_N_per_m": item.stiffness,
+                    }
+                    for item in self.intersections
+                ],
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per stiffness, one column per critical speed."""

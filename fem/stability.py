@@ -15,7 +15,7 @@ from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.solvers.stable_speeds import Bases
 from fem.whirl import available_modes, checked_number, checked_speeds
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
 from rotorid.base.units import RPM, speed_text
 
 SMALLEST = 1e-9
@@ -70,19 +70,21 @@ class Stability:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; unknown values are None."""
-        return {
-            "status": self.status,
-            "lowest_rad_s": self.lowest,
-            "highest_rad_s": self.highest,
-            "threshold_rad_s": self.threshold,
-            "threshold_rpm": None if self.threshold is None else self.threshold * RPM,
-            "mode": self.mode,
-            "frequency_rad_s": self.frequency,
-            "whirl_ratio": self.whirl_ratio,
-            "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
-            "smallest_log_decrement": finite(self.margin),
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "status": self.status,
+                "lowest_rad_s": self.lowest,
+                "highest_rad_s": self.highest,
+                "threshold_rad_s": self.threshold,
+                "threshold_rpm": None if self.threshold is None else self.threshold * RPM,
+                "mode": self.mode,
+                "frequency_rad_s": self.frequency,
+                "whirl_ratio": self.whirl_ratio,
+                "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
+                "smallest_log_decrement": self.margin,
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """The answer as text."""

@@ -10,7 +10,8 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.units import RPM, phase_deg
-from rotorid.report.grids import Cells, Grid, figures, numbered, words
+from rotorid.report.document import Cells
+from rotorid.report.grids import Grid, figures, numbered, words
 from rotorid.report.pictures import Drawing, rotor_picture
 
 if TYPE_CHECKING:

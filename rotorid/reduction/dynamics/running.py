@@ -14,7 +14,7 @@ from fem.model.sensors import SensorLike, label
 from fem.solvers.eigen import finite_modes
 from fem.whirl import checked_speeds
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 from rotorid.base.units import phase_deg
 from rotorid.reduction.dynamics.threshold import stability_threshold
 from rotorid.reduction.dynamics.turning import equations
@@ -136,21 +136,23 @@ class ResponseCost:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: what is said of all speeds, and `worst` of each as relative difference."""
         speed, sensor, plane = self.where
-        return {
-            "nodes": list(self.nodes),
-            "sensors": [str(label(each)) for each in self.sensors],
-            "speeds_rad_s": self.speeds.tolist(),
-            "criticals_rad_s": self.criticals.tolist(),
-            "bands": self.bands,
-            "excluded": self.excluded.tolist(),
-            "relative_difference": floats(self.worst),
-            "largest": self.largest,
-            "median": self.median,
-            "largest_to_highest": self.largest_to_highest,
-            "median_to_highest": self.median_to_highest,
-            "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "sensors": [str(label(each)) for each in self.sensors],
+                "speeds_rad_s": self.speeds,
+                "criticals_rad_s": self.criticals,
+                "bands": self.bands,
+                "excluded": self.excluded,
+                "relative_difference": self.worst,
+                "largest": self.largest,
+                "median": self.median,
+                "largest_to_highest": self.largest_to_highest,
+                "median_to_highest": self.median_to_highest,
+                "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
+                "warnings": self.warnings,
+            }
+        )
 
 
 def compare_response(
