@@ -300,6 +300,7 @@ def _check(options: BalanceOptions) -> None:
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
     from rotorid.tables import Job
+    from rotorid.tables.job.job_data import Overrides
     from rotorid.tables.job.source import JobSource
 
     stored = None if options.influence is None else Path(options.influence)
@@ -307,7 +308,7 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     said = (options.phase, options.angles, *errors)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-        return JobSource(tuple(file_of(file, "a job") for file in files), stored, *said)
+        return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*said))
     if any(value is not None for value in (stored, *said)):
         raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
     return job
@@ -386,7 +387,8 @@ def _again(
 ) -> Correction:
     """The same files under other conventions."""
     with catch_warnings(action="ignore"):  # said when the job was read
-        job = _read(replace(source, phase=phase, angles=angles), options)
+        said = replace(source.overrides, phase=phase, angles=angles)
+        job = _read(replace(source, overrides=said), options)
     return _correct(job, _choose(job, options), planes, options)
 
 

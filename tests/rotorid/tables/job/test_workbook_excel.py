@@ -10,12 +10,12 @@ import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
+from job_comparison import differences
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.job.comparison import differences
 from rotorid.tables.job.source import JobSource
 from rotorid.tables.job.workbook_template import template_bytes
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
