@@ -10,7 +10,7 @@ import numpy as np
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, numbered
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -84,8 +84,7 @@ class Modes:
     def to_frame(self) -> pd.DataFrame:
         """One row per node: number, position and the deflection in each mode."""
         nodes = (Column("node", range(1, self.rotor.n_nodes + 1)), Column("position_m", self.positions))
-        modes = (Column(f"mode_{k}", shape) for k, shape in enumerate(self.shapes.T, start=1))
-        return frame((*nodes, *modes))
+        return frame((*nodes, *numbered("mode_{}", self.shapes)))
 
     def summary(self) -> str:
         """Critical speeds as text."""

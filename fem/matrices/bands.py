@@ -135,6 +135,18 @@ def multiply(band: FloatArray, X: FloatArray) -> FloatArray:
     return Y
 
 
+def held(band: FloatArray, unknowns: IndexArray) -> FloatArray:
+    """Upper band with some unknowns fixed: their rows and columns are those of the identity."""
+    K = band.copy(order="F")
+    width, size = K.shape[0] - 1, K.shape[1]
+    K[:, unknowns] = 0.0
+    K[width, unknowns] = 1.0
+    for above in range(1, width + 1):
+        right = unknowns + above
+        K[width - above, right[right < size]] = 0.0
+    return K
+
+
 def dense(band: FloatArray) -> FloatArray:
     """Full symmetric or Hermitian matrix of a band, shape (size, size), in Fortran order."""
     width, size = band.shape[0] - 1, band.shape[1]

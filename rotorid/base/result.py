@@ -18,7 +18,7 @@ A result has a function `result → tuple of Column`; `rows`, `frame` and `text`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -47,9 +47,14 @@ class Column:
     """
 
     name: str
-    values: Sequence[Any] | NDArray[Any]
+    values: Collection[Any]
     shown: Callable[[Any], str] | None = None
     title: str | None = None
+
+
+def numbered(name: str, values: NDArray[Any]) -> tuple[Column, ...]:
+    """The columns of an array, numbered from 1: `numbered("mass_{}_kg", masses)`."""
+    return tuple(Column(name.format(k), column) for k, column in enumerate(values.T, start=1))
 
 
 def rows(columns: Sequence[Column]) -> list[dict[str, Any]]:

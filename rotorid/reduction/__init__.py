@@ -5,7 +5,7 @@ from rotorid.reduction.dynamics.small import SmallRotor, small_rotor
 from rotorid.reduction.dynamics.stability import StabilityCost, compare_stability
 from rotorid.reduction.dynamics.threshold import stability_threshold
 from rotorid.reduction.equivalent.masses import design, equivalent_masses
-from rotorid.reduction.equivalent.matching import Matching, match, matching_masses
+from rotorid.reduction.equivalent.matching import matching_masses
 from rotorid.reduction.equivalent.sensitivity import InputErrors, mass_sensitivity
 from rotorid.reduction.equivalent.separated import Separated, separate, separated_compliance
 from rotorid.reduction.equivalent.shift import Shift
@@ -23,7 +23,6 @@ __all__ = [
     "Choices",
     "InputErrors",
     "MassUncertainty",
-    "Matching",
     "Method",
     "Methods",
     "Placement",
@@ -45,7 +44,6 @@ __all__ = [
     "mac",
     "mass_sensitivity",
     "mass_uncertainty",
-    "match",
     "matching_masses",
     "natural_frequencies",
     "rank_nodes",

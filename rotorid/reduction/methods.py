@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.matrices.bands import assemble, ignored_inertia, multiply
+from fem.matrices.bands import assemble, held, ignored_inertia, multiply
 from fem.matrices.pencil import Pencil, whole_rotor
 from fem.solvers.eigen import Spectrum, lowest_modes
 from rotorid.base import registry
@@ -41,7 +41,7 @@ from rotorid.reduction.equivalent.masses import (
     normalised,
     row_factors,
 )
-from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.plane import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.vibration import like, mac, natural_frequencies
 from rotorid.reduction.methods_result import Method, Methods
 
@@ -212,37 +212,28 @@ class _NoModelError(ValueError):
 def _condense(rotor: fem.Rotor, nodes: Sequence[str | int], speed: float | None) -> _Condensed:
     from scipy.linalg.lapack import dpbtrf, dpbtrs
 
-    places = tuple(rotor.node(node) for node in nodes)
-    if not places or len(set(places)) != len(places):
-        raise ValueError(f"the masters must be different nodes; got {list(nodes)}")
+    at = mass_nodes(rotor, nodes)
     plane, said = plane_at_rest(rotor, speed)
-    alpha = fem.compliance(plane, places)  # refuses a rotor that is free, or a mesh lost in float64
-    modes = fem.critical_speeds(plane, len(places))
+    alpha = fem.compliance(plane, at)  # refuses a rotor that is free, or a mesh lost in float64
+    modes = fem.critical_speeds(plane, len(at))
     A = assemble(plane)
     pencil = whole_rotor(plane, A)
-    spectrum = lowest_modes(plane, A, len(places), pencil)
-    masters = pencil.waves[0][np.array(places) - 1]
-    held = np.array(pencil.stiffness)
-    width = held.shape[0] - 1
-    unit = np.zeros((pencil.size, len(places)), order="F")
-    unit[masters, np.arange(len(places))] = 1.0
+    spectrum = lowest_modes(plane, A, len(at), pencil)
+    masters = pencil.waves[0][np.array(at) - 1]
+    unit = np.zeros((pencil.size, len(at)), order="F")
+    unit[masters, np.arange(len(at))] = 1.0
     load = -multiply(pencil.stiffness, unit)
     load[masters] = 0.0
-    for d in masters:
-        held[:, d] = 0.0
-        beside = np.arange(d + 1, min(d + width + 1, pencil.size))
-        held[width - (beside - d), beside] = 0.0
-        held[width, d] = 1.0
-    factor, info = dpbtrf(held)
+    factor, info = dpbtrf(held(pencil.stiffness, masters))
     if info != 0:
         raise ValueError(
             "the rotor held at the masters is statically unstable: a support has negative stiffness; check "
             "its sign and size"
         )
     T = np.asarray(dpbtrs(factor, load)[0])
-    T[masters] = np.eye(len(places))
+    T[masters] = np.eye(len(at))
     return _Condensed(
-        rotor, places, tuple(said), plane, pencil, masters, modes, spectrum, alpha, factor, T
+        rotor, at, tuple(said), plane, pencil, masters, modes, spectrum, alpha, factor, T
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +10,9 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
-from rotorid.base.text import counted
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
+from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,18 +69,20 @@ class Method:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the transformation T is left to Python."""
         masses = self.masses
-        return {
-            "method": self.name,
-            "mass_matrix_kg": None if self.M is None else self.M.tolist(),
-            "stiffness_matrix_N_per_m": None if self.K is None else self.K.tolist(),
-            "masses_kg": None if masses is None else masses.tolist(),
-            "diagonal": self.diagonal,
-            "natural_frequencies_rad_s": floats(self.frequencies),
-            "relative_error": floats(self.relative_error),
-            "mac": floats(self.mac),
-            "mode_shapes": [floats(shape) for shape in self.shapes.T],
-            "reason": self.reason or None,
-        }
+        return plain(
+            {
+                "method": self.name,
+                "mass_matrix_kg": self.M,
+                "stiffness_matrix_N_per_m": self.K,
+                "masses_kg": masses,
+                "diagonal": self.diagonal,
+                "natural_frequencies_rad_s": self.frequencies,
+                "relative_error": self.relative_error,
+                "mac": self.mac,
+                "mode_shapes": self.shapes.T,
+                "reason": self.reason or None,
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,37 +132,39 @@ class Methods:
 
     def to_frame(self) -> pd.DataFrame:
         """A row per method and mode."""
-        import pandas as pd
-
-        n = len(self.nodes)
-        return pd.DataFrame(
-            {
-                "method": [row.name for row in self.rows for _ in range(n)],
-                "mode": [*range(1, n + 1)] * len(self.rows),
-                "frequency_rad_s": np.concatenate([row.frequencies for row in self.rows]),
-                "rotor_frequency_rad_s": np.tile(self.rotor_frequencies, len(self.rows)),
-                "relative_error": np.concatenate([row.relative_error for row in self.rows]),
-                "mac": np.concatenate([row.mac for row in self.rows]),
-                "diagonal": [row.diagonal for row in self.rows for _ in range(n)],
-            }
+        n, several = len(self.nodes), len(self.rows)
+        return frame(
+            (
+                Column("method", np.repeat([row.name for row in self.rows], n)),
+                Column("mode", np.tile(np.arange(1, n + 1), several)),
+                Column("frequency_rad_s", np.concatenate([row.frequencies for row in self.rows])),
+                Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several)),
+                Column("relative_error", np.concatenate([row.relative_error for row in self.rows])),
+                Column("mac", np.concatenate([row.mac for row in self.rows])),
+                Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
+            )
         )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return {
-            "nodes": list(self.nodes),
-            "positions_m": self.positions.tolist(),
-            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
-            "methods": [row.to_dict() for row in self.rows],
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "positions_m": self.positions,
+                "rotor_frequencies_rad_s": self.rotor_frequencies,
+                "methods": [row.to_dict() for row in self.rows],
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """A table of frequencies, errors and MAC by method and mode, as text."""
         n = len(self.nodes)
         lines = [f"Warning: {text}" for text in self.warnings]
         unknowns = counted(n, "unknown")
-        lines.append(f"The rotor reduced to {unknowns}, the deflections of nodes {_list(self.nodes)}")
+        lines.append(
+            f"The rotor reduced to {unknowns}, the deflections of nodes {', '.join(map(str, self.nodes))}"
+        )
         lines.append("in each cell: frequency in rad/s, its error, MAC with the rotor's mode at these nodes")
         for first in range(0, n, _ACROSS):
             modes = range(first, min(n, first + _ACROSS))
@@ -179,7 +183,7 @@ class Methods:
         full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
         if full:
             lines.append(
-                f"{_words(full)}: full mass matrices; they couple the nodes, "
+                f"{listing(full, 'and')}: full mass matrices; they couple the nodes, "
                 "and no single mass stands at a node"
             )
         return "\n".join(lines)
@@ -207,11 +211,3 @@ def _percent(error: float) -> str:
     if size >= 100:
         return f"{percent:+7.3g} %"
     return f"{percent:+7.3f} %" if size >= 0.01 else f"{percent:+7.4f} %"
-
-
-def _list(nodes: Sequence[int]) -> str:
-    return ", ".join(map(str, nodes))
-
-
-def _words(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 import fem
 from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.json import finite, floats
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, numbered
 from rotorid.base.text import counted
 
 if TYPE_CHECKING:
@@ -170,59 +171,62 @@ class Placement:
         """One row per choice, in rank order: nodes, masses, frequencies, error, MAC, condition number."""
         import pandas as pd
 
-        n = self.nodes.shape[1]
-        columns: dict[str, Any] = {
-            "rank": pd.array([*range(1, self.ranked + 1)] + [pd.NA] * self._rest, "Int64")
-        }
-        columns |= {f"node_{i + 1}": self.nodes[:, i] for i in range(n)}
-        columns |= {f"mass_{i + 1}_kg": self.masses[:, i] for i in range(n)}
-        columns |= {f"frequency_{k + 1}_rad_s": self.frequencies[:, k] for k in range(self.check)}
-        columns |= {"largest_error": self.error, "smallest_mac": self.mac}
-        columns |= {"worst_mode": self.worst_mode, "condition_number": self.condition}
+        rank = [*range(1, self.ranked + 1)] + [pd.NA] * (self.considered - self.ranked)
         on_front = np.zeros(self.considered, dtype=bool)
         on_front[self.pareto] = True
-        return pd.DataFrame({**columns, "trade_off": on_front})
-
-    @property
-    def _rest(self) -> int:
-        return self.considered - self.ranked
+        table = frame(
+            (
+                Column("rank", rank),
+                *numbered("node_{}", self.nodes),
+                *numbered("mass_{}_kg", self.masses),
+                *numbered("frequency_{}_rad_s", self.frequencies),
+                Column("largest_error", self.error),
+                Column("smallest_mac", self.mac),
+                Column("worst_mode", self.worst_mode),
+                Column("condition_number", self.condition),
+                Column("trade_off", on_front),
+            )
+        )
+        return table.astype({"rank": "Int64"})
 
     def to_dict(self, top: int = 20) -> dict[str, Any]:
         """As JSON types: counts, the `top` ranked choices, the trade-off, the choices with a name."""
-        return {
-            "considered": self.considered,
-            "ranked": self.ranked,
-            "unphysical": self.unphysical,
-            "undetermined": self.undetermined,
-            "at_node": self.at_node,
-            "modes": self.modes,
-            "check": self.check,
-            "normalise": self.normalise,
-            "rows": self.rows,
-            "candidates": list(self.candidates),
-            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
-            "choices": [self._choice(i) for i in range(min(top, self.ranked))],
-            "trade_off": [self._choice(int(i)) for i in self.pareto],
-            "best_by_frequency": self._choice(self.best_by_frequency),
-            "best_by_mac": self._choice(self.best_by_mac),
-            "compromise": self._choice(self.compromise),
-            "book_rule": self._choice(self.book),
-            "frequency_match_with_wrong_shapes": len(self.traps()),
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "considered": self.considered,
+                "ranked": self.ranked,
+                "unphysical": self.unphysical,
+                "undetermined": self.undetermined,
+                "at_node": self.at_node,
+                "modes": self.modes,
+                "check": self.check,
+                "normalise": self.normalise,
+                "rows": self.rows,
+                "candidates": self.candidates,
+                "rotor_frequencies_rad_s": self.rotor_frequencies,
+                "choices": [self._choice(i) for i in range(min(top, self.ranked))],
+                "trade_off": [self._choice(i) for i in self.pareto],
+                "best_by_frequency": self._choice(self.best_by_frequency),
+                "best_by_mac": self._choice(self.best_by_mac),
+                "compromise": self._choice(self.compromise),
+                "book_rule": self._choice(self.book),
+                "frequency_match_with_wrong_shapes": len(self.traps()),
+                "warnings": self.warnings,
+            }
+        )
 
-    def _choice(self, i: int | None) -> dict[str, Any] | None:
+    def _choice(self, i: int | np.intp | None) -> dict[str, Any] | None:
         if i is None:
             return None
         return {
             "rank": i + 1 if i < self.ranked else None,
-            "nodes": self.nodes[i].tolist(),
-            "masses_kg": floats(self.masses[i]),
-            "natural_frequencies_rad_s": floats(self.frequencies[i]),
-            "largest_error": finite(self.error[i]),
-            "smallest_mac": finite(self.mac[i]),
-            "worst_mode": int(self.worst_mode[i]) or None,
-            "condition_number": finite(self.condition[i]),
+            "nodes": self.nodes[i],
+            "masses_kg": self.masses[i],
+            "natural_frequencies_rad_s": self.frequencies[i],
+            "largest_error": self.error[i],
+            "smallest_mac": self.mac[i],
+            "worst_mode": self.worst_mode[i] or None,
+            "condition_number": self.condition[i],
         }
 
     def summary(self, top: int = 10) -> str:

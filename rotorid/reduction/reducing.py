@@ -13,7 +13,7 @@ import fem
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import BoundedEstimate, Normalisation, RowWeights, equivalent_masses
-from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.plane import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.sensitivity import mass_sensitivity
 from rotorid.reduction.equivalent.separated import separate
 from rotorid.reduction.equivalent.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
@@ -79,7 +79,7 @@ def reduce(  # noqa: PLR0913
     Source: [S] 1.10, tasks 9.1 and 9.2. The frequencies of the small model come from its own eigenvalue
     problem, so their agreement with the rotor's is a check, also for the modes that the regression used.
     """
-    places = _places(rotor, nodes)
+    places = mass_nodes(rotor, nodes)
     n = len(places)
     plane, said = plane_at_rest(rotor, speed)
     if measured is not None and any(s.pedestal is not None and s.pedestal.mass for s in rotor.supports):
@@ -230,16 +230,6 @@ def _reduced(
             *far_off(errors_of_frequency),
         ),
     )
-
-
-def _places(rotor: fem.Rotor, nodes: Sequence[int]) -> tuple[int, ...]:
-    places = tuple(int(n) for n in nodes)
-    if not places or len(set(places)) != len(places):
-        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
-    bad = [p for p in places if not 1 <= p <= rotor.n_nodes]
-    if bad:
-        raise ValueError(f"node {bad[0]} does not exist: this rotor has nodes 1 … {rotor.n_nodes}")
-    return places
 
 
 def _modes(measured: tuple[ArrayLike, ArrayLike], n: int) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 from rotorid.base.units import RPM
 from rotorid.reduction.equivalent.masses import Normalisation, RowWeights
 from rotorid.reduction.equivalent.separated import Separated
@@ -196,29 +196,28 @@ class Reduction:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, the keys of INTERFACE.md (`rotorid reduce`)."""
-        positions = self.positions
         document: dict[str, Any] = {
-            "nodes": list(self.nodes),
-            "positions_m": None if positions is None else positions.tolist(),
+            "nodes": self.nodes,
+            "positions_m": self.positions,
             "modes": self.modes,
             **self.choices.to_dict(),
-            "masses_kg": self.masses.solution.tolist(),
-            "masses_std_kg": None if self.masses.std is None else floats(self.masses.std),
-            "mass_sensitivity": floats(self.sensitivity),
-            "compliance_m_per_N": self.compliance.tolist(),
-            "seal_stiffness_N_per_m": self.seal_stiffness.tolist(),
-            "natural_frequencies_rad_s": floats(self.frequencies),
-            "rotor_frequencies_rad_s": floats(self._padded(self.rotor_frequencies)),
-            "relative_error": floats(self.relative_error),
-            "mac": floats(self.mac),
+            "masses_kg": self.masses.solution,
+            "masses_std_kg": self.masses.std,
+            "mass_sensitivity": self.sensitivity,
+            "compliance_m_per_N": self.compliance,
+            "seal_stiffness_N_per_m": self.seal_stiffness,
+            "natural_frequencies_rad_s": self.frequencies,
+            "rotor_frequencies_rad_s": self._padded(self.rotor_frequencies),
+            "relative_error": self.relative_error,
+            "mac": self.mac,
             "condition_number": self.masses.condition_number,
-            "warnings": list(self.warnings),
+            "warnings": self.warnings,
         }
         if self.separated is not None:
             document["separated"] = self.separated.to_dict()
         if self.uncertainty is not None:
             document["uncertainty"] = self.uncertainty.to_dict()
-        return document
+        return plain(document)
 
     def to_frame(self) -> pd.DataFrame:
         """First a row per mass (`table` is "masses"), then a row per mode ("modes").

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.json import plain
 from rotorid.regression import Estimate, least_squares
 
 if TYPE_CHECKING:
@@ -201,7 +202,7 @@ class BoundedEstimate(Estimate):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the keys of an estimate, `at_bounds` and `warnings`."""
-        return {**super().to_dict(), "at_bounds": list(self.at_bounds), "warnings": list(self.warnings)}
+        return plain({**super().to_dict(), "at_bounds": self.at_bounds, "warnings": self.warnings})
 
     def to_frame(self) -> pd.DataFrame:
         """One row per mass: value, std, interval, and whether it stands at the bound."""

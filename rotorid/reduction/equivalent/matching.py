@@ -14,14 +14,14 @@ solutions cancel.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import BoolArray, FloatArray, IntArray
-from rotorid.base.text import counted
+from rotorid.base.arrays import FloatArray
 from rotorid.reduction.equivalent.vibration import natural_frequencies
+
+MOST = 3
+"""Masses up to which elimination gives one polynomial."""
 
 EXACT = 1e-9
 """Largest relative difference of frequencies of a set that counts as matching."""
@@ -32,77 +32,12 @@ SAME = 1e-6
 WIDEST = 1000.0
 """Ratio of highest to lowest frequency beyond which float64 cannot confirm a match."""
 
-STARTS = 2000
-"""Random starts in a round, for four masses and more."""
-
-ROUNDS = 5
-"""Rounds at most; there is another one as long as a set was reached fewer times than RARE."""
-
-RARE = 5
-
-STEPS = 60
-"""Newton steps of each start."""
-
-
-@dataclass(frozen=True, eq=False)
-class Matching:
-    """All positive mass sets found whose n-mass model has exactly n given frequencies.
-
-    Attributes
-    ----------
-    masses
-        kg, shape (s, n), by ascending first mass; s may be 0.
-    frequencies
-        Those given, rad/s, ascending, shape (n,).
-    complete
-        Whether the sets are proven to be all: up to three masses by elimination.
-    found
-        How many of the starts ended at each set, shape (s,).
-    starts
-        How many starts there were.
-    warnings
-        What is not certain.
-    """
-
-    masses: FloatArray
-    frequencies: FloatArray
-    complete: bool
-    found: IntArray
-    starts: int
-    warnings: tuple[str, ...]
-
 
 def matching_masses(compliance: ArrayLike, frequencies: ArrayLike) -> FloatArray:
-    """All positive mass sets whose n-mass model has exactly these n frequencies.
+    """All positive sets of one, two or three masses whose model has exactly these frequencies.
 
-    `match` with its masses only; for four masses and more look at what it says about completeness.
-
-    Parameters
-    ----------
-    compliance
-        m/N, shape (n, n).
-    frequencies
-        rad/s, shape (n,).
-
-    Returns
-    -------
-    kg, shape (s, n): s sets, which may be none.
-
-    Examples
-    --------
-    >>> matching_masses([[2e-8, 1e-8], [1e-8, 2e-8]], [1e3, 2e3]).round(3)
-    array([[19.282, 43.218],
-           [43.218, 19.282]])
-    """
-    return match(compliance, frequencies).masses
-
-
-def match(compliance: ArrayLike, frequencies: ArrayLike, *, starts: int = STARTS, seed: int = 0) -> Matching:
-    """Find all positive mass sets whose n-mass model has exactly n given frequencies.
-
-    One, two and three masses: by elimination, all roots of one polynomial (degree 1, 2, 6). Four and more:
-    Newton's method from many random starts, which proves nothing about sets that none of them reached. Every
-    root is refined and every set confirmed to 1e-9 by `natural_frequencies`.
+    By elimination: all roots of one polynomial (of degree 1, 2, 6), each refined, and confirmed to 1e-9 by
+    `natural_frequencies`.
 
     Parameters
     ----------
@@ -110,58 +45,40 @@ def match(compliance: ArrayLike, frequencies: ArrayLike, *, starts: int = STARTS
         m/N, shape (n, n), symmetric, positive definite.
     frequencies
         rad/s, shape (n,), positive, in any order.
-    starts, seed
-        Of the random starts, for four masses and more: their number in a round. There are up to five rounds
-        while a set was reached by fewer than five starts, or the number of sets is odd.
+
+    Returns
+    -------
+    kg, shape (s, n), by ascending first mass: s sets, which may be none.
 
     Raises
     ------
     ValueError
-        For shapes that do not fit, entries that are not finite, a compliance that is not symmetric and
-        positive definite, frequencies that are not positive, repeat, or are further apart than float64
-        resolves.
+        For shapes that do not fit, more than three masses, entries that are not finite, a compliance that is
+        not symmetric and positive definite, frequencies that are not positive, repeat, or are further apart
+        than float64 resolves.
 
-    Notes
-    -----
-    Newton's equations are ln λ_j(m) = ln λ_j in ln m: with unit vectors v_j of √m α √m the derivative of
-    ln λ_j by ln m_i is v_ij². All starts go through each step together.
+    Examples
+    --------
+    >>> matching_masses([[2e-8, 1e-8], [1e-8, 2e-8]], [1e3, 2e3]).round(3)
+    array([[19.282, 43.218],
+           [43.218, 19.282]])
     """
     alpha, omega = _checked(compliance, frequencies)
-    n = len(omega)
     lam = 1.0 / omega**2
     # dimensionless: shares u_i = α_ii m_i / Σ λ, which sum to one, and a compliance with unit diagonal
     root = np.sqrt(np.diag(alpha))
     shape = alpha / np.outer(root, root)
     z = lam / lam.sum()
-    first = _random(n, starts, seed) if n > 3 else (_one, _two, _three)[n - 1](shape, z)
-    u = _refined(shape, z, first)
-    used, sets, found = len(first), *_distinct(u[_confirmed(shape, z, u)])
-    for extra in range(1, ROUNDS if n > 3 else 1):
-        if not found.size or (found.min() >= RARE and len(found) % 2 == 0):
-            break
-        u = _refined(shape, z, _random(n, starts, (seed, extra)))
-        sets, found = _distinct(np.concatenate((np.repeat(sets, found, axis=0), u[_confirmed(shape, z, u)])))
-        used += len(u)
-    masses = sets * lam.sum() / np.diag(alpha)
-    kept = [np.abs(natural_frequencies(alpha, m)[0] / omega - 1.0).max() < EXACT for m in masses]
-    masses, found = masses[kept], found[kept]
-    return Matching(
-        masses=masses,
-        frequencies=omega,
-        complete=n <= 3,
-        found=found,
-        starts=used,
-        warnings=() if n <= 3 else (_incomplete(n, used, found),),
-    )
-
-
-def _incomplete(n: int, starts: int, found: IntArray) -> str:
-    rare = f", the rarest reached by {found.min()} of them" if found.size else ""
-    odd = "; their number should be even: one is missing or two coincide" if len(found) % 2 else ""
-    return (
-        f"{counted(len(found), 'set')} of masses found from {starts} random starts{rare}: for {n} masses "
-        f"it is not proven that there are no others{odd}"
-    )
+    starts = (_one, _two, _three)[len(omega) - 1](shape, z)
+    sets: list[FloatArray] = []
+    for start in starts:
+        m = _refined(shape, z, start) * lam.sum() / np.diag(alpha)
+        matches = np.abs(natural_frequencies(alpha, m)[0] / omega - 1.0).max() < EXACT
+        if matches and not any(np.abs(np.log(m / known)).max() < SAME for known in sets):
+            sets.append(m)
+    # rounded: equal first masses are equal only to rounding
+    sets.sort(key=lambda m: np.round(np.log(m), 7).tolist())
+    return np.array(sets).reshape(-1, len(omega))
 
 
 def _checked(compliance: ArrayLike, frequencies: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -172,6 +89,8 @@ def _checked(compliance: ArrayLike, frequencies: ArrayLike) -> tuple[FloatArray,
         raise ValueError(
             f"n masses have a compliance (n, n) and n frequencies; got {alpha.shape} and {omega.shape}"
         )
+    if n > MOST:
+        raise ValueError(f"sets that match {n} frequencies are not searched: at most {MOST} masses")
     if not (np.isfinite(alpha).all() and np.isfinite(omega).all()):
         raise ValueError("compliance and frequencies must be finite")
     if (omega <= 0).any():
@@ -245,70 +164,27 @@ def _pairs(total: FloatArray, product: FloatArray) -> FloatArray:
     return np.concatenate((np.column_stack((large, small)), np.column_stack((small, large))))
 
 
-def _random(n: int, count: int, seed: int | tuple[int, int]) -> FloatArray:
-    """Shares that sum to one, (count, n): evenly spread, and as many with masses of different orders."""
-    if count < 1:
-        raise ValueError(f"starts must be at least 1, not {count}")
-    rng = np.random.default_rng(seed)
-    even = rng.dirichlet(np.ones(n), size=(count + 1) // 2)
-    uneven = rng.dirichlet(np.full(n, 0.3), size=count // 2)
-    return np.maximum(np.concatenate((even, uneven)), 1e-6)
+def _refined(shape: FloatArray, z: FloatArray, start: FloatArray) -> FloatArray:
+    """The masses next to a start that match, if there are any: ln λ(u) = ln z in the unknowns ln u.
 
+    With unit vectors v_j of √u α √u the derivative of ln λ_j by ln u_i is v_ij².
+    """
+    from scipy.optimize import least_squares
 
-def _spectra(shape: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of λ, descending (s, n), and their derivatives by x = ln u, (s, mode, mass)."""
-    root = np.exp(x / 2)
-    lam, V = np.linalg.eigh(root[:, :, None] * shape * root[:, None, :])
     tiny = np.finfo(float).tiny
-    return np.log(np.maximum(lam[:, ::-1], tiny)), np.swapaxes(V[:, :, ::-1], 1, 2) ** 2
 
+    def spectrum(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        root = np.exp(x / 2)
+        lam, V = np.linalg.eigh(root[:, None] * shape * root)
+        return np.log(np.maximum(lam[::-1], tiny)) - np.log(z), V[:, ::-1].T ** 2
 
-def _refined(shape: FloatArray, z: FloatArray, starts: FloatArray) -> FloatArray:
-    """Newton's method from all starts together, with steps shortened where the residual would grow."""
-    x = np.log(starts)
-    aim = np.log(z)
-    logs, J = _spectra(shape, x)
-    active = np.arange(len(x))
-    for _ in range(STEPS):
-        residual = logs - aim
-        size = np.abs(residual).max(axis=1)
-        active = active[size[active] > 1e-15]
-        if not active.size:
-            break
-        # least squares with a cut-off: at a fold J is singular, and there the smallest step is the right one
-        step = -(np.linalg.pinv(J[active], rcond=1e-10) @ residual[active][:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, 2.0 / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
-        waiting, scale, moved = np.arange(len(active)), 1.0, []
-        for _ in range(6):
-            if not waiting.size:
-                break
-            trial = x[active[waiting]] + scale * step[waiting]
-            new_logs, new_J = _spectra(shape, trial)
-            better = np.abs(new_logs - aim).max(axis=1) < size[active[waiting]]
-            rows = active[waiting[better]]
-            x[rows], logs[rows], J[rows] = trial[better], new_logs[better], new_J[better]
-            moved.append(rows)
-            waiting, scale = waiting[~better], scale / 3
-        active = np.sort(np.concatenate(moved))  # no step helps the rest: at rounding, or stuck
-    return np.asarray(np.exp(x))
-
-
-def _confirmed(shape: FloatArray, z: FloatArray, u: FloatArray) -> BoolArray:
-    logs, _ = _spectra(shape, np.log(u))
-    return np.asarray(np.abs(logs - np.log(z)).max(axis=1) < EXACT)
-
-
-def _distinct(u: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Each set once, by ascending first share, and how often it was found."""
-    sets: list[FloatArray] = []
-    count: list[int] = []
-    for row in u:
-        same = [i for i, known in enumerate(sets) if np.abs(np.log(row / known)).max() < SAME]
-        if same:
-            count[same[0]] += 1
-        else:
-            sets.append(row)
-            count.append(1)
-    # rounded: equal first shares are equal only to rounding
-    order = np.lexsort(np.round(np.log(sets), 7).T[::-1]) if sets else np.empty(0, dtype=np.intp)
-    return np.array(sets).reshape(-1, u.shape[1])[order], np.array(count, dtype=np.int64)[order]
+    found = least_squares(
+        lambda x: spectrum(x)[0],
+        np.log(start),
+        jac=lambda x: spectrum(x)[1],
+        method="lm",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    return np.asarray(np.exp(found.x))

@@ -1,12 +1,27 @@
-"""The plane of a rotor that formula (50) is about: x, at rest."""
+"""Where formula (50) looks at a rotor: at which nodes, and in the plane x at rest."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 import fem
+
+
+def mass_nodes(rotor: fem.Rotor, nodes: Sequence[int | str]) -> tuple[int, ...]:
+    """Numbers of different nodes, given as numbers from 1 or names of stations.
+
+    Raises
+    ------
+    ValueError
+        For none, for nodes that do not exist or repeat.
+    """
+    found = tuple(rotor.node(node) for node in nodes)
+    if not found or len(set(found)) != len(found):
+        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    return found
 
 
 def plane_at_rest(rotor: fem.Rotor, speed: float | None) -> tuple[fem.Rotor, list[str]]:

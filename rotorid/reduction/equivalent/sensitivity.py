@@ -30,7 +30,7 @@ from rotorid.reduction.equivalent.masses import (
     row_factors,
 )
 from rotorid.reduction.equivalent.vibration import natural_frequencies
-from rotorid.regression import Estimate
+from rotorid.regression import Estimate, gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +115,7 @@ class Inputs:
         out = np.full((len(e), 2, n), np.nan)
         fine = np.isfinite(B).all(axis=(1, 2)) & np.isfinite(D).all(axis=1)
         B, D = B[fine], D[fine]
-        scale = np.linalg.norm(B, axis=1)
-        m = (np.linalg.pinv(B / scale[:, None], rcond=1e-13) @ D[..., None])[..., 0] / scale
+        m = (gain(B) @ D[..., None])[..., 0].real
         out[fine, 0] = m
         for s, masses in zip(np.flatnonzero(fine), m, strict=True):
             out[s, 1] = natural_frequencies(alpha[s], masses, seal_stiffness=springs[s])[0]

@@ -20,8 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices.bands import assemble, rounding_error
+from fem.matrices.bands import assemble, held, rounding_error
 from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
+from rotorid.reduction.equivalent.plane import mass_nodes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,25 +79,22 @@ class Separated:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return {
-            "nodes": list(self.nodes),
-            "positions_m": self.positions.tolist(),
-            "supports": list(self.supports),
-            "span_m": self.span,
-            "delta_m_per_N": self.delta.tolist(),
-            "fractions": self.fractions.tolist(),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "positions_m": self.positions,
+                "supports": self.supports,
+                "span_m": self.span,
+                "delta_m_per_N": self.delta,
+                "fractions": self.fractions,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """A row per mass: node, position from the left support, shares of both supports, row of δ."""
-        import pandas as pd
-
-        frame = pd.DataFrame({"node": self.nodes, "position_m": self.positions})
-        for s, node in enumerate(self.supports):
-            frame[f"share_{node}"] = self.fractions[:, s]
-        for j, node in enumerate(self.nodes):
-            frame[f"delta_{node}_m_per_N"] = self.delta[:, j]
-        return frame
+        shares = (Column(f"share_{node}", self.fractions[:, s]) for s, node in enumerate(self.supports))
+        delta = (Column(f"delta_{node}_m_per_N", self.delta[:, j]) for j, node in enumerate(self.nodes))
+        return frame((Column("node", self.nodes), Column("position_m", self.positions), *shares, *delta))
 
 
 def separate(rotor: fem.Rotor, nodes: Sequence[int]) -> Separated:
@@ -114,22 +114,16 @@ def separate(rotor: fem.Rotor, nodes: Sequence[int]) -> Separated:
         give the shares of a force), a seal among the supports, nodes that do not exist or repeat, a mesh
         too fine for float64.
     """
-    places = tuple(int(n) for n in nodes)
-    if not places or len(set(places)) != len(places):
-        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
-    bad = [p for p in places if not 1 <= p <= rotor.n_nodes]
-    if bad:
-        raise ValueError(f"node {bad[0]} does not exist: this rotor has nodes 1 … {rotor.n_nodes}")
+    at = mass_nodes(rotor, nodes)
     a, b = _two_supports(rotor)
     A = assemble(rotor)
-    held = np.array([A.deflection(a), A.deflection(b)])
-    K = _hold(A.shaft, held, A.width)
-    unknowns = np.array([A.deflection(p) for p in places], dtype=np.intp)
-    delta = _flexibility(K, unknowns)
-    delta[np.isin(unknowns, held), :] = delta[:, np.isin(unknowns, held)] = 0.0
-    where = rotor.positions[np.array([a, b, *places]) - 1]
+    ends = np.array([A.deflection(a), A.deflection(b)])
+    unknowns = np.array([A.deflection(p) for p in at], dtype=np.intp)
+    delta = _flexibility(held(A.shaft, ends), unknowns)
+    delta[np.isin(unknowns, ends), :] = delta[:, np.isin(unknowns, ends)] = 0.0
+    where = rotor.positions[np.array([a, b, *at]) - 1]
     span, positions = float(where[1] - where[0]), where[2:] - where[0]
-    return Separated(places, positions, (a, b), span, delta, _fractions(positions, span))
+    return Separated(at, positions, (a, b), span, delta, _fractions(positions, span))
 
 
 def separated_compliance(
@@ -206,17 +200,6 @@ def _two_supports(rotor: fem.Rotor) -> tuple[int, int]:
             "force between the supports: use small_rotor, which keeps every support as a coordinate"
         )
     return found[0], found[1]
-
-
-def _hold(band: FloatArray, held: IndexArray, width: int) -> FloatArray:
-    """Upper band with some unknowns fixed: their rows and columns hold their own diagonal alone."""
-    K = band.copy(order="F")
-    size = K.shape[1]
-    for above in range(1, width + 1):
-        K[width - above, held] = 0.0
-        right = held + above
-        K[width - above, right[right < size]] = 0.0
-    return K
 
 
 def _flexibility(band: FloatArray, unknowns: IndexArray) -> FloatArray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,17 +35,19 @@ class Shift:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        return {
-            "first_order": {
-                "masses_kg": floats(self.masses),
-                "frequencies_rad_s": floats(self.frequencies),
-            },
-            "exact": {
-                "masses_kg": floats(self.exact_masses),
-                "frequencies_rad_s": floats(self.exact_frequencies),
-            },
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "first_order": {
+                    "masses_kg": self.masses,
+                    "frequencies_rad_s": self.frequencies,
+                },
+                "exact": {
+                    "masses_kg": self.exact_masses,
+                    "frequencies_rad_s": self.exact_frequencies,
+                },
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """Text: what each mass and frequency changes by, predicted and recomputed."""

@@ -11,11 +11,12 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
-from rotorid.base.json import finite, floats
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, numbered, rows
 from rotorid.base.text import counted
 from rotorid.reduction.equivalent.masses import Normalisation, equivalent_masses
-from rotorid.reduction.equivalent.matching import match
-from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.matching import MOST, matching_masses
+from rotorid.reduction.equivalent.plane import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.vibration import mac, natural_frequencies
 from rotorid.reduction.placement_result import ALIKE
 
@@ -46,7 +47,7 @@ class TradeOff:
     condition
         Condition number of each regression, shape (r,); NaN for matching sets.
     complete
-        Whether the matching sets are proven to be all (up to three masses).
+        Whether matching sets were searched: up to three masses, and then these are all.
     rotor_frequencies, rotor_shapes
         Of the rotor's plane at rest: rad/s (n,), and at the nodes (n, n).
     rotor
@@ -76,36 +77,44 @@ class TradeOff:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per alternative: masses, frequencies, errors, MAC, condition number."""
-        import pandas as pd
-
-        columns: dict[str, Any] = {"model": self.names, "matching": self.matching}
-        columns |= {f"mass_{node}_kg": self.masses[:, i] for i, node in enumerate(self.nodes)}
-        for k in range(len(self.nodes)):
-            columns[f"frequency_{k + 1}_rad_s"] = self.frequencies[:, k]
-            columns[f"relative_error_{k + 1}"] = self.relative_error[:, k]
-            columns[f"mac_{k + 1}"] = self.mac[:, k]
-        return pd.DataFrame({**columns, "condition_number": self.condition})
+        masses = [Column(f"mass_{node}_kg", self.masses[:, i]) for i, node in enumerate(self.nodes)]
+        modes = zip(
+            numbered("frequency_{}_rad_s", self.frequencies),
+            numbered("relative_error_{}", self.relative_error),
+            numbered("mac_{}", self.mac),
+            strict=True,
+        )
+        return frame(
+            (
+                Column("model", self.names),
+                Column("matching", self.matching),
+                *masses,
+                *(column for mode in modes for column in mode),
+                Column("condition_number", self.condition),
+            )
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: the nodes, the rotor's frequencies, and a document per alternative."""
-        return {
-            "nodes": list(self.nodes),
-            "rotor_frequencies_rad_s": self.rotor_frequencies.tolist(),
-            "matching_sets_complete": self.complete,
-            "alternatives": [
-                {
-                    "model": name,
-                    "matching": bool(self.matching[r]),
-                    "masses_kg": self.masses[r].tolist(),
-                    "natural_frequencies_rad_s": floats(self.frequencies[r]),
-                    "relative_error": floats(self.relative_error[r]),
-                    "mac": floats(self.mac[r]),
-                    "condition_number": finite(self.condition[r]),
-                }
-                for r, name in enumerate(self.names)
-            ],
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "rotor_frequencies_rad_s": self.rotor_frequencies,
+                "matching_sets_complete": self.complete,
+                "alternatives": rows(
+                    (
+                        Column("model", self.names),
+                        Column("matching", self.matching),
+                        Column("masses_kg", self.masses),
+                        Column("natural_frequencies_rad_s", self.frequencies),
+                        Column("relative_error", self.relative_error),
+                        Column("mac", self.mac),
+                        Column("condition_number", self.condition),
+                    )
+                ),
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """Text for an engineer: two lines per alternative, and the trap in words."""
@@ -124,9 +133,10 @@ class TradeOff:
         n, count = len(self.nodes), int(self.matching.sum())
         if n == 1:
             return "One mass has no shape to compare: its MAC is always 1."
-        if not count:
-            which = "" if self.complete else " was found; there may be one"
-            text = f"No set of positive masses at these nodes has all {n} frequencies{which}. "
+        if not self.complete:
+            text = f"Masses that match all frequencies are searched for up to {MOST} masses only. "
+        elif not count:
+            text = f"No set of positive masses at these nodes has all {n} frequencies. "
         else:
             text = (
                 f"{counted(count, 'different set')} of masses {'has' if count == 1 else 'have'} the rotor's "
@@ -182,37 +192,35 @@ def trade_off(
     -----
     Regressions that these modes do not determine are left out and named in `warnings`. [S] 1.10.
     """
-    places = tuple(rotor.node(node) for node in nodes)
-    n = len(places)
-    if n == 0 or len(set(places)) != n:
-        raise ValueError(f"the masses need different nodes; got {list(nodes)}")
+    at = mass_nodes(rotor, nodes)
+    n = len(at)
     plane, said = plane_at_rest(rotor, speed)
-    alpha = fem.compliance(plane, places)
+    alpha = fem.compliance(plane, at)
     full = fem.critical_speeds(plane, n)
-    shapes = full.shapes[np.array(places) - 1]
+    shapes = full.shapes[np.array(at) - 1]
     names, masses, condition, lost = _regressions(alpha, full.frequencies, shapes, normalise)
-    sets = match(alpha, full.frequencies)
-    names += [f"matching set {i + 1}" for i in range(len(sets.masses))]
+    sets = matching_masses(alpha, full.frequencies) if n <= MOST else np.empty((0, n))
+    names += [f"matching set {i + 1}" for i in range(len(sets))]
     matching = np.arange(len(names)) >= len(masses)
-    m = np.concatenate((np.array(masses).reshape(-1, n), sets.masses))
+    m = np.concatenate((np.array(masses).reshape(-1, n), sets))
     pairs = [natural_frequencies(alpha, row) for row in m]
     frequencies = np.array([omega for omega, _ in pairs]).reshape(-1, n)
     agreement = np.array([_paired(model, shapes) for _, model in pairs]).reshape(-1, n)
     agreement[np.isnan(frequencies)] = np.nan
     return TradeOff(
-        nodes=places,
+        nodes=at,
         names=tuple(names),
         matching=matching,
         masses=m,
         frequencies=frequencies,
         relative_error=frequencies / full.frequencies - 1.0,
         mac=agreement,
-        condition=np.concatenate((condition, np.full(len(sets.masses), np.nan))),
-        complete=sets.complete,
+        condition=np.concatenate((condition, np.full(len(sets), np.nan))),
+        complete=n <= MOST,
         rotor_frequencies=full.frequencies,
         rotor_shapes=shapes,
         rotor=rotor,
-        warnings=(*said, *full.warnings, *lost, *sets.warnings, *_unphysical(names, m)),
+        warnings=(*said, *full.warnings, *lost, *_unphysical(names, m)),
     )
 
 
@@ -226,10 +234,10 @@ def _regressions(
     lost: list[str] = []
     choices: tuple[Literal["equal", "relative"], ...] = ("equal", "relative")
     for k in range(1, len(omega) + 1):
-        for rows in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
-            name = f"regression, {counted(k, 'mode')}" + (f", {rows} rows" if k > 1 else "")
+        for weights in choices[: 1 if k == 1 else 2]:  # one mode: the weight of all rows is the same
+            name = f"regression, {counted(k, 'mode')}" + (f", {weights} rows" if k > 1 else "")
             try:
-                fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=rows)
+                fit = equivalent_masses(alpha, omega[:k], shapes[:, :k], normalise=normalise, rows=weights)
             except ValueError as problem:
                 lost.append(f"{name}: left out, {problem}")
                 continue

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.reduction.equivalent.masses import Normalisation, RowWeights
 from rotorid.reduction.equivalent.sensitivity import (
     InputErrors,
@@ -132,49 +133,48 @@ class MassUncertainty:
 
     def to_frame(self) -> pd.DataFrame:
         """A row per mass and per frequency: value, std, nonlinearity, and the share of each input."""
-        import pandas as pd
-
         n = len(self.masses)
         std = np.concatenate((self.masses_std, self.frequencies_std))
-        frame = pd.DataFrame(
-            {
-                "quantity": labels(n),
-                "unit": units(n),
-                "value": np.concatenate((self.masses, self.frequencies)),
-                "std": std,
-                "nonlinearity": self.nonlinearity.ravel(),
-            }
+        variance = np.where(std > 0, std, np.nan) ** 2
+        parts = {name: part.ravel() for name, part in self.contributions.items() if part.any()}
+        return frame(
+            (
+                Column("quantity", labels(n)),
+                Column("unit", units(n)),
+                Column("value", np.concatenate((self.masses, self.frequencies))),
+                Column("std", std),
+                Column("nonlinearity", self.nonlinearity.ravel()),
+                *(Column(name, part / variance) for name, part in parts.items()),
+            )
         )
-        for name, part in self.contributions.items():
-            if part.any():
-                frame[name] = part.ravel() / np.where(std > 0, std, np.nan) ** 2
-        return frame
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        return {
-            "masses_kg": floats(self.masses),
-            "masses_std_kg": floats(self.masses_std),
-            "natural_frequencies_rad_s": floats(self.frequencies),
-            "natural_frequencies_std_rad_s": floats(self.frequencies_std),
-            "drawn": None
-            if self.drawn is None
-            else {
-                "masses_std_kg": floats(self.drawn[0]),
-                "natural_frequencies_std_rad_s": floats(self.drawn[1]),
-            },
-            "nonlinearity": {
-                "masses": floats(self.nonlinearity[0]),
-                "natural_frequencies": floats(self.nonlinearity[1]),
-            },
-            "contributions": {
-                name: {"masses_kg2": floats(part[0]), "natural_frequencies_rad2_s2": floats(part[1])}
-                for name, part in self.contributions.items()
-                if part.any()
-            },
-            "condition_number": self.condition_number,
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "masses_kg": self.masses,
+                "masses_std_kg": self.masses_std,
+                "natural_frequencies_rad_s": self.frequencies,
+                "natural_frequencies_std_rad_s": self.frequencies_std,
+                "drawn": None
+                if self.drawn is None
+                else {
+                    "masses_std_kg": self.drawn[0],
+                    "natural_frequencies_std_rad_s": self.drawn[1],
+                },
+                "nonlinearity": {
+                    "masses": self.nonlinearity[0],
+                    "natural_frequencies": self.nonlinearity[1],
+                },
+                "contributions": {
+                    name: {"masses_kg2": part[0], "natural_frequencies_rad2_s2": part[1]}
+                    for name, part in self.contributions.items()
+                    if part.any()
+                },
+                "condition_number": self.condition_number,
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """Text: value ± std, and the inputs that make up most of each variance."""
