@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, must_be, read_table
@@ -50,7 +50,7 @@ class Material:
 
     youngs_modulus: float = STEEL_MODULUS
     density: float = STEEL_DENSITY
-    poisson_ratio: float = 0.3
+    poisson_ratio: float = STEEL_POISSON
     material_damping: float = 0.0
 
 
