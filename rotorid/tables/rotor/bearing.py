@@ -15,7 +15,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find, names
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.key import Key, Kind, take
 from rotorid.tables.reader.kinds import TEXT, choice, number, plain_number
 from rotorid.tables.reader.problems import Problems
@@ -182,12 +182,12 @@ def _coefficients(
     present = [column.stem for column in COLUMNS[1:] if column.stem in table]
     if not present:
         expected = f"a column of coefficients, such as {listing(c.names[0] for c in COLUMNS[1:4])}"
-        problems.add(table.source, table.header_row, COLUMNS[1].names[0], None, expected)
+        table.in_header(COLUMNS[1].names[0], expected)
         return None
     for name in (*SCALARS, *DIAGONAL):
-        must_be(table, name, table.numbers(name) >= low, OUTWARDS, problems)
+        table.must_be(name, table.numbers(name) >= low, OUTWARDS)
     if len(table) == 1:
-        table.complain(problems, 0, "speed", "two speeds at least: a table says how coefficients change")
+        table.complain(0, "speed", "two speeds at least: a table says how coefficients change")
     for name in present:
         if name in values:
             complain[name](f"nothing: {table.source} has a column {table.fields[name].name}")
@@ -195,7 +195,7 @@ def _coefficients(
         complain[name] = _in_header(table, name, problems)
 
     def missing(name: str, expected: str) -> None:
-        problems.add(table.source, table.header_row, name, None, expected)
+        table.in_header(name, expected)
 
     return _Coefficients(values, complain, missing, tuple(table.numbers("speed").tolist()))
 
@@ -229,9 +229,9 @@ def _in_header(table: Table, name: str, problems: Problems) -> Callable[[str], N
 
 def _check_speeds(table: Table, problems: Problems) -> None:
     speed = table.numbers("speed")
-    must_be(table, "speed", speed >= 0, "a speed of 0 or more", problems)
+    table.must_be("speed", speed >= 0, "a speed of 0 or more")
     rising = np.insert(~(np.diff(speed) <= 0), 0, True)
-    must_be(table, "speed", rising, "a speed above that of the row before (ascending, each once)", problems)
+    table.must_be("speed", rising, "a speed above that of the row before (ascending, each once)")
 
 
 def _quantity(quantity: str, given: _Coefficients) -> Coefficient | tuple[Coefficient, ...] | None:

@@ -11,7 +11,7 @@ import numpy as np
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.rotor.plausible import warn_of_rotor, warn_of_table
@@ -79,33 +79,31 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     last = len(table) - 1
     end_row = bool(length[last] == 0.0)
     elements = np.arange(len(table)) < len(table) - end_row
-    must_be(
-        table,
+    table.must_be(
         "length",
         (length > 0) | ~elements,
         "a length above 0 (0 only in the last row, which then attaches to the right end)",
-        problems,
     )
     if not elements.any():
         expected = "at least one row with a length above 0"
-        problems.add(table.source, table.header_row, table.fields["length"].name, None, expected)
+        table.in_header(table.fields["length"].name, expected)
     for stem in ("diameter", "inner_diameter", *OF_ELEMENTS):
         _complain_about_blanks(table, stem, elements, problems)
     diameter, inner = table.numbers("diameter"), table.numbers("inner_diameter", 0.0)
-    must_be(table, "diameter", (diameter > 0) | ~elements, "a diameter above 0", problems)
-    must_be(table, "inner_diameter", (inner >= 0) | ~elements, "a diameter of 0 or more", problems)
+    table.must_be("diameter", (diameter > 0) | ~elements, "a diameter above 0")
+    table.must_be("inner_diameter", (inner >= 0) | ~elements, "a diameter of 0 or more")
     fits = ~(inner >= diameter) | ~(diameter > 0) | ~elements
-    must_be(table, "inner_diameter", fits, "less than the outer diameter", problems)
+    table.must_be("inner_diameter", fits, "less than the outer diameter")
     modulus, density = table.numbers("youngs_modulus"), table.numbers("density")
-    must_be(table, "youngs_modulus", (modulus > 0) | ~elements, "a number above 0", problems)
-    must_be(table, "density", (density >= 0) | ~elements, "a number of 0 (no mass) or more", problems)
+    table.must_be("youngs_modulus", (modulus > 0) | ~elements, "a number above 0")
+    table.must_be("density", (density >= 0) | ~elements, "a number of 0 (no mass) or more")
     poisson, damping = table.numbers("poisson_ratio"), table.numbers("material_damping")
     possible = (poisson > -1) & (poisson <= 0.5)
-    must_be(table, "poisson_ratio", possible | ~elements, "a number above -1, up to 0.5", problems)
-    must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
+    table.must_be("poisson_ratio", possible | ~elements, "a number above -1, up to 0.5")
+    table.must_be("material_damping", (damping >= 0) | ~elements, "a time of 0 or more")
     for stem in ATTACHED:
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
-        must_be(table, stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}", problems)
+        table.must_be(stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}")
     warn_of_table(table, elements)
     return Shaft(
         length[elements],
@@ -149,7 +147,7 @@ def _complain_about_blanks(table: Table, stem: str, elements: BoolArray, problem
         return
     for index, needed in enumerate(elements):
         if needed and not table.shown(stem, index):
-            table.complain(problems, index, stem, "a number")
+            table.complain(index, stem, "a number")
 
 
 def _attached(table: Table) -> tuple[tuple[Disc, ...], tuple[Support, ...]]:
