@@ -9,7 +9,7 @@ from balancing.correction.check_result import CheckComparison
 from balancing.correction.correct import correct
 from balancing.correction.correction_result import Correction
 from balancing.correction.history import History, history
-from balancing.correction.refine import Trim, refine, trim
+from balancing.correction.refine import refine
 from balancing.correction.subsets import Subsets, best_subsets
 from balancing.correction.trade_off import TradeOff, trade_off
 from balancing.correction.verdict import Verdict, verdict_of_check, verdict_of_prediction
@@ -48,7 +48,6 @@ __all__ = [
     "Tolerance",
     "TradeOff",
     "Trials",
-    "Trim",
     "Unbalance",
     "UndeterminedError",
     "Verdict",
@@ -74,7 +73,6 @@ __all__ = [
     "trade_off",
     "trial_from_coefficients",
     "trial_from_force",
-    "trim",
     "unbalance_of_run",
     "verdict_of_check",
     "verdict_of_prediction",

@@ -12,7 +12,7 @@ How it is shared by two planes: `balancing.allocation`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from balancing.allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import wrap
 from rotorid.base.units import rpm, rpm_text
 
@@ -113,13 +114,10 @@ class Tolerance:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""
-        positions = [None] * len(self.planes) if self.positions is None else self.positions.tolist()
         bearings = None
         if self.bearings is not None and self.bearing_limits is not None:
-            bearings = [
-                {"position_m": z, "limit_kg_m": float(u), "limit_g_mm": float(u * _GRAM_MM)}
-                for z, u in zip(self.bearings, self.bearing_limits, strict=True)
-            ]
+            bearings = rows(_limit_columns(self.bearings, self.bearing_limits))
+        planes = _limit_columns(self._places, self.limits)
         return {
             "grade": f"G{self.grade:g}",
             "mass_kg": self.mass,
@@ -130,28 +128,29 @@ class Tolerance:
             "specific_um": self.eccentricity * 1e6,
             "centre_of_mass_m": self.centre,
             "bearings": bearings,
-            "planes": [
-                {"plane": name, "position_m": z, "limit_kg_m": float(u), "limit_g_mm": float(u * _GRAM_MM)}
-                for name, z, u in zip(self.planes, positions, self.limits, strict=True)
-            ],
+            "planes": rows((Column("plane", self.planes), *planes)),
             "rule": self.rule,
             "warnings": list(self.warnings),
         }
 
     def to_frame(self) -> pd.DataFrame:
         """One row for the rotor, each bearing and each plane: place, position_mm, limit_g_mm."""
-        import pandas as pd
+        ends: FloatArray = np.zeros(0) if self.bearing_limits is None else self.bearing_limits
+        names = ("bearing A", "bearing B")[: len(ends)]
+        at = np.concatenate(([np.nan], self.bearings or (), self._places))
+        limits = np.concatenate(([self.total], ends, self.limits))
+        return frame(
+            (
+                Column("place", ("whole rotor", *names, *(f"plane {name}" for name in self.planes))),
+                Column("position_mm", at * 1e3),
+                Column("limit_g_mm", limits * _GRAM_MM),
+            )
+        )
 
-        rows: list[tuple[str, float, float]] = [("whole rotor", math.nan, self.total)]
-        if self.bearings is not None and self.bearing_limits is not None:
-            ends = zip(("bearing A", "bearing B"), self.bearings, self.bearing_limits, strict=True)
-            rows += [(name, z, float(u)) for name, z, u in ends]
-        at = np.full(len(self.planes), math.nan) if self.positions is None else self.positions
-        rows += [
-            (f"plane {n}", float(z), float(u)) for n, z, u in zip(self.planes, at, self.limits, strict=True)
-        ]
-        frame = pd.DataFrame(rows, columns=["place", "position_mm", "limit_g_mm"])
-        return frame.assign(position_mm=frame.position_mm * 1e3, limit_g_mm=frame.limit_g_mm * _GRAM_MM)
+    @property
+    def _places(self) -> FloatArray:
+        """Of the planes, m, NaN where unknown."""
+        return np.full(len(self.planes), np.nan) if self.positions is None else self.positions
 
     def summary(self) -> str:
         """Text of 80 columns."""
@@ -166,6 +165,14 @@ class Tolerance:
             where = "" if math.isnan(z) else f"at {z:.6g} mm"
             lines.append(f"{place:24} {where:>16} {limit:14.4g} g·mm")
         return "\n".join([*lines, "", wrap(self.rule)])
+
+
+def _limit_columns(positions: Sequence[float] | FloatArray, limits: FloatArray) -> tuple[Column, ...]:
+    return (
+        Column("position_m", positions),
+        Column("limit_kg_m", limits),
+        Column("limit_g_mm", limits * _GRAM_MM),
+    )
 
 
 def parse_grade(text: str | float) -> float:

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.data.columns import reading_columns, vector_columns
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import wrap
 from rotorid.base.units import rpm
 
@@ -71,40 +74,41 @@ class TrialWeight:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
-        known = self.angle is not None
-        return {
+        size, angle = self._weight()
+        share = None if self.force is None or self.load is None else 100 * self.force / self.load
+        expected = self._columns()
+        document = {
             "plane": self.plane,
-            "mass": float(size),
+            "mass": size,
             "unit": self.labels.weight_unit,
-            "angle_deg": float(angle) if known else None,
+            "angle_deg": angle,
             "angle_reach_deg": None if self.angle_reach is None else math.degrees(self.angle_reach),
             "basis": self.basis,
             "radius_m": self.radius,
             "speed_rpm": rpm(self.speed),
             "force_N": self.force,
             "load_N": self.load,
-            "force_percent": None
-            if self.force is None or self.load is None
-            else 100 * self.force / self.load,
-            "expected": self._expected(),
+            "force_percent": share,
+            "expected": None if expected is None else rows(expected),
             "conventions": self.labels.conventions(),
-            "warnings": list(self.warnings),
+            "warnings": self.warnings,
         }
+        return plain(document)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and sensor with the expected readings; one row without coefficients."""
-        import pandas as pd
-
-        found = self.to_dict()
-        weight = {
-            "plane": self.plane,
-            "mass": found["mass"],
-            "unit": found["unit"],
-            "angle_deg": found["angle_deg"],
-        }
-        frame = pd.DataFrame([{**weight, **row} for row in found["expected"] or [{}]])
-        return frame.astype({"angle_deg": float})
+        size, angle = self._weight()
+        expected = self._columns()
+        n = 1 if expected is None else len(expected[0].values)
+        return frame(
+            (
+                Column("plane", (self.plane,) * n),
+                Column("mass", np.full(n, size)),
+                Column("unit", (self.labels.weight_unit,) * n),
+                Column("angle_deg", np.full(n, angle)),
+                *(expected or ()),
+            )
+        )
 
     def summary(self) -> str:
         """Text of 80 columns."""
@@ -132,22 +136,19 @@ class TrialWeight:
             lines.append(f"{name:24} {now:>18} {then:>18} {row['change']:10.4g}")
         return "\n".join(lines)
 
-    def _expected(self) -> list[dict[str, Any]] | None:
+    def _weight(self) -> tuple[float, float]:
+        """Size in the job's unit and angle in degrees; NaN: nothing is known to choose it by."""
+        size, angle = self.labels.weight(self.amount * np.exp(1j * (self.angle or 0.0)))
+        return float(size), np.nan if self.angle is None else float(angle)
+
+    def _columns(self) -> tuple[Column, ...] | None:
+        """Readings without and with it, one row per speed and sensor; None without coefficients."""
         if self.speeds is None or self.before is None or self.expected is None:
             return None
-        old, old_phase = self.labels.vibration(self.before)
-        new, new_phase = self.labels.vibration(self.expected)
         change = np.abs(self.expected - self.before) * self.labels.vibration_scale
-        return [
-            {
-                "speed_rpm": rpm(speed),
-                "sensor": name,
-                "before": float(old[s, c]),
-                "before_phase_deg": float(old_phase[s, c]),
-                "after": float(new[s, c]),
-                "after_phase_deg": float(new_phase[s, c]),
-                "change": float(change[s, c]),
-            }
-            for s, speed in enumerate(self.speeds.tolist())
-            for c, name in enumerate(self.sensors)
-        ]
+        return (
+            *reading_columns(self.speeds, self.sensors),
+            *vector_columns(self.labels, "before", self.before),
+            *vector_columns(self.labels, "after", self.expected),
+            Column("change", change.ravel()),
+        )

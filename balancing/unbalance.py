@@ -30,14 +30,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import starting_point
-from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.identifiability import HOPELESS, UndeterminedError, separation
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
-from balancing.coefficients.resolution import HOPELESS
-from balancing.coefficients.run_errors import marginal
+from balancing.coefficients.run_errors import marginal, passes_zero
 from balancing.data.conventions import Labels
-from balancing.data.errors import symmetric
+from balancing.data.errors import mean_variance, symmetric
 from balancing.data.trials import Trials, check_names
+from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import (
     common_covariance,
     prediction_covariance,
@@ -48,13 +48,14 @@ from balancing.unbalance_result import Unbalance
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import counted
-from rotorid.regression import RCOND, stretch
+from rotorid.regression import RCOND, gain, solution, stretch
 
 _Gain = tuple[ComplexArray, int, float, float | None]
 """G (n, N), rank, condition number of what is determined, and λ relative to the largest s."""
 LEVEL = 0.99
 _REASONS = "unbalance elsewhere, wrong coefficients or a nonlinear rotor are likely reasons"
 _PASSES = 4
+_DEPENDENT = 1e6
 _SMALLEST, _LARGEST = 1e-10, 1e6
 """Range of λ, relative to the largest singular value."""
 
@@ -106,16 +107,12 @@ def estimate_unbalance(  # noqa: PLR0913
     UndeterminedError
         Where no station has an effect, or the readings or stations do not tell the modes apart.
     """
-    A, y = np.array(W, dtype=complex), np.array(Y, dtype=complex)
-    if A.ndim != 2 or 0 in A.shape or y.shape != A.shape[:1]:
-        raise ValueError(f"W must be (N, Q) and Y (N,), at least one each; got {A.shape} and {y.shape}")
-    if not (np.isfinite(A).all() and np.isfinite(y).all()):
-        raise ValueError("coefficients and readings must be finite; found NaN or infinity")
+    A, y, _ = check_stack(W, Y)
     N, Q = A.shape
     stations = check_names(names or [str(q) for q in range(1, Q + 1)], "stations")
     if len(stations) != Q:
         raise ValueError(f"{Q} names of stations are needed; got {len(stations)}")
-    gain = find(METHODS, method, "method").function
+    fit = find(METHODS, method, "method").function
     _check_options(method, ridge, shapes, masses)
     if not A.any():
         raise UndeterminedError("no station has an effect on any reading: check the coefficients")
@@ -128,7 +125,7 @@ def estimate_unbalance(  # noqa: PLR0913
         if channels is not None:
             variance = prediction_covariance(-U[: (channels.shape[1] - 2) // 2], channels)
             sigma = _sigma(variance)
-        G, rank, condition, used = gain((A @ basis).astype(complex), y, sigma, ridge)
+        G, rank, condition, used = fit((A @ basis).astype(complex), y, sigma, ridge)
         G = basis @ G
         U = G @ y
     residual = y - A @ U
@@ -145,7 +142,7 @@ def estimate_unbalance(  # noqa: PLR0913
         left = white(residual[:, None])[:, :1]
         if used is None:  # the least that unbalance at the stations leaves
             fitted = white((A @ basis).astype(complex))
-            left -= fitted @ np.linalg.lstsq(fitted, left, rcond=RCOND)[0]
+            left -= fitted @ solution(fitted, left)
         chi_square = float(np.sum(left**2))
     result = Unbalance(
         stations=stations,
@@ -259,7 +256,7 @@ def _sigma(variance: FloatArray) -> FloatArray:
 
     All alike where there is none: errors of coefficients alone, before an unbalance is known.
     """
-    mean = np.trace(variance, axis1=1, axis2=2) / 2
+    mean = mean_variance(variance)
     return np.asarray(np.sqrt(np.maximum(mean, 1e-8 * mean.max()))) if mean.any() else np.ones(len(mean))
 
 
@@ -272,47 +269,45 @@ def _basis(shapes: ArrayLike | None, masses: ArrayLike | None, Q: int) -> FloatA
     if m.shape != (Q,) or not (np.isfinite(m) & (m > 0)).all():
         raise ValueError(f"the masses must be finite, > 0, and have shape ({Q},); got {m.shape}")
     root = np.sqrt(m)[:, None] * Phi
-    scale = np.linalg.norm(root, axis=0)
-    singular = np.linalg.svd(root / np.where(scale > 0, scale, 1.0), compute_uv=False)
-    if Phi.shape[1] > Q or singular[-1] <= 1e-6 * singular[0]:
+    if separation(root).condition_number >= _DEPENDENT:
         raise UndeterminedError(
             f"{counted(Q, 'station')} cannot tell {Phi.shape[1]} modes apart: "
             "choose fewer modes, or more stations where the shapes differ"
         )
-    return np.asarray(np.sqrt(m)[:, None] * np.linalg.pinv(root).T)
+    return np.asarray(np.sqrt(m)[:, None] * gain(root).real.T)
 
 
 def _minimum_norm(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
-    weight = _row_weights(sigma, len(A))
-    left, s, right = _decomposed(weight[:, None] * A)
-    return _gain(left, s, right) * weight, len(s), float(s[0] / s[-1]), None
+    return (*_ridge(A, y, sigma, 0.0)[:3], None)
 
 
 def _ridge(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
     weight = _row_weights(sigma, len(A))
-    left, s, right = _decomposed(weight[:, None] * A)
+    # the columns are not scaled: the norm of stations has a meaning
+    left, s, right = np.linalg.svd(weight[:, None] * A, full_matrices=False)
+    rank = int(np.count_nonzero(s > RCOND * s[0]))
+    left, s, right = left[:, :rank], s[:rank], right[:rank]
     if ridge is None:
         b = weight * y
         beta = np.abs(left.conj().T @ b) ** 2
         rest = max(float(np.sum(np.abs(b) ** 2) - beta.sum()), 0.0)
         choose = _by_gcv if sigma is None else _by_discrepancy
         ridge = choose(s, beta, rest, len(y))
-    f = s**2 / (s**2 + (ridge * s[0]) ** 2)
-    return _gain(left, s, right, f) * weight, len(s), float(s[0] / s[-1]), ridge
+    filtered = s / (s**2 + (ridge * s[0]) ** 2)
+    G = (right.conj().T * filtered) @ left.conj().T
+    return np.asarray(G * weight), rank, float(s[0] / s[-1]), ridge
 
 
 def _modal(A: ComplexArray, y: ComplexArray, sigma: FloatArray | None, ridge: float | None) -> _Gain:
     weight = _row_weights(sigma, len(A))
-    # the columns of modes may be of any scale; the norm of stations has a meaning
-    norms = np.linalg.norm(weight[:, None] * A, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    left, s, right = _decomposed(weight[:, None] * A / scale)
-    if len(s) < A.shape[1]:
+    rows = weight[:, None] * A
+    told = separation(rows)
+    if told.rank < A.shape[1]:
         raise UndeterminedError(
             f"{counted(len(A), 'reading')} cannot tell {A.shape[1]} modes apart: "
             "choose fewer modes, or add sensors or speeds"
         )
-    return _gain(left, s, right) * weight / scale[:, None], len(s), float(s[0] / s[-1]), None
+    return gain(rows) * weight, told.rank, told.condition_number, None
 
 
 METHODS: tuple[
@@ -333,19 +328,6 @@ def _row_weights(sigma: FloatArray | None, n: int) -> FloatArray:
     return np.ones(n) if sigma is None else np.asarray(1.0 / sigma)
 
 
-def _decomposed(A: ComplexArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
-    """U, σ and Vᴴ of what is determined."""
-    left, s, right = np.linalg.svd(A, full_matrices=False)
-    rank = int(np.count_nonzero(s > RCOND * s[0]))
-    return left[:, :rank], s[:rank], right[:rank]
-
-
-def _gain(
-    left: ComplexArray, s: FloatArray, right: ComplexArray, f: FloatArray | float = 1.0
-) -> ComplexArray:
-    return np.asarray((right.conj().T * (f / s)) @ left.conj().T)
-
-
 def _remains(
     s: FloatArray, beta: FloatArray, rest: float, ridge: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -355,15 +337,12 @@ def _remains(
 
 
 def _by_discrepancy(s: FloatArray, beta: FloatArray, rest: float, N: int) -> float:
-    """λ at which Σ |r|²/σ² = 2 N, by bisection (the residual grows with λ)."""
-    low, high = np.log(_SMALLEST), np.log(_LARGEST)
-    for _ in range(100):
-        middle = (low + high) / 2
-        if _remains(s, beta, rest, np.exp(np.array(middle)))[0] < 2 * N:
-            low = middle
-        else:
-            high = middle
-    return float(np.exp((low + high) / 2))
+    """λ at which Σ |r|²/σ² = 2 N (the residual grows with λ)."""
+
+    def excess(exponent: float) -> float:
+        return float(_remains(s, beta, rest, np.exp(np.array(exponent)))[0]) - 2 * N
+
+    return float(np.exp(passes_zero(excess, np.log(_SMALLEST), np.log(_LARGEST))))
 
 
 def _by_gcv(s: FloatArray, beta: FloatArray, rest: float, N: int) -> float:

@@ -9,6 +9,8 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -131,48 +133,46 @@ class Unbalance:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the labels' units and conventions; what is unknown is None."""
-        size, angle = self.labels.weight(self.unbalance)
-        std, known, share = self.std, self.determined, self.own_share
-        rows = [
+        return plain(
             {
-                "station": name,
-                "unbalance": float(size[q]),
-                "unit": self.labels.weight_unit,
-                "angle_deg": float(angle[q]),
-                "std": None if std is None or np.isnan(std[q]) else float(std[q] * self.labels.weight_scale),
-                "own_share": float(share[q]),
-                "determined": bool(known[q]),
+                "stations": rows(self._columns()),
+                "method": self.method,
+                "rank": self.rank,
+                "condition_number": self.condition_number,
+                "ridge": self.ridge,
+                "chi_square": self.chi_square,
+                "words": self.words(),
+                "conventions": self.labels.conventions(),
+                "warnings": self.warnings,
             }
-            for q, name in enumerate(self.stations)
-        ]
-        return {
-            "stations": rows,
-            "method": self.method,
-            "rank": self.rank,
-            "condition_number": self.condition_number,
-            "ridge": self.ridge,
-            "chi_square": self.chi_square,
-            "words": self.words(),
-            "conventions": self.labels.conventions(),
-            "warnings": list(self.warnings),
-        }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per station: unbalance, unit, angle_deg, std (NaN: unknown), own_share, determined."""
-        import pandas as pd
+        return frame(self._columns())
 
-        return pd.DataFrame(self.to_dict()["stations"]).astype({"std": float})
+    def _columns(self) -> tuple[Column, ...]:
+        size, angle = self.labels.weight(self.unbalance)
+        std = np.full(len(size), np.nan) if self.std is None else self.std * self.labels.weight_scale
+        return (
+            Column("station", self.stations),
+            Column("unbalance", size),
+            Column("unit", [self.labels.weight_unit] * len(size)),
+            Column("angle_deg", angle),
+            Column("std", std),
+            Column("own_share", self.own_share),
+            Column("determined", self.determined),
+        )
 
     def summary(self) -> str:
         """Text: what is determined, and the unbalance of each station with its standard deviation."""
-        data = self.to_dict()
         width = max(8, *(len(name) for name in self.stations))
-        lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {data['words']}"]
+        lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {self.words()}"]
         lines[:0] = [self.labels.assumed_in_words()] if self.labels.assumed else []
         lines.append(
             f"{'station':<{width}} {self.labels.weight_unit:>12} {'angle':>8} {'std':>10}  determined"
         )
-        for row in data["stations"]:
+        for row in rows(self._columns()):
             std = "" if row["std"] is None else f"{row['std']:.3g}"
             sure = "yes" if row["determined"] else f"no ({_percent(row['own_share'])} % its own)"
             size = f"{row['unbalance']:>12.5g} {row['angle_deg']:>7.1f}°"

@@ -33,8 +33,7 @@ def main(picture: str | None = None) -> dict[str, float]:
     unbalance = read_unbalance(FOLDER / "unbalance.csv", rotor)
     speeds = np.arange(1000, 15001, 20) * RPM
     response = fem.unbalance_response(rotor, unbalance, speeds)
-    reading = np.abs(response.at(("probe DE", 45)))
-    peaks = fem.find_peaks(speeds, reading, operating=OPERATING)
+    peaks = fem.response_peaks(response, ("probe DE", 45), operating=OPERATING)
     print(peaks.summary("µm", 1e6), end="\n\n")
 
     # Where it would become unstable.

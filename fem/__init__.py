@@ -18,7 +18,7 @@ from fem.model.sensors import Sensor
 from fem.modes import Modes
 from fem.orbits import Orbits, orbits, probe, whirl_direction
 from fem.peak_search import resolve_peaks
-from fem.peaks import Peak, Peaks, find_peaks, required_margin
+from fem.peaks import Peak, Peaks, required_margin
 from fem.plots import draw_rotor
 from fem.response import influence, response_peaks, unbalance_response
 from fem.speed_map import Intersection, SpeedMap, speed_map
@@ -61,7 +61,6 @@ __all__ = [
     "critical_speeds",
     "draw_rotor",
     "equations_of_motion",
-    "find_peaks",
     "influence",
     "mesh_check",
     "orbits",

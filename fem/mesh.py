@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.critical import critical_speeds
-from fem.model.rotor import Rotor
-from rotorid.base.arrays import FloatArray
+from fem.model.rotor import PER_ELEMENT, Rotor
+from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
-from rotorid.base.json import floats
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame
 from rotorid.base.text import counted
 
 if TYPE_CHECKING:
@@ -47,27 +48,20 @@ class MeshCheck:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per critical speed."""
-        import pandas as pd
-
-        return pd.DataFrame(
-            {
-                "mode": range(1, self.frequencies.size + 1),
-                "frequency_rad_s": self.frequencies,
-                "extrapolated_rad_s": self.extrapolated,
-                "relative_error": self.errors,
-                "rate": self.rates,
-            }
-        )
+        modes = Column("mode", range(1, self.frequencies.size + 1))
+        return frame((modes, Column("frequency_rad_s", self.frequencies), *self._estimates()))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "elements": self.elements,
-            "frequencies_rad_s": self.frequencies.tolist(),
-            "extrapolated_rad_s": self.extrapolated.tolist(),
-            "relative_error": self.errors.tolist(),
-            "rate": floats(self.rates),
-        }
+        estimates = {column.name: column.values for column in self._estimates()}
+        return plain({"elements": self.elements, "frequencies_rad_s": self.frequencies, **estimates})
+
+    def _estimates(self) -> tuple[Column, ...]:
+        return (
+            Column("extrapolated_rad_s", self.extrapolated),
+            Column("relative_error", self.errors),
+            Column("rate", self.rates),
+        )
 
     def summary(self) -> str:
         """A table, and the advice that follows."""
@@ -104,20 +98,10 @@ def refined(rotor: Rotor, times: int) -> Rotor:
     def moved(node: int) -> int:
         return times * (node - 1) + 1
 
-    per_element: dict[str, Any] = {
-        name: np.repeat(getattr(rotor, name), times)
-        for name in (
-            "outer_diameter",
-            "inner_diameter",
-            "youngs_modulus",
-            "density",
-            "poisson_ratio",
-            "material_damping",
-        )
-    }
+    per_element: dict[str, Any] = {name: np.repeat(getattr(rotor, name), times) for name in PER_ELEMENT}
+    per_element["length"] /= times
     return replace(
         rotor,
-        length=np.repeat(rotor.length, times) / times,
         **per_element,
         discs=[replace(disc, node=moved(disc.node)) for disc in rotor.discs],
         supports=[replace(support, node=moved(support.node)) for support in rotor.supports],
@@ -155,6 +139,5 @@ def mesh_check(rotor: Rotor, n: int = 3) -> MeshCheck:
     clear = (np.abs(second) > 1e-10 * scale) & (first * second > 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         rates = np.where(clear, np.log2(np.abs(first / second)), np.nan)
-    for array in (extrapolated, errors, rates):
-        array.flags.writeable = False
+    read_only(extrapolated, errors, rates)
     return MeshCheck(coarse, extrapolated, errors, rates, rotor.n_elements)

@@ -10,7 +10,7 @@ import numpy as np
 
 from fem.critical import critical_speeds
 from fem.model.sensors import SensorLike
-from fem.peaks import Edition, Peaks
+from fem.peaks import Peaks
 from fem.response import judged, response_peaks
 from fem.vibration import Response
 from rotorid.base.arrays import BoolArray, FloatArray
@@ -30,7 +30,6 @@ def resolve_peaks(
     sensors: Sequence[SensorLike],
     *,
     operating: tuple[float, float] | None = None,
-    edition: Edition = "2005",
 ) -> tuple[Response, list[Peaks]]:
     """Find the peaks of readings whatever the steps between the speeds of the response are.
 
@@ -40,7 +39,7 @@ def resolve_peaks(
         At ascending speeds.
     sensors
         Where it is read.
-    operating, edition
+    operating
         As in `find_peaks`.
 
     Returns
@@ -56,7 +55,7 @@ def resolve_peaks(
     if np.count_nonzero(response.speeds) < 3:  # rest is no part of a peak
         return response, []
     finer = judged(_refine(response, sensors))
-    peaks = [response_peaks(finer, place, operating=operating, edition=edition) for place in sensors]
+    peaks = [response_peaks(finer, place, operating=operating) for place in sensors]
     finer = _settle(finer, peaks, response.speeds)
     if any(peak.undamped for found in peaks for peak in found.peaks):
         finer = dataclasses.replace(finer, warnings=(*finer.warnings, UNDAMPED))
@@ -129,7 +128,7 @@ def _with(result: Response, extra: FloatArray) -> Response | None:
             np.abs(extra - omega[right - 1]), np.abs(omega[np.minimum(right, omega.size - 1)] - extra)
         )
         extra = extra[gaps > _FINEST / 2 * extra]
-    if not extra.size or result.solve is None:
+    if not extra.size:
         return result
     try:
         more = result.solve(extra)

@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike
 from fem.growth_check import judge
 from fem.matrices.bands import Matrices, assemble, ignored_inertia
 from fem.model.rotor import Rotor
-from fem.model.sensors import SensorLike, as_sensors
-from fem.peaks import UNLIMITED, Edition, Peak, Peaks, find_peaks
+from fem.model.sensors import SensorLike, as_sensor, as_sensors
+from fem.peaks import UNLIMITED, Peaks, find_peaks
 from fem.solvers.banded import rounding_warning
 from fem.solvers.eigen import fine_mesh_warning
 from fem.solvers.receptance import Receptance, prepare
-from fem.vibration import BearingForces, InfluenceCoefficients, Response, phase_degrees
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from fem.vibration import BearingForces, InfluenceCoefficients, Response
+from rotorid.base.arrays import ComplexArray, FloatArray, read_only
 
-__all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "phase_degrees"]
-__all__ += ["response_peaks", "unbalance_response"]
+__all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "response_peaks"]
+__all__ += ["unbalance_response"]
 Unbalance = Mapping[str | int, complex] | Mapping[int, complex] | Mapping[str, complex]
 """`{node or station: m r e^{iφ}}`, kg·m."""
 
@@ -83,9 +83,8 @@ def unbalance_response(
             largest[part], where[part] = size.max(axis=1), size.argmax(axis=1) + 1
             doubts.append(found.doubt)
         said = (*_model_warnings(ready), *rounding_warning(doubts))
-        for array in (F, b, largest, where):
-            array.flags.writeable = False
-        return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve=solve)
+        read_only(F, b, largest, where)
+        return Response(speeds, F, masses, rotor, said, b, largest, where, kept, solve)
 
     return judged(solve(speeds))
 
@@ -123,7 +122,6 @@ def response_peaks(
     sensor: SensorLike,
     *,
     operating: tuple[float, float] | None = None,
-    edition: Edition = "2005",
 ) -> Peaks:
     """Find the peaks of one reading, evaluated by the model between the speeds of the response.
 
@@ -133,7 +131,7 @@ def response_peaks(
         At speeds between which no peak is hidden; those without a steady response do not count.
     sensor
         Where it is read.
-    operating, edition
+    operating
         As in `find_peaks`.
 
     Raises
@@ -141,33 +139,20 @@ def response_peaks(
     ValueError
         As `find_peaks`.
     """
-    rotor, place = response.rotor, as_sensors((sensor,), response.rotor)[0]
-    A = assemble(rotor)
-    loads, factors = _loads(A, response.unbalance)
-    at = np.array([A.deflection(rotor.node(place.node))])
-    ready = prepare(rotor, A, at, loads, response.speeds)
-    turn = np.exp(1j * place.radians)
+    place = as_sensor(sensor, response.rotor)
 
     def reading(speed: float) -> float:
         try:
-            ((_, found),) = ready.parts(np.array([speed]))
+            return float(np.abs(response.solve(np.array([speed])).at(place)[0]))
         except ValueError:
             return UNLIMITED  # undamped, and critical
-        F = (found.F @ factors)[0, 0] * turn.conjugate()
-        return float(speed**2 * abs(F if found.b is None else F + (found.b @ factors)[0, 0] * turn))
 
-    speeds, size = response.speeds, np.abs(response.at(sensor))
+    speeds, size = response.speeds, np.abs(response.at(place))
     counted = response.steady & (speeds > 0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], counted, [False]))))
-    peaks: list[Peak] = []
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if end - start >= 3:
-            part = slice(start, end)
-            found = find_peaks(
-                speeds[part], size[part], operating=operating, edition=edition, evaluate=reading
-            )
-            peaks += found.peaks
-    return Peaks(tuple(peaks), operating, edition)
+    edges = np.flatnonzero(np.diff(counted, prepend=False, append=False))
+    runs = [slice(start, end) for start, end in zip(edges[::2], edges[1::2], strict=True) if end - start > 2]
+    found = [find_peaks(speeds[run], size[run], reading, operating=operating) for run in runs]
+    return Peaks(tuple(peak for part in found for peak in part.peaks), operating)
 
 
 def _loads(A: Matrices, masses: Mapping[int, complex]) -> tuple[FloatArray, ComplexArray]:
@@ -176,9 +161,7 @@ def _loads(A: Matrices, masses: Mapping[int, complex]) -> tuple[FloatArray, Comp
     loads = np.zeros((A.size, 2))
     at = [A.deflection(node) for node in masses]
     loads[at, 0], loads[at, 1] = U.real, U.imag
-    used = np.flatnonzero(loads.any(axis=0))
-    if not used.size:
-        used = np.array([0])
+    used = np.flatnonzero(loads.any(axis=0)) if U.any() else [0]
     return loads[:, used], np.array([1.0, 1j])[used]
 
 
@@ -236,7 +219,8 @@ def influence(
         doubts.append(found.doubt)
     windows, said = judge(rotor, speeds)
     warnings = (*_model_warnings(ready), *rounding_warning(doubts), *said)
-    return InfluenceCoefficients(speeds, sensors, planes, _frozen(W), warnings, windows)
+    read_only(W)
+    return InfluenceCoefficients(speeds, sensors, planes, W, warnings, windows)
 
 
 def _model_warnings(ready: Receptance) -> tuple[str, ...]:
@@ -252,10 +236,5 @@ def _checked_speeds(speeds: ArrayLike) -> FloatArray:
         raise ValueError("speeds must be one number or a list of at least one")
     if not (np.isfinite(array) & (array >= 0)).all():
         raise ValueError("speeds must be finite and not negative, in rad/s")
-    array.flags.writeable = False
-    return array
-
-
-def _frozen(array: AnyArray) -> AnyArray:
-    array.flags.writeable = False
+    read_only(array)
     return array

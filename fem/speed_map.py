@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from fem.critical import critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
+from fem.solvers.roots import bracketed_root
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import floats
 from rotorid.base.units import rpm_text
@@ -277,20 +279,16 @@ def _meet(at: _Criticals, curve: FloatArray, where: FloatArray) -> list[tuple[in
         return [(j + 1, float(w), value) for j, w in enumerate(at(value)) if np.isfinite(w)]
     if (curve <= 0).any():
         return []
+
+    def excess(speed: float, mode: int) -> float:
+        return float(at(float(np.interp(speed, where, curve)))[mode] - speed)
+
     f = np.array([at(float(value)) for value in curve]) - where[:, None]
     found = []
     for i, j in zip(*np.nonzero((f[:-1] > 0) != (f[1:] > 0)), strict=True):
         if not np.isfinite(f[i : i + 2, j]).all():
             continue
-        (a, b), (fa, fb) = where[i : i + 2], f[i : i + 2, j]
-        for _ in range(60):
-            speed = b - fb * (b - a) / (fb - fa)
-            value = float(np.interp(speed, where, curve))
-            here = float(at(value)[j] - speed)
-            if abs(here) <= 1e-12 * speed:
-                break
-            # Illinois: the end that stays loses half of its weight.
-            fa, a = (fa / 2, a) if (here > 0) == (fb > 0) else (fb, b)
-            b, fb = speed, here
-        found.append((int(j) + 1, float(speed), value))
+        ends = (float(where[i]), float(where[i + 1]))
+        speed = bracketed_root(partial(excess, mode=j), ends, tuple(f[i : i + 2, j]), 1e-13 * ends[1])
+        found.append((int(j) + 1, speed, float(np.interp(speed, where, curve))))
     return sorted(found)

@@ -10,17 +10,15 @@ state space follow from
 
 C₂₂ need not be regular. With its null spaces, C₂₂ V_b = 0 and U_bᵀ C₂₂ = 0, the massless coordinates are
 q₂ = V_a a + V_b b: a is damped and becomes a state of first order, b is not and follows from the algebraic
-rows U_bᵀ. The velocity of b is needed where C₁₂ V_b ≠ 0 (it is zero for symmetric damping, which does no
-negative work): then the momentum p = M₁₁ q₁' + C₁₂ V_b b is the state instead of the velocity, so that no
-force is differentiated:
+rows U_bᵀ:
 
-    p'                      = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
+    M₁₁ v'                  = f₁ − C₁₁ v − C₁₂ V_a a' − K₁₁ q₁ − K₁₂ q₂
     (U_aᵀ C₂₂ V_a) a'       = U_aᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ q₂)
-    [M₁₁       C₁₂ V_b    ] [v]   [p                              ]
-    [U_bᵀ C₂₁  U_bᵀ K₂₂ V_b] [b] = [U_bᵀ (f₂ − K₂₁ q₁ − K₂₂ V_a a)].
+    (U_bᵀ K₂₂ V_b) b        = U_bᵀ (f₂ − C₂₁ v − K₂₁ q₁ − K₂₂ V_a a).
 
 The last matrix must be regular; else the motion depends on derivatives of the forces (an index above 1) or is
-not determined at all, and is refused.
+not determined at all, and is refused. So is damping by the velocity of b, C₁₂ V_b ≠ 0: dampers, seals and
+gyroscopic moments of a rotor have none, as what does no negative work cannot.
 """
 
 from __future__ import annotations
@@ -32,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.matrices.massless import ZERO, Sorted, eigenvalues, scales, solved, sorted_by_mass, split_by_damping
+from fem.matrices.massless import ZERO, eigenvalues, massive_first, scales, solved, split_by_damping
 from fem.matrices.motion import Motion
 from rotorid.base.arrays import ComplexArray, FloatArray
 
@@ -50,10 +48,8 @@ class StateSpace:
     A, B, C, D
         Shapes (n, n), (n, inputs), (outputs, n), (outputs, inputs); SI.
     states
-        Names: `x7` a deflection, `v_x7` its velocity; `p_x7` instead of a velocity where the damping of
-        massless coordinates calls for the momentum (divided by the mass matrix, m/s, see the module);
-        `damped1` … combinations of massless coordinates where damping acts on combinations only;
-        `combination1` … of massive ones where the mass matrix is singular without a zero row.
+        Names: `x7` a deflection, `v_x7` its velocity; `damped1` … combinations of massless coordinates where
+        damping acts on combinations only.
     inputs
         `f_x7` is a force on coordinate `x7`, N (on a tilt: N·m).
     outputs
@@ -118,7 +114,7 @@ class StateSpace:
         }
 
 
-def state_space(  # noqa: PLR0915
+def state_space(
     motion: Motion, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
 ) -> StateSpace:
     """Write equations of motion as a state space.
@@ -127,7 +123,7 @@ def state_space(  # noqa: PLR0915
     ----------
     motion
         Coordinates with zero row and column of M are massless: they become states of first order where they
-        are damped, and are eliminated where not. So do combinations that move no mass.
+        are damped, and are eliminated where not.
     inputs
         Forces, `f_x7` on the coordinate `x7`; by default on every coordinate.
     outputs
@@ -136,8 +132,9 @@ def state_space(  # noqa: PLR0915
     Raises
     ------
     ValueError
-        For names that do not exist or repeat, numbers that are not finite, massless coordinates that nothing
-        holds, or as output the velocity of a massless undamped coordinate that follows a force at once.
+        For names that do not exist or repeat, numbers that are not finite, a singular mass matrix without a
+        zero row, massless coordinates that nothing holds or whose velocity acts without being damped, or as
+        output the velocity of a massless undamped coordinate that follows a force at once.
 
     Examples
     --------
@@ -157,43 +154,42 @@ def state_space(  # noqa: PLR0915
     forces = [_force(name, motion) for name in chosen_inputs]
     picked = [_output(name, motion) for name in chosen_outputs]
 
-    order = sorted_by_mass(M, names)
-    n1 = len(order.mass)
-    damping, stiffness, F = _combined(order, C), _combined(order, K), order.left.T[:, forces]
-    mass = np.zeros_like(damping)
-    mass[:n1, :n1] = order.mass
-    scale, omega = scales(mass, damping, stiffness)
-    C11, C12, C21, C22 = _blocks(damping, n1)
-    K11, K12, K21, K22 = _blocks(stiffness, n1)
+    order, n1 = massive_first(M)
+    M, C, K = (matrix[np.ix_(order, order)] for matrix in (M, C, K))
+    mass, F = M[:n1, :n1], np.eye(len(names))[order][:, forces]
+    scale, omega = scales(M, C, K)
+    C11, C12, C21, C22 = _blocks(C, n1)
+    K11, K12, K21, K22 = _blocks(K, n1)
     F1, F2 = F[:n1], F[n1:]
-    split = split_by_damping(C22, scale[n1:], omega, order.names[n1:])
+    ordered = [names[i] for i in order]
+    split = split_by_damping(C22, scale[n1:], omega, ordered[n1:])
     Va, Vb, Ua, Ub = split.Va, split.Vb, split.Ua, split.Ub
     na = Va.shape[1]
 
-    # Rows over the unknowns (q₁, M₁₁⁻¹ p, a) and u; the second is the velocity wherever C₁₂ V_b = 0.
+    if (omega * scale[:n1, None] * np.abs(C12 @ Vb) > ZERO).any():
+        raise ValueError(
+            "the velocity of a massless coordinate acts on others without being damped itself: there is no "
+            "state space with velocities; make the damping symmetric, or give the coordinate mass"
+        )
+
+    # Rows over the unknowns (q₁, v, a) and u.
     n = 2 * n1 + na
     width = n + len(forces)
-    Q1, P, A_, U = np.split(np.eye(width), [n1, 2 * n1, n])
-    across = C12 @ Vb
-    across[omega * scale[:n1, None] * np.abs(across) <= ZERO] = 0.0
-    shift = np.linalg.solve(order.mass, across)
-    b = solved(Ub.T @ (K22 @ Vb - C21 @ shift), Ub.T @ (F2 @ U - K21 @ Q1 - K22 @ Va @ A_ - C21 @ P))
-    v = P - shift @ b
+    Q1, v, A_, U = np.split(np.eye(width), [n1, 2 * n1, n])
+    b = solved(Ub.T @ K22 @ Vb, Ub.T @ (F2 @ U - K21 @ Q1 - K22 @ Va @ A_ - C21 @ v))
     q2 = Va @ A_ + Vb @ b
     rate_a = np.linalg.solve(Ua.T @ C22 @ Va, Ua.T @ (F2 @ U - C21 @ v - K21 @ Q1 - K22 @ q2))
-    rate_p = np.linalg.solve(order.mass, F1 @ U - C11 @ v - C12 @ Va @ rate_a - K11 @ Q1 - K12 @ q2)
-    S = np.vstack((v, rate_p, rate_a))
+    rate_v = np.linalg.solve(mass, F1 @ U - C11 @ v - C12 @ Va @ rate_a - K11 @ Q1 - K12 @ q2)
+    S = np.vstack((v, rate_v, rate_a))
 
-    deflections = order.right @ np.vstack((Q1, q2))
-    velocities = order.right @ np.vstack((v, Va @ rate_a))
-    instant = order.right[:, n1:] @ Vb
-    algebraic = np.abs(instant).max(axis=1, initial=0.0) > 0
+    back = np.argsort(order)
+    deflections, velocities = np.vstack((Q1, q2))[back], np.vstack((v, Va @ rate_a))[back]
+    algebraic = np.concatenate((np.zeros(n1, dtype=bool), np.abs(Vb).max(axis=1, initial=0.0) > 0))[back]
     velocities[algebraic] = deflections[algebraic, :n] @ S  # unless a force stands in the deflection
-    size = np.abs(order.right) @ scale
-    reach = np.abs(order.left) @ scale
+    size = scale[back]
     rows = []
     for name, (kind, i) in zip(chosen_outputs, picked, strict=True):
-        direct = np.abs(deflections[i, n:]) > ZERO * size[i] * reach[forces]
+        direct = np.abs(deflections[i, n:]) > ZERO * size[i] * size[forces]
         if kind == "v" and algebraic[i] and direct.any():
             raise ValueError(
                 f"output {name!r}: {names[i]!r} has neither mass nor damping of its own and follows "
@@ -202,19 +198,10 @@ def state_space(  # noqa: PLR0915
             )
         rows.append(velocities[i] if kind == "v" else deflections[i])
     Y = np.array(rows).reshape(len(rows), width)
-    first = order.names[:n1]
-    speeds = [f"{'p' if shift[k].any() else 'v'}_{name}" for k, name in enumerate(first)]
-    states = (*first, *speeds, *split.names)
+    states = (*ordered[:n1], *(f"v_{name}" for name in ordered[:n1]), *split.names)
     return StateSpace(
         S[:, :n], S[:, n:], Y[:, :n], Y[:, n:], states, chosen_inputs, tuple(chosen_outputs), motion.speed
     )
-
-
-def _combined(order: Sorted, X: FloatArray) -> FloatArray:
-    """leftᵀ X right, without entries that are only what rounding leaves of terms that cancel."""
-    out = order.left.T @ X @ order.right
-    size = np.abs(order.left.T) @ np.abs(X) @ np.abs(order.right)
-    return np.where(np.abs(out) > ZERO * size, out, 0.0)
 
 
 def _blocks(matrix: FloatArray, n: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

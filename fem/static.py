@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble, general, multiply, rounding_error
+from fem.matrices.bands import Matrices, assemble, general, multiply
 from fem.matrices.pencil import whole_rotor
 from fem.model.rotor import Rotor
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,30 +55,23 @@ class StaticDeflection:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per node."""
-        import pandas as pd
-
-        return pd.DataFrame(
-            {
-                "node": range(1, self.rotor.n_nodes + 1),
-                "position_m": self.rotor.positions,
-                "x_m": self.x,
-                "y_m": self.y,
-            }
-        )
+        nodes = Column("node", range(1, self.rotor.n_nodes + 1))
+        positions = Column("position_m", self.rotor.positions)
+        return frame((nodes, positions, Column("x_m", self.x), Column("y_m", self.y)))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return {
-            "speed_rad_s": self.speed,
-            "weight_N": self.weight,
-            "positions_m": self.rotor.positions.tolist(),
-            "x_m": self.x.tolist(),
-            "y_m": self.y.tolist(),
-            "reactions": [
-                {"node": support.node, "x_N": float(x), "y_N": float(y)}
-                for support, x, y in zip(self.rotor.supports, self.reaction_x, self.reaction_y, strict=True)
-            ],
-        }
+        nodes = Column("node", [support.node for support in self.rotor.supports])
+        return plain(
+            {
+                "speed_rad_s": self.speed,
+                "weight_N": self.weight,
+                "positions_m": self.rotor.positions,
+                "x_m": self.x,
+                "y_m": self.y,
+                "reactions": rows((nodes, Column("x_N", self.reaction_x), Column("y_N", self.reaction_y))),
+            }
+        )
 
     def summary(self) -> str:
         """Weight, largest deflection and reactions, as text."""
@@ -130,8 +125,7 @@ def static_deflection(
         D = support.dynamic_stiffness(0.0, speed).real
         reactions[:, k] = -D @ X[:, A.deflection(support.node)]
     x, y = X[:, A.deflections]
-    for array in (x, y, reactions):
-        array.flags.writeable = False
+    read_only(x, y, reactions)
     return StaticDeflection(x, y, reactions[0], reactions[1], gravity * rotor.total_mass, rotor, speed)
 
 
@@ -161,23 +155,13 @@ def compliance(rotor: Rotor, nodes: Sequence[str | int], speed: float = 0.0) -> 
         If the supports leave the rotor free, or a node does not exist, or the mesh is so fine that float64
         carries fewer than about three digits.
     """
-    from scipy.linalg.lapack import dpbtrf, dpbtrs
-
     A = assemble(rotor)
     unknowns = np.array([A.deflection(rotor.node(node)) for node in nodes], dtype=np.intp)
-    forces = np.zeros((A.size, unknowns.size))
-    forces[unknowns, np.arange(unknowns.size)] = 1.0
-    if not all(support.plain for support in rotor.supports):
-        both = np.stack((forces, np.zeros_like(forces)))
-        return np.asarray(_solve(rotor, A, both, number(speed, "speed"), spin=False)[0, unknowns])
-    if A.rigid:
-        raise _free()
-    U, info = dpbtrf(A.stiffness)
-    X = dpbtrs(U, forces)[0] if info == 0 else forces
-    if info != 0 or rounding_error(A.stiffness, X).max(initial=0.0) > 1e-3:
-        raise _lost(rotor)
-    alpha = X[unknowns]
-    return np.asarray((alpha + alpha.T) / 2)
+    forces = np.zeros((2, A.size, unknowns.size))
+    forces[0, unknowns, np.arange(unknowns.size)] = 1.0
+    alpha = _solve(rotor, A, forces, number(speed, "speed"), spin=False)[0, unknowns]
+    symmetric = all(support.plain for support in rotor.supports)
+    return np.asarray((alpha + alpha.T) / 2 if symmetric else alpha)
 
 
 def _solve(rotor: Rotor, A: Matrices, forces: FloatArray, speed: float, spin: bool = True) -> FloatArray:
@@ -211,7 +195,7 @@ def _solve(rotor: Rotor, A: Matrices, forces: FloatArray, speed: float, spin: bo
     scatter = np.zeros(size)
     for plane in (0, 1):
         part = np.abs(X[plane::2])
-        scatter += np.einsum("ij,ij->j", part, multiply(np.abs(A.stiffness), part))
+        scatter += np.einsum("ij,ij->j", part, multiply(np.abs(A.shaft), part))
     loaded = np.abs(rhs).max(axis=0) > 0
     if info != 0 or not np.isfinite(X).all() or (np.finfo(float).eps * scatter > 1e-3 * work)[loaded].any():
         raise _lost(rotor)

@@ -11,7 +11,9 @@ import numpy as np
 from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.windows import Window, within
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted
 from rotorid.base.units import phase_deg, speed_text
 
@@ -44,10 +46,10 @@ class Response:
         Longest half axis of all nodes' orbits, m, and the number of that node, shape (S,).
     nodes
         Numbers of the nodes kept, by default all, shape (K,).
-    windows
-        Ranges of speed in which no steady response exists: amplitudes there are never reached.
     solve
         The same at other speeds of the range, rad/s, ascending; not judged for stability.
+    windows
+        Ranges of speed in which no steady response exists: amplitudes there are never reached.
     """
 
     speeds: FloatArray
@@ -59,8 +61,8 @@ class Response:
     largest: FloatArray
     largest_node: IndexArray
     nodes: IndexArray
+    solve: Callable[[FloatArray], Response] = field(repr=False)
     windows: tuple[Window, ...] = ()
-    solve: Callable[[FloatArray], Response] | None = field(default=None, repr=False)
 
     @property
     def steady(self) -> BoolArray:
@@ -123,41 +125,39 @@ class Response:
             motion = np.stack((X[:, i], Y[:, i]), axis=1)
             D = support.dynamic_stiffness(self.speeds)
             forces[:, :, k] = np.einsum("sij,sj->is", D, motion)
-        forces.flags.writeable = False
+        read_only(forces)
         return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
 
     def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
-        sensors = list(self.nodes.tolist() if sensors is None else sensors)
+        sensors = self.nodes.tolist() if sensors is None else sensors
         Z = np.array([self.at(sensor) for sensor in sensors]).reshape(len(sensors), -1)
-        return {
-            "speeds_rad_s": self.speeds.tolist(),
-            "sensors": [label(sensor) for sensor in sensors],
-            "amplitude_m": np.abs(Z).tolist(),
-            "phase_deg": phase_degrees(Z).tolist(),
-            "unstable_speeds": [window.to_dict() for window in self.windows],
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "speeds_rad_s": self.speeds,
+                "sensors": [label(sensor) for sensor in sensors],
+                "amplitude_m": np.abs(Z),
+                "phase_deg": phase_deg(Z),
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and node: the reading in x; where x and y differ, also y and the orbit."""
-        import pandas as pd
-
         S, K = self.amplitudes.shape
-        columns = {
-            "speed_rad_s": np.repeat(self.speeds, K),
-            "node": np.tile(self.nodes, S),
-            "amplitude_m": np.abs(self.x).ravel(),
-            "phase_deg": phase_degrees(self.x).ravel(),
-        }
+        columns = [
+            Column("speed_rad_s", np.repeat(self.speeds, K)),
+            Column("node", np.tile(self.nodes, S)),
+            *polar("amplitude_m", "phase_deg", self.x),
+        ]
         if not self.rotor.symmetric:
-            columns |= {
-                "amplitude_y_m": np.abs(self.y).ravel(),
-                "phase_y_deg": phase_degrees(self.y).ravel(),
-                "major_axis_m": self.major.ravel(),
-                "minor_axis_m": self.minor.ravel(),
-            }
-        return pd.DataFrame(columns)
+            columns += [
+                *polar("amplitude_y_m", "phase_y_deg", self.y),
+                Column("major_axis_m", self.major.ravel()),
+                Column("minor_axis_m", self.minor.ravel()),
+            ]
+        return frame(columns)
 
     def summary(self) -> str:
         """The highest peak of a steady response and where it is, as text."""
@@ -202,36 +202,25 @@ class BearingForces:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and support."""
-        import pandas as pd
-
         S, B = self.x.shape
-        return pd.DataFrame(
-            {
-                "speed_rad_s": np.repeat(self.speeds, B),
-                "node": [support.node for support in self.supports] * S,
-                "support": [support.name for support in self.supports] * S,
-                "force_x_N": np.abs(self.x).ravel(),
-                "phase_x_deg": phase_degrees(self.x).ravel(),
-                "force_y_N": np.abs(self.y).ravel(),
-                "phase_y_deg": phase_degrees(self.y).ravel(),
-                "largest_N": self.largest.ravel(),
-            }
+        return frame(
+            (
+                Column("speed_rad_s", np.repeat(self.speeds, B)),
+                Column("node", [support.node for support in self.supports] * S),
+                Column("support", [support.name for support in self.supports] * S),
+                *self._forces(),
+                Column("largest_N", self.largest.ravel()),
+            )
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
-        return {
-            "speeds_rad_s": self.speeds.tolist(),
-            "nodes": [support.node for support in self.supports],
-            **{
-                f"{name}_{axis}_{unit}": value.T.tolist()
-                for axis, force in (("x", self.x), ("y", self.y))
-                for name, unit, value in (
-                    ("force", "N", np.abs(force)),
-                    ("phase", "deg", phase_degrees(force)),
-                )
-            },
-        }
+        """Plain data for JSON: one list over speed for each support."""
+        forces = {column.name: np.asarray(column.values).reshape(self.x.shape).T for column in self._forces()}
+        nodes = [support.node for support in self.supports]
+        return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
+
+    def _forces(self) -> tuple[Column, ...]:
+        return (*polar("force_x_N", "phase_x_deg", self.x), *polar("force_y_N", "phase_y_deg", self.y))
 
     def summary(self) -> str:
         """The largest force on each support, as text."""
@@ -271,26 +260,27 @@ class InfluenceCoefficients:
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane: the influence table of INTERFACE.md."""
-        import pandas as pd
-
-        S, C, P = self.W.shape
-        return pd.DataFrame(
-            {
-                "speed_rad_s": np.repeat(self.speeds, C * P),
-                "sensor": [label(sensor) for sensor in self.sensors for _ in self.planes] * S,
-                "plane": list(self.planes) * (S * C),
-                "influence_m_per_kg_m": np.abs(self.W).ravel(),
-                "phase_deg": phase_degrees(self.W).ravel(),
-            }
-        )
+        return frame(self._columns("speed_rad_s", "influence_m_per_kg_m", "phase_deg"))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`; the units stand once."""
-        keys = ("speed", "sensor", "plane", "influence", "phase")
-        units = {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"}
-        rows = self.to_frame().set_axis(list(keys), axis=1).to_dict("records")
-        unstable = [window.to_dict() for window in self.windows]
-        return {"rows": rows, "units": units, "unstable_speeds": unstable, "warnings": list(self.warnings)}
+        return plain(
+            {
+                "rows": rows(self._columns("speed", "influence", "phase")),
+                "units": {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"},
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def _columns(self, speed: str, influence: str, phase: str) -> tuple[Column, ...]:
+        S, C, P = self.W.shape
+        return (
+            Column(speed, np.repeat(self.speeds, C * P)),
+            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.planes] * S),
+            Column("plane", list(self.planes) * (S * C)),
+            *polar(influence, phase, self.W),
+        )
 
     def summary(self) -> str:
         """A table at one speed, or the range of sizes over many, as text."""
@@ -313,7 +303,7 @@ class InfluenceCoefficients:
                     size = np.where(steady, size, size[k])
                     line += f"{size.min():20.4g}{size[k]:12.4g}{self.speeds[k]:12.6g}"
                 else:
-                    line += f"{size[0]:14.4g}{phase_degrees(self.W[:, c, p])[0]:17.2f}"
+                    line += f"{size[0]:14.4g}{phase_deg(self.W[0, c, p]):17.2f}"
                 lines.append(line)
         return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
 
@@ -323,10 +313,9 @@ def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
     return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
 
 
-def phase_degrees(Z: ComplexArray) -> FloatArray:
-    """Phase as lead, 0 ≤ phase < 360 degrees."""
-    phase = phase_deg(Z)
-    return np.where(phase >= 360.0, 0.0, phase)
+def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
+    """Two columns of a table: size, and phase as lead, 0 ≤ phase < 360 degrees."""
+    return Column(size, np.abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
 
 
 def speed_range(speeds: FloatArray) -> str:

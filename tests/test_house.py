@@ -13,7 +13,7 @@ PACKAGES = ("fem", "balancing", "rotorid")
 MOST, LEAST = 24, 4
 """Modules of a folder: more is a corridor, fewer (with a package's own page) is a module."""
 
-COMPLEX_FUNCTIONS = 17
+COMPLEX_FUNCTIONS = 16
 """Breaches of the limits of statements and arguments that stand in the code: they may only go."""
 
 

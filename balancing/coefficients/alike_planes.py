@@ -6,9 +6,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from balancing.coefficients.identifiability import REMEDY, acting_alike, alike_words, large, refusal
+from balancing.coefficients.identifiability import (
+    HOPELESS,
+    REMEDY,
+    alike_words,
+    large,
+    refusal,
+    resolution,
+    separation,
+)
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.resolution import HOPELESS, resolution
 from rotorid.base.arrays import BoolArray, FloatArray
 
 
@@ -62,13 +69,12 @@ def _unresolved(influence: Influence, covariance: FloatArray | None, counts: Boo
     W = influence.W.reshape(-1, P)[counts]
     if covariance is not None and covariance[..., 2:, 2:].any():
         found = resolution(W, covariance[..., 2:, 2:].reshape(-1, 2 * P, 2 * P)[counts])
-        if found.significant(len(W), influence.dof):
+        if found.significant(influence.dof):
             return ""
-        ratio = np.sqrt(found.chi_square / found.n)
-        within = f" within the errors of the readings (told apart by {ratio:.2g} times the errors)"
+        within = f" within the errors of the readings (told apart by {found.ratio:.2g} times the errors)"
         return alike_words(W, large(found.direction), influence.planes) + within + REMEDY
-    singular = np.linalg.svd(W / np.linalg.norm(W, axis=0), compute_uv=False)
-    if covariance is not None or influence.last_run is None or singular[0] <= HOPELESS * singular[-1]:
+    told = separation(W)
+    if covariance is not None or influence.last_run is None or told.condition_number <= HOPELESS:
         return ""
-    within = f": no instrument supports a condition number of {singular[0] / singular[-1]:.2g}"
-    return alike_words(W, acting_alike(W), influence.planes) + within + REMEDY
+    within = f": no instrument supports a condition number of {told.condition_number:.2g}"
+    return alike_words(W, large(told.weakest), influence.planes) + within + REMEDY

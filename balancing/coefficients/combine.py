@@ -25,8 +25,7 @@ import numpy as np
 from balancing.coefficients.baseline import SPEED_TOLERANCE
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
-from balancing.coefficients.resolution import hermitian
-from balancing.data.errors import symmetric
+from balancing.data.errors import hermitian, symmetric
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.units import rpm_text
 from rotorid.regression import stretch
@@ -79,8 +78,9 @@ def combine(measured: Influence, computed: Influence) -> Influence:
     for s, c in np.ndindex(S, C):
         a = _place(measured, ours[s], sensors[c])
         b = _place(computed, theirs[s], sensors[c])
-        lacking = _lacking(measured.planes if a else (), computed.planes if b else (), planes)
-        if lacking:
+        there = (*(measured.planes if a else ()), *(computed.planes if b else ()))
+        lacking = next((plane for plane in planes if plane not in there), None)
+        if lacking is not None:
             raise ValueError(
                 f"there is neither a measured nor a computed coefficient of plane {lacking!r} at sensor "
                 f"{sensors[c]!r}, {rpm_text(float(speeds[s]))}: compute it, or leave out one of them"
@@ -156,10 +156,6 @@ def _place(side: Influence, speed: int | None, sensor: str) -> tuple[int, int] |
     if speed is None or sensor not in side.sensors:
         return None
     return speed, side.sensors.index(sensor)
-
-
-def _lacking(a: tuple[str, ...], b: tuple[str, ...], planes: tuple[str, ...]) -> str | None:
-    return next((plane for plane in planes if plane not in a and plane not in b), None)
 
 
 def _reading(

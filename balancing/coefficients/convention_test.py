@@ -14,7 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from balancing.data.errors import error_model, mean_covariance
+from balancing.coefficients.repeatability import tail
+from balancing.data.errors import error_model, mean_covariance, mean_variance
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -49,8 +50,8 @@ class ConventionTest:
     @property
     def other_fits(self) -> bool:
         """Whether the errors explain what the other reading leaves."""
-        found = self.chi_square_other, self.degrees_of_freedom
-        return found[0] is not None and found[1] is not None and _chance(found[0], found[1]) > FITS
+        other, dof = self.chi_square_other, self.degrees_of_freedom
+        return other is not None and dof is not None and tail(other, dof) > FITS
 
 
 def convention_test(trials: Trials) -> ConventionTest:
@@ -75,7 +76,7 @@ def convention_test(trials: Trials) -> ConventionTest:
     if np.linalg.matrix_rank(np.hstack((A, A.conj())), _SAME) == rank:
         return ConventionTest("weights in line")
     errors = error_model(trials).errors or _ASSUMED
-    variance = np.trace(mean_covariance(trials, errors), axis1=-2, axis2=-1) / 2
+    variance = mean_variance(mean_covariance(trials, errors))
     used = variance.any(axis=0)
     Y, variance = trials.mean[:, used].T, variance[:, used].T
     # a reading near zero would otherwise count infinitely much
@@ -97,15 +98,6 @@ def _residual(A: ComplexArray, Y: ComplexArray, root: FloatArray) -> float:
 
 
 def _refuted(own: float, other: float, dof: int) -> bool:
-    from scipy.special import fdtrc
-
-    clearly = _chance(own, dof) < UNLIKELY and _chance(other, dof) > FITS and own > 2 * other
+    clearly = tail(own, dof) < UNLIKELY and tail(other, dof) > FITS and own > 2 * other
     ratio = own / max(other, _SAME * dof)
-    return clearly or bool(ratio > FAR and fdtrc(dof, dof, ratio) < UNLIKELY)
-
-
-def _chance(chi_square: float, dof: int) -> float:
-    """Probability of a larger χ²."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(dof, chi_square))
+    return clearly or bool(ratio > FAR and tail(ratio * dof, dof, dof) < UNLIKELY)

@@ -1,24 +1,161 @@
-"""Whether the runs, or the sensors, can tell the planes apart; and if not, why, in words."""
+"""What data tell apart: runs the planes, readings their weights; and if they do not, why, in words.
+
+Columns are compared after scaling to length 1 (`separation`). Where coefficients have errors, `resolution`
+asks whether the weakest combination of the planes has an effect at all, or only errors.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import ComplexArray
-from rotorid.regression import Estimate, least_squares
+from balancing.coefficients.repeatability import tail
+from balancing.data.errors import hermitian
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import RCOND, WORD_TOLERANCE
+
+LEVEL, SINGLE_LEVEL = 0.95, 0.99
+HOPELESS = 1e3
+"""No instrument supports planes that act alike up to so large a condition number."""
+REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
+
+_STEPS = 30
 
 
 class UndeterminedError(ValueError):
     """The data do not determine the influence coefficients, or the weights."""
 
 
-def undetermined_columns(A: ComplexArray, names: Sequence[str]) -> list[int]:
-    """Columns of a complex matrix whose unknowns the equations `A x = y` leave open; empty at full rank."""
-    estimate: Estimate = least_squares(A, np.zeros(len(A), dtype=complex), names=names)
-    lost = set(estimate.undetermined)
-    return [i for i, name in enumerate(names) if f"Re {name}" in lost or f"Im {name}" in lost]
+class Separation(NamedTuple):
+    """What equations with the columns of K (N, P), scaled to length 1, tell of their P unknowns.
+
+    `lengths` (P,) of the columns; `singular_values` (P,), the largest first, zeros where N < P; `directions`
+    (P, P), a column for each: the combination of scaled columns that it belongs to.
+    """
+
+    lengths: FloatArray
+    singular_values: FloatArray
+    directions: ComplexArray
+
+    @property
+    def rank(self) -> int:
+        """Number of combinations that are determined."""
+        return int(np.count_nonzero(self.singular_values > RCOND * self.singular_values[0]))
+
+    @property
+    def condition_number(self) -> float:
+        """Largest by smallest singular value; infinite where columns are dependent."""
+        s = self.singular_values
+        return float(s[0] / s[-1]) if self.rank == len(s) else float("inf")
+
+    @property
+    def weakest(self) -> ComplexArray:
+        """The combination (P,) of the least effect."""
+        return self.directions[:, -1]
+
+    @property
+    def undetermined(self) -> list[int]:
+        """Unknowns that the equations leave open; empty at full rank."""
+        known = self.directions[:, : self.rank]
+        outside = np.linalg.norm(np.eye(len(known)) - known @ known.conj().T, axis=0)
+        return [int(p) for p in np.flatnonzero(outside > WORD_TOLERANCE)]
+
+
+def scaled_columns(K: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Columns of K (N, P) divided by their lengths (P,), and these; columns of zeros stay."""
+    lengths = np.linalg.norm(K, axis=0)
+    return K / np.where(lengths > 0, lengths, 1.0), lengths
+
+
+def separation(K: ArrayLike) -> Separation:
+    """Singular values of a finite matrix (N, P) with scaled columns, and what they mean."""
+    scaled, lengths = scaled_columns(np.asarray(K, dtype=complex))
+    N, P = scaled.shape
+    _, s, Vh = np.linalg.svd(scaled, full_matrices=N < P)
+    return Separation(lengths, np.pad(s, (0, P - len(s))), Vh.conj().T)
+
+
+class Resolution(NamedTuple):
+    """Test of the hypothesis that a combination of the planes, `direction`, has no effect at all.
+
+    `each` (N,): χ² of each reading; `n` degrees of freedom over all of them; `direction` (P,) for planes
+    scaled to equal effect.
+    """
+
+    each: FloatArray
+    n: int
+    direction: ComplexArray
+
+    @property
+    def chi_square(self) -> float:
+        """Over all readings."""
+        return float(self.each.sum())
+
+    @property
+    def ratio(self) -> float:
+        """Effect of the weakest combination in units of its errors."""
+        return float(np.sqrt(self.chi_square / self.n))
+
+    def significant(self, dof: float | None) -> bool:
+        """Whether some reading tells the planes apart, for errors of so many degrees of freedom."""
+        return significant(self.each, self.n, dof)
+
+
+def significant(each: FloatArray, n: int, dof: float | None = None) -> bool:
+    """Whether χ² of readings (N,), n degrees of freedom, shows an effect: all at 95 %, or one at 99 %."""
+    if n <= 0:
+        return False
+    if tail(float(each.sum()), n, dof) < 1 - LEVEL:
+        return True
+    return len(each) * tail(float(each.max()), 2, dof) < 1 - SINGLE_LEVEL
+
+
+def resolution(W: ComplexArray, covariance: FloatArray) -> Resolution:
+    """Minimise the χ² of the effect W v over all combinations v of the planes.
+
+    Parameters
+    ----------
+    W
+        Stacked coefficients, shape (N, P).
+    covariance
+        Of (Re W₁, Im W₁, …) of each reading, shape (N, 2P, 2P).
+
+    Notes
+    -----
+    χ²(v) = Σ |w v|² / σ²(v) over the readings w with the variance σ²(v) = vᴴ S v of each in one direction;
+    its minimum has 2N − 2(P − 1) degrees of freedom where the true effects are dependent. Stationary v solve
+    A(v) v = B(v) v with A = Σ w wᴴ/σ², B = Σ |w v|² S/σ⁴; the iteration takes the mean of S/σ² for B.
+    """
+    N, P = W.shape
+    told = separation(W)
+    scaled, v, n = W / told.lengths, told.weakest, 2 * (N - P + 1)
+    S = hermitian(covariance) / np.outer(told.lengths, told.lengths)
+    best: tuple[FloatArray, ComplexArray] | None = None
+    for _ in range(_STEPS):
+        variance = np.einsum("p,npq,q->n", v, S, v.conj()).real
+        variance = np.maximum(variance, 1e-9 * variance.max())
+        if not variance.max() > 0:
+            return Resolution(np.full(N, np.inf), n, v)
+        each = np.abs(scaled @ v) ** 2 / variance
+        if best is not None and each.sum() > best[0].sum() * (1 - 1e-9):
+            break
+        best = each, v
+        A = np.einsum("np,nq->pq", scaled.conj(), scaled / variance[:, None])
+        B = np.einsum("npq,n->qp", S, 1 / variance) / N
+        v = _smallest(A, B)
+    assert best is not None
+    return Resolution(best[0], n, best[1])
+
+
+def _smallest(A: ComplexArray, B: ComplexArray) -> ComplexArray:
+    """Eigenvector of A v = λ B v with the smallest λ, of length 1."""
+    values, vectors = np.linalg.eigh(B)
+    root = vectors / np.sqrt(np.maximum(values, 1e-12 * values.max()))
+    v = root @ np.linalg.eigh(root.conj().T @ A @ root)[1][:, 0]
+    return np.asarray(v / np.linalg.norm(v))
 
 
 def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray) -> None:
@@ -43,17 +180,15 @@ def check_runs(runs: Sequence[str], planes: Sequence[str], weights: ComplexArray
                 "make a run with a trial weight there, or leave the plane out"
             )
     A = np.column_stack((np.ones(len(runs)), weights)).astype(complex)
-    names = ["the baseline", *(f"plane {p!r}" for p in planes)]
-    lost = undetermined_columns(A, names)
+    lost = separation(A).undetermined
     if not lost:
         return
-    with_baseline = np.vstack((A, np.eye(1, A.shape[1])))
-    if lost[0] == 0 and not undetermined_columns(with_baseline, names):
+    alone = separation(np.vstack((A, np.eye(1, A.shape[1])))).undetermined
+    if lost[0] == 0 and not alone:
         raise UndeterminedError(
             "the runs do not determine the vibration without weights: add a baseline run, a run that has no "
             "rows in the weights table (or one more run with other weights)"
         )
-    alone = [i for i in undetermined_columns(with_baseline, names) if i > 0]
     missing = " and no run without weights is there either" if lost[0] == 0 else ""
     raise UndeterminedError(_unseparated(alone, planes, weights) + missing + _states(weights))
 
@@ -102,15 +237,16 @@ def check_planes(W: ComplexArray, planes: Sequence[str]) -> None:
             f"{P} planes need at least {P} readings (sensors × speeds) of a run, and there "
             f"{'is' if N == 1 else 'are'} {N}: add sensors or speeds, or choose fewer planes"
         )
-    for p, plane in enumerate(planes):
-        if not W[:, p].any():
-            raise UndeterminedError(f"plane {plane!r} has no effect on any reading: leave it out")
-    lost = undetermined_columns(W, list(planes))
-    if lost:
+    told = separation(W)
+    check_effect(told, planes)
+    if lost := told.undetermined:
         raise UndeterminedError(alike_words(W, lost, planes) + REMEDY)
 
 
-REMEDY = "; their weights are not determined: leave one out, or add sensors or speeds"
+def check_effect(told: Separation, planes: Sequence[str]) -> None:
+    """Refuse planes without any effect (`UndeterminedError`)."""
+    for p in np.flatnonzero(told.lengths == 0):
+        raise UndeterminedError(f"plane {planes[int(p)]!r} has no effect on any reading: leave it out")
 
 
 def refusal(
@@ -138,7 +274,7 @@ def refusal(
 
 def acting_alike(W: ComplexArray) -> list[int]:
     """The planes that the weakest combination of W (N, P) is made of."""
-    return large(np.linalg.svd(W / np.linalg.norm(W, axis=0))[2][-1])
+    return large(separation(W).weakest)
 
 
 def large(direction: ComplexArray) -> list[int]:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from balancing.coefficients.identifiability import UndeterminedError, check_runs, refusal
 from balancing.coefficients.repeatability import describe, differences
-from balancing.coefficients.run_errors import ASSUMED as ASSUMED_RUN
 from balancing.coefficients.run_errors import (
+    ASSUMED,
     RunColumns,
     RunErrors,
     Runs,
@@ -36,14 +36,23 @@ from balancing.coefficients.run_likelihood import (
 )
 from balancing.coefficients.significance import check_consistency, check_effects, weak_trials
 from balancing.data.conventions import Labels
-from balancing.data.errors import EQUAL, ErrorModel, Source, error_model, mean_covariance, symmetric
+from balancing.data.errors import (
+    EQUAL,
+    ErrorModel,
+    Source,
+    error_model,
+    mean_covariance,
+    mean_variance,
+    symmetric,
+)
 from balancing.data.trials import ReadingErrors, Trials, check_names, check_speeds
 
 if TYPE_CHECKING:
     import pandas as pd
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.units import RPM
-from rotorid.regression import gain
+from rotorid.regression import gain, stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,28 +199,29 @@ class Influence:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: one row per speed, sensor and plane; phases lead, weights turn with the rotation."""
-        frame = self.to_frame()
-        rows = frame.to_dict("records")
-        return {"unit": self.unit, "phase": "lead", "angles": "with rotation", "rows": rows}
+        return {
+            "unit": self.unit,
+            "phase": "lead",
+            "angles": "with rotation",
+            "rows": rows(self._columns()),
+        }
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane: `influence` in `unit`, `phase_deg` as lead of the vibration.
 
         The phase is that of a vibration (positive = lead) caused by a weight at 0°, in every convention.
         """
-        import pandas as pd
+        return frame(self._columns())
 
+    def _columns(self) -> tuple[Column, ...]:
         scale = self.labels.vibration_scale / self.labels.weight_scale
         S, C, P = self.W.shape
-        rpm = np.round(self.speeds * RPM, 9)
-        return pd.DataFrame(
-            {
-                "speed_rpm": np.repeat(rpm, C * P),
-                "sensor": np.tile(np.repeat(self.sensors, P), S),
-                "plane": np.tile(self.planes, S * C),
-                "influence": np.abs(self.W).ravel() * scale,
-                "phase_deg": np.mod(np.degrees(np.angle(self.W)).ravel(), 360.0),
-            }
+        return (
+            Column("speed_rpm", np.repeat(np.round(self.speeds * RPM, 9), C * P)),
+            Column("sensor", np.tile(np.repeat(self.sensors, P), S)),
+            Column("plane", np.tile(self.planes, S * C)),
+            Column("influence", np.abs(self.W).ravel() * scale),
+            Column("phase_deg", np.mod(np.degrees(np.angle(self.W)).ravel(), 360.0)),
         )
 
 
@@ -336,7 +346,7 @@ def unseen(run: RunErrors) -> tuple[str, ...]:
     """Note that nothing measures the errors between runs."""
     if run.origin not in ("assumed", "none"):
         return ()
-    taken = f"{100 * ASSUMED_RUN:g} % are assumed" if run.origin == "assumed" else "none are stated"
+    taken = f"{100 * ASSUMED:g} % are assumed" if run.origin == "assumed" else "none are stated"
     return (
         f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: repeated readings "
         "do not show them; one more baseline run at the end, or one more trial run, would measure them",
@@ -358,7 +368,7 @@ def _between_runs(
     trials: Trials, A: ComplexArray, theta: ComplexArray, reading: FloatArray, model: ErrorModel
 ) -> RunErrors:
     """Errors between runs: stated, estimated from redundant runs, assumed, or none beside stated errors."""
-    one_direction = np.trace(reading, axis1=-2, axis2=-1) / 2
+    one_direction = mean_variance(reading)
     runs = runs_of(trials.mean, trials.weights, theta[..., 1:])
     spare = spare_rows(A, runs.Y, one_direction)
     rows = (spare, *corrected_row(A, runs.Y, one_direction, theta))
@@ -423,7 +433,7 @@ def _gain(A: ComplexArray, reading: FloatArray, between: FloatArray) -> ComplexA
         Variances by the errors between runs, (R, S, C).
     """
     R, n = A.shape
-    variance = np.moveaxis(np.trace(reading, axis1=-2, axis2=-1) / 2 + between, 0, -1)
+    variance = np.moveaxis(mean_variance(reading) + between, 0, -1)
     largest = variance.max(axis=-1, keepdims=True)
     if n == R or not largest.any():
         return np.broadcast_to(gain(A), (*between.shape[1:], n, R))
@@ -436,10 +446,6 @@ def _gain(A: ComplexArray, reading: FloatArray, between: FloatArray) -> ComplexA
 def _channel_covariance(G: ComplexArray, covariance: FloatArray) -> FloatArray:
     """Covariance (S, C, 2P + 2, 2P + 2) of G Y from that of the readings Y, (R, S, C, 2, 2)."""
     S, C, n, R = G.shape
-    B = np.empty((S, C, n, 2, R, 2))
-    B[..., 0, :, 0] = B[..., 1, :, 1] = G.real
-    B[..., 0, :, 1] = -G.imag
-    B[..., 1, :, 0] = G.imag
-    B = B.reshape(S, C, 2 * n, R, 2)
-    left = np.einsum("scark,rsckl->scarl", B, covariance).reshape(S, C, 2 * n, 2 * R)
-    return symmetric(left @ np.swapaxes(B.reshape(S, C, 2 * n, 2 * R), -1, -2))
+    B = stretch(G)
+    left = np.einsum("scark,rsckl->scarl", B.reshape(S, C, 2 * n, R, 2), covariance)
+    return symmetric(left.reshape(B.shape) @ np.swapaxes(B, -1, -2))

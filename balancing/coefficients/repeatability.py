@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.errors import ErrorModel, reading_covariance
+from balancing.data.errors import ErrorModel, mean_variance, reading_covariance
 from balancing.data.trials import ReadingErrors, Trials
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.regression import stretch
 
 LEVEL = 0.99
 NOTICEABLE_AMPLITUDE, NOTICEABLE = 0.10, 0.20
@@ -52,14 +54,11 @@ def differences(trials: Trials, model: ErrorModel, largest: bool = False) -> lis
     found = []
     tested = model.source == "stated" and trials.run_errors is None
     for group in same_state(trials.weights):
-        pair = (
-            _beyond_errors(trials, group, model)
-            if tested
-            else _noticeable(trials, group, model, largest=largest)
-        )
-        if pair is not None:
-            found.append(pair)
-    return found
+        if tested:
+            found.append(_beyond_errors(trials, group, model))
+        else:
+            found.append(_noticeable(trials, group, model, largest=largest))
+    return [difference for difference in found if difference is not None]
 
 
 def describe(found: Sequence[Difference]) -> tuple[str, ...]:
@@ -77,7 +76,7 @@ def _noticeable(trials: Trials, group: list[int], model: ErrorModel, *, largest:
     relative, floor = trials.run_errors or (0.0, 0.0)
     variance = (relative * np.abs(Y)) ** 2 + floor**2
     if model.errors is not None:
-        variance += np.trace(reading_covariance(Y, model.errors), axis1=-2, axis2=-1) / 2
+        variance += mean_variance(reading_covariance(Y, model.errors))
     top = np.abs(Y).max() if largest else np.abs(Y[group]).max(axis=(0, 2))[:, None]
     for k, a in enumerate(group):
         for b in group[k + 1 :]:
@@ -106,23 +105,25 @@ def _beyond_errors(trials: Trials, group: list[int], model: ErrorModel) -> Diffe
     each = reading_covariance(Y, both_directions(model.errors))
     root = _inverse_root(each.mean(axis=0))  # (S, C, 2, 2), zero where every reading is
     mean = np.sum(Y * repeats, axis=0) / repeats.sum(axis=0)
-    deviation = Y - mean
-    vector = np.stack((deviation.real, deviation.imag), axis=-1) * np.sqrt(repeats)[..., None]
-    squares = np.sum(np.einsum("scij,rscj->rsci", root, vector) ** 2, axis=-1)
+    squares = _squares(root, Y - mean, repeats)
     dof = 2 * (len(group) - 1) * int(np.count_nonzero(root.any(axis=(-2, -1))))
     chi_square = float(squares.sum())
     if dof == 0 or tail(chi_square, dof, model.dof) > 1 - LEVEL:
         return None
-    worst, pair = -1.0, (0, 1)
-    for a in range(len(group)):
-        for b in range(a + 1, len(group)):
-            change = np.stack(((Y[a] - Y[b]).real, (Y[a] - Y[b]).imag), axis=-1)
-            share = 1 / (1 / repeats[a] + 1 / repeats[b])
-            size = float(np.sum(np.einsum("scij,scj->sci", root, change) ** 2 * share[..., None]))
-            if size > worst:
-                worst, pair = size, (a, b)
+
+    def apart(pair: tuple[int, int]) -> float:
+        a, b = pair
+        return float(_squares(root, Y[a] - Y[b], 1 / (1 / repeats[a] + 1 / repeats[b])).sum())
+
+    first, second = max(combinations(range(len(group)), 2), key=apart)
     words = f"{np.sqrt(chi_square / dof):.2g} times the errors of the readings"
-    return Difference(trials.runs[group[pair[0]]], trials.runs[group[pair[1]]], words)
+    return Difference(trials.runs[group[first]], trials.runs[group[second]], words)
+
+
+def _squares(root: FloatArray, change: ComplexArray, counts: FloatArray | IntArray) -> FloatArray:
+    """Squares of changes (…, S, C) in units of their errors, of means of so many readings."""
+    vector = stretch(change.reshape(-1)).reshape(*change.shape, 2)
+    return np.asarray(counts * np.sum(np.einsum("scij,...scj->...sci", root, vector) ** 2, axis=-1))
 
 
 def both_directions(errors: ReadingErrors) -> ReadingErrors:
@@ -130,7 +131,7 @@ def both_directions(errors: ReadingErrors) -> ReadingErrors:
     return replace(errors, amplitude=errors.amplitude or errors.phase, phase=errors.phase or errors.amplitude)
 
 
-def tail(chi_square: float, n: int, dof: float | None) -> float:
+def tail(chi_square: float, n: int, dof: float | None = None) -> float:
     """Probability of a larger χ² with n degrees of freedom; of F where the errors have `dof` themselves."""
     from scipy.special import chdtrc, fdtrc
 

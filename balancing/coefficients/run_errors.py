@@ -22,7 +22,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from balancing.data.errors import inverse_root
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.regression import stretch
 
 Origin = Literal["stated", "estimated", "assumed", "none"]
 
@@ -89,9 +91,7 @@ class RunErrors:
 
         total = parts.sum(axis=0)
         n = len(total)
-        std = np.sqrt(np.maximum(np.diag(total), 1e-300))
-        values, vectors = np.linalg.eigh(total / np.outer(std, std))
-        root = vectors / np.sqrt(np.maximum(values, 1e-12 * values[-1])) / std[:, None]
+        root = inverse_root(total, 1e-12)
         white = root.T @ parts @ root
         share = float(np.trace(white[0])) / n
         spread = 0.0 if reading_dof is None else share**2 / reading_dof
@@ -106,22 +106,22 @@ class RunErrors:
         # a sum of squares of unlike variances is a χ² of the same mean and variance
         unit = (values**2).sum(axis=1) / values.sum(axis=1)
         dof = values.sum(axis=1) / unit
-        bound = _root(lambda c: float(weight @ chdtr(dof, c / unit)) - 0.95, chdtri(dof, 0.05) * unit)
+        ends = chdtri(dof, 0.05) * unit
+        bound = passes_zero(lambda c: float(weight @ chdtr(dof, c / unit)) - 0.95, min(ends), max(ends), 1e-4)
         wanted = bound / size
         if wanted <= chdtri(n, 0.05) * 1.001:
             return bound / float(chdtri(n, 0.05)), 1 / spread if spread else None
-        nu = _root(lambda nu: wanted - n * float(fdtri(n, nu, 0.95)), np.array([0.5, 1e5]))
+        nu = passes_zero(lambda nu: wanted - n * float(fdtri(n, nu, 0.95)), 0.5, 1e5, 1e-4)
         return size, 1 / (1 / nu + spread)
 
 
-def _root(function: Callable[[float], float], within: FloatArray) -> float:
+def passes_zero(function: Callable[[float], float], low: float, high: float, rtol: float = 1e-14) -> float:
     """Where a growing function passes zero; the end of the range where it does not."""
     from scipy.optimize import brentq
 
-    low, high = float(within.min()), float(within.max())
     if function(low) >= 0:
-        return low
-    return high if function(high) <= 0 else float(brentq(function, low, high, rtol=1e-4))
+        return float(low)
+    return float(high) if function(high) <= 0 else float(brentq(function, low, high, rtol=rtol))
 
 
 class Runs(NamedTuple):
@@ -178,18 +178,14 @@ def marginal(common: ComplexArray) -> FloatArray:
     """Covariance of each channel by common columns (…, M, S, C, n), (S, C, 2n, 2n)."""
     F = common.reshape(-1, *common.shape[-3:])
     H = np.einsum("mscp,mscq->scpq", F, F.conj())
-    out = np.empty((*H.shape[:2], H.shape[2], 2, H.shape[3], 2))
-    out[..., 0, :, 0] = out[..., 1, :, 1] = H.real
-    out[..., 1, :, 0] = H.imag
-    out[..., 0, :, 1] = -H.imag
-    return out.reshape(*H.shape[:2], 2 * H.shape[2], 2 * H.shape[3])
+    return stretch(H)
 
 
 def shares_of(parts: Sequence[FloatArray], total: FloatArray) -> FloatArray:
     """How much of a covariance (…, n, n) comes from each part, sum 1."""
-    size = np.sqrt(np.einsum("...ii->...i", total))
-    size = np.where(size > 0, size, np.inf)
-    values = np.array([np.sum(np.einsum("...ii->...i", part) / size**2) for part in parts])
+    variance = np.einsum("...ii->...i", total)
+    variance = np.where(variance > 0, variance, np.inf)
+    values = np.array([np.sum(np.einsum("...ii->...i", part) / variance) for part in parts])
     return np.asarray(values / values.sum() if values.sum() > 0 else np.eye(len(values))[0])
 
 

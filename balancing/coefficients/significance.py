@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.identifiability import LEVEL, UndeterminedError, significant
 from balancing.coefficients.run_errors import Runs
 from balancing.coefficients.run_likelihood import scatter, spare_rows
+from balancing.data.errors import mean_variance
 from balancing.data.trials import Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import stretch
+from rotorid.regression import solution, stretch
 
-LEVEL = 0.95
 ENGINEERS_AMPLITUDE, ENGINEERS_PHASE = 0.30, np.deg2rad(30)
 """A good trial weight changes a reading by 30 % of its amplitude or by 30°."""
 
@@ -58,9 +58,7 @@ def check_effects(
             )
         own = slice(2 + 2 * p, 4 + 2 * p)
         if covariance is not None and not _significant(W[..., p], covariance[..., own, own]):
-            size = float(
-                np.abs(trials.weights[run, p]) * CLEAR / clearness(W[..., p], covariance[..., own, own])
-            )
+            size = np.abs(trials.weights[run, p]) * CLEAR / clearness(W[..., p], covariance[..., own, own])
             larger = f"{float(f'{size * trials.labels.weight_scale:.2g}'):g} {trials.labels.weight_unit}"
             remedy = f"repeat the run with a larger trial weight, at least {larger}".rstrip()
             raise UndeterminedError(
@@ -85,17 +83,7 @@ def _significant(w: ComplexArray, covariance: FloatArray) -> bool:
     # errors in one direction only make a block singular
     block = block[known] + 1e-9 * trace[known, None, None] * np.eye(2)
     each = np.einsum("ni,nij,nj->n", v[known], np.linalg.inv(block), v[known])
-    n = len(each)
-    if _tail(float(each.sum()), 2 * n) < 1 - LEVEL:
-        return True
-    return n * _tail(float(each.max()), 2) < 0.01
-
-
-def _tail(chi_square: float, n: int) -> float:
-    """Probability of a larger value of χ² with n degrees of freedom."""
-    from scipy.special import chdtrc
-
-    return float(chdtrc(n, chi_square))
+    return significant(each, 2 * len(each))
 
 
 def weak_trials(trials: Trials, W: ComplexArray) -> tuple[str, ...]:
@@ -137,13 +125,13 @@ def check_consistency(trials: Trials, A: ComplexArray, reading: FloatArray, runs
     runs
         The same with what their weights do.
     """
-    spare = spare_rows(A, trials.mean, np.trace(reading, axis1=-2, axis2=-1) / 2)
+    spare = spare_rows(A, trials.mean, mean_variance(reading))
     stated = trials.run_errors or (0.0, 0.0)
     ratio, chance = scatter([spare], runs, *stated)
     if chance > 1 - LEVEL:
         return ()
-    fit = np.linalg.lstsq(A, trials.mean.reshape(len(A), -1), rcond=None)[0]
-    residual = np.abs(trials.mean.reshape(len(A), -1) - A @ fit) ** 2
+    readings = trials.mean.reshape(len(A), -1)
+    residual = np.abs(readings - A @ solution(A, readings)) ** 2
     worst = np.sum(residual / np.mean(np.abs(trials.mean) ** 2, axis=0).ravel(), axis=1)
     return (
         f"the runs disagree by {ratio:.2g} times the stated errors, most of all in run "

@@ -19,7 +19,6 @@ in the correction planes explains is found by fitting d = W δ.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,15 +34,12 @@ from balancing.coefficients.run_errors import (
 )
 from balancing.correction.check_result import CheckComparison
 from balancing.correction.correction_result import Correction
+from balancing.correction.refine import mounted_in
 from balancing.data.errors import error_model, reading_covariance, symmetric
 from balancing.data.trials import Trials
 from balancing.solvers.error_propagation import real_columns, whitening
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.regression import stretch
-
-if TYPE_CHECKING:
-    pass
-
+from rotorid.regression import solution, stretch, unstretch
 
 LEVEL = 0.95
 """A difference whose χ² would be exceeded by errors alone in less than 5 % of all jobs is not explained."""
@@ -152,14 +148,9 @@ def _mounted(
 ) -> tuple[ComplexArray, tuple[str, ...]]:
     """Weights (R, P) in the planes of the coefficients during the check runs, and the names of the planes."""
     T = np.zeros((len(check.runs), len(influence.planes)), dtype=complex)
-    if check.planes:
-        for p, plane in enumerate(check.planes):
-            if plane not in influence.planes and not check.weights[:, p].any():
-                continue
-            T[:, _index(plane, influence.planes, "plane")] = check.weights[:, p]
-    else:
-        for plane, weight in zip(correction.planes, correction.weights, strict=True):
-            T[:, _index(plane, influence.planes, "plane")] = weight
+    for plane, weights in mounted_in(check, correction).items():
+        if plane in influence.planes or weights.any():
+            T[:, _index(plane, influence.planes, "plane")] = weights
     return T, influence.planes
 
 
@@ -223,13 +214,11 @@ def _change(
         return None
     A = np.repeat(stretch(W.reshape(-1, P)).reshape(S, C, 1, 2, 2 * P), target.size // (2 * S * C), axis=2)
     matrix = white(A.reshape(S, -1, 2 * P)).reshape(-1, 2 * P)
-    size = np.linalg.norm(matrix, axis=0)
-    size[size == 0] = 1.0
-    solution = np.linalg.lstsq(matrix / size, target.ravel(), rcond=1e-10)[0] / size
-    chi_square = float(np.sum((target.ravel() - matrix @ solution) ** 2)) / scale
+    delta = solution(matrix, target.ravel(), rcond=1e-10)
+    chi_square = float(np.sum((target.ravel() - matrix @ delta) ** 2)) / scale
     if tail(chi_square, rows, dof) < 1 - LEVEL:
         return None
-    return np.asarray(solution[::2] + 1j * solution[1::2])
+    return unstretch(delta)
 
 
 def _vectors(z: ComplexArray) -> FloatArray:

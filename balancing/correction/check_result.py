@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.correction.correction_result import DUST
+from balancing.data.columns import known, reading_columns, rms, vector_columns, weight_rows
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.text import figures, sentence, table, wrap
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import figures, sentence, wrap
 from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
@@ -105,18 +109,100 @@ class CheckComparison:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        return _check_dict(self)
+        labels, readings = self.labels, self._columns()
+        sizes = {column.name: list(column.values) for column in readings}
+        mounted = [
+            {"run": run, "weights": weight_rows(labels, self.planes, weights)}
+            for run, weights in zip(self.runs, self.weights, strict=True)
+        ]
+        return plain(
+            {
+                "as_proposed": self.as_proposed,
+                "mounted": mounted,
+                "readings": rows(readings),
+                "chi_square": self.chi_square,
+                "degrees_of_freedom": self.n,
+                "error_degrees_of_freedom": self.dof,
+                "probability": self.probability,
+                "explained": self.explained,
+                "verdict": self.verdict,
+                "further_weights": None
+                if self.change is None
+                else weight_rows(labels, self.planes, self.change),
+                "rms_before": rms(sizes["before"]),
+                "rms_predicted": rms(sizes["predicted"]),
+                "rms_achieved": rms(sizes["achieved"]),
+                "improvement_predicted": self.improvement_predicted,
+                "improvement_achieved": self.improvement_achieved,
+                "warnings": self.warnings,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
-        import pandas as pd
-
-        frame = pd.DataFrame(self.to_dict()["readings"]).drop(columns="covariance")
-        return frame.astype({"distance": float})
+        return frame([column for column in self._columns() if column.name != "covariance"])
 
     def summary(self) -> str:
         """Text of 80 columns: warnings, verdict, readings beside the prediction, improvement."""
-        return _text(self)
+        mounted = (
+            "the proposed corrections" if self.as_proposed else "what the weights table of the check says"
+        )
+        blocks = [
+            *(wrap(f"Warning: {w}", "  ") for w in self.warnings),
+            wrap(f"Check run, mounted: {mounted}.", ""),
+            self._readings_text(),
+            wrap(sentence(self.verdict)),
+            wrap(
+                f"Vibration (rms) before by after: predicted {_times(self.improvement_predicted)}, "
+                f"achieved {_times(self.improvement_achieved)}.",
+                "",
+            ),
+        ]
+        return "\n\n".join(blocks)
+
+    def _columns(self) -> tuple[Column, ...]:
+        """One row per run, speed and sensor."""
+        R, S, C = self.achieved.shape
+        labels = self.labels
+        before = np.broadcast_to(self.before, (R, S, C))
+        dust = DUST * float(np.abs(self.before).max()) * labels.vibration_scale
+        blocks: Sequence[Any] | FloatArray = [None] * (R * S * C)
+        if self.covariance is not None:
+            blocks = labels.vibration_covariance(self.covariance).reshape(-1, 2, 2)
+        return (
+            Column("run", np.repeat(self.runs, S * C)),
+            *(
+                replace(column, values=list(column.values) * R)
+                for column in reading_columns(self.speeds, self.sensors)
+            ),
+            *vector_columns(labels, "before", before, dust),
+            *vector_columns(labels, "predicted", self.predicted, dust),
+            *vector_columns(labels, "achieved", self.achieved, dust),
+            *vector_columns(labels, "difference", self.difference, dust),
+            Column("covariance", blocks),
+            Column(
+                "distance",
+                known(self.distance, (R, S, C)).ravel(),
+                lambda distance: figures(distance, 2),
+                "std",
+            ),
+        )
+
+    def _readings_text(self) -> str:
+        shown = {column.name: column for column in self._columns()}
+        if len(self.runs) > 1:
+            named = zip(shown["sensor"].values, shown["run"].values, strict=True)
+            shown["sensor"] = Column("sensor", [f"{sensor} ({run})" for sensor, run in named], str)
+        for name in ("before", "before_phase_deg", "difference_phase_deg"):
+            del shown[name]
+        foot = ""
+        if self.distance is None:
+            del shown["distance"]
+        else:
+            foot = "\nstd: the difference in its standard deviations"
+            foot += " (95 % of all below 2.4)" if self.dof is None else ""
+        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
+        return f"Vibration{unit}, predicted and achieved\n{text(list(shown.values()), left=2)}{foot}"
 
 
 def _verdict_words(c: CheckComparison) -> str:
@@ -158,114 +244,8 @@ def _verdict_words(c: CheckComparison) -> str:
     )
 
 
-def _check_dict(c: CheckComparison) -> dict[str, Any]:
-    """`CheckComparison.to_dict`."""
-    old, old_phase = c.labels.vibration(c.before)
-    planned, planned_phase = c.labels.vibration(c.predicted)
-    read, read_phase = c.labels.vibration(c.achieved)
-    change, change_phase = c.labels.vibration(c.difference)
-    dust = DUST * old.max()
-    planned = np.where(planned > dust, planned, 0.0)
-    covariance = None if c.covariance is None else c.labels.vibration_covariance(c.covariance)
-    return {
-        "as_proposed": c.as_proposed,
-        "mounted": [{"run": run, "weights": _weights(c, c.weights[r])} for r, run in enumerate(c.runs)],
-        "readings": [
-            {
-                "run": run,
-                "speed_rpm": rpm(speed),
-                "sensor": sensor,
-                "before": float(old[s, k]),
-                "before_phase_deg": _phase(old[s, k], old_phase[s, k], dust),
-                "predicted": float(planned[r, s, k]),
-                "predicted_phase_deg": _phase(planned[r, s, k], planned_phase[r, s, k], dust),
-                "achieved": float(read[r, s, k]),
-                "achieved_phase_deg": _phase(read[r, s, k], read_phase[r, s, k], dust),
-                "difference": float(change[r, s, k]),
-                "difference_phase_deg": _phase(change[r, s, k], change_phase[r, s, k], dust),
-                "covariance": None if covariance is None else covariance[r, s, k].tolist(),
-                "distance": None if c.distance is None else float(c.distance[r, s, k]),
-            }
-            for r, run in enumerate(c.runs)
-            for s, speed in enumerate(c.speeds)
-            for k, sensor in enumerate(c.sensors)
-        ],
-        "chi_square": c.chi_square,
-        "degrees_of_freedom": c.n,
-        "error_degrees_of_freedom": c.dof,
-        "probability": c.probability,
-        "explained": c.explained,
-        "verdict": c.verdict,
-        "further_weights": None if c.change is None else _weights(c, c.change),
-        "rms_before": _rms(old),
-        "rms_predicted": _rms(planned),
-        "rms_achieved": _rms(read),
-        "improvement_predicted": c.improvement_predicted,
-        "improvement_achieved": c.improvement_achieved,
-        "warnings": list(c.warnings),
-    }
-
-
-def _text(c: CheckComparison) -> str:
-    """`CheckComparison.summary`."""
-    mounted = "the proposed corrections" if c.as_proposed else "what the weights table of the check says"
-    blocks = [
-        *(wrap(f"Warning: {w}", "  ") for w in c.warnings),
-        wrap(f"Check run, mounted: {mounted}.", ""),
-        _readings(c),
-        wrap(sentence(c.verdict)),
-        wrap(
-            f"Vibration (rms) before by after: predicted {_times(c.improvement_predicted)}, "
-            f"achieved {_times(c.improvement_achieved)}.",
-            "",
-        ),
-    ]
-    return "\n\n".join(blocks)
-
-
-def _readings(c: CheckComparison) -> str:
-    old = c.labels.vibration(c.before)[0]
-    planned, planned_phase = c.labels.vibration(c.predicted)
-    read, read_phase = c.labels.vibration(c.achieved)
-    change = c.labels.vibration(c.difference)[0]
-    several = len(c.runs) > 1
-    rows = [["rpm", "sensor", "predicted", "phase", "achieved", "phase", "difference"]]
-    if c.distance is not None:
-        rows[0].append("std")
-    for r, run in enumerate(c.runs):
-        for s, speed in enumerate(c.speeds):
-            for k, sensor in enumerate(c.sensors):
-                none = planned[r, s, k] <= DUST * old.max()
-                row = [
-                    f"{rpm(speed):.6g}",
-                    f"{sensor} ({run})" if several else sensor,
-                    "0" if none else figures(planned[r, s, k], 3),
-                    "" if none else f"{planned_phase[r, s, k]:.0f}°",
-                    figures(read[r, s, k], 3),
-                    f"{read_phase[r, s, k]:.0f}°",
-                    figures(change[r, s, k], 3),
-                ]
-                if c.distance is not None:
-                    row.append(figures(c.distance[r, s, k], 2))
-                rows.append(row)
-    unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
-    foot = "" if c.distance is None else "\nstd: the difference in its standard deviations"
-    if c.distance is not None and c.dof is None:
-        foot += " (95 % of all below 2.4)"
-    return f"Vibration{unit}, predicted and achieved\n{table(rows, left=2)}{foot}"
-
-
-def _weights(c: CheckComparison, weights: ComplexArray) -> list[dict[str, Any]]:
-    mass, angle = c.labels.weight(weights)
-    return [
-        {"plane": p, "mass": float(mass[i]), "unit": c.labels.weight_unit, "angle_deg": float(angle[i])}
-        for i, p in enumerate(c.planes)
-    ]
-
-
-def _phase(size: float, phase: float, dust: float) -> float | None:
-    # the direction of rounding means nothing
-    return float(phase) if size > dust else None
+def _two_figures(value: float) -> str:
+    return figures(value, 2)
 
 
 def _times(factor: float | None) -> str:
@@ -276,11 +256,7 @@ def _percent(probability: float) -> str:
     return "below 0.01 %" if probability < 1e-4 else f"{100 * probability:.3g} %"
 
 
-def _rms(amplitudes: FloatArray) -> float:
-    return float(np.sqrt(np.mean(amplitudes**2)))
-
-
 def _factor(before: ComplexArray, after: ComplexArray) -> float | None:
     """Ratio of root mean squares; None where nothing but rounding is left."""
-    old, new = (float(np.sqrt(np.mean(np.abs(z) ** 2))) for z in (before, after))
+    old, new = rms(before), rms(after)
     return None if new <= 1e-12 * old else old / new

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,9 +32,6 @@ from balancing.solvers.conditioning import conditioning
 from balancing.solvers.error_propagation import region_radius as region_radius
 from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray
-
-if TYPE_CHECKING:
-    pass
 
 
 def correct(  # noqa: PLR0913
@@ -95,9 +91,9 @@ def correct(  # noqa: PLR0913
     ------
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
-        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.resolution`). Errors that are
-        assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do, or,
-        without an end of them, a condition number above 1000, which no instrument supports.
+        stated or measured errors by a χ² test at 95 % (`balancing.coefficients.identifiability`). Errors that
+        are assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do,
+        or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
     """

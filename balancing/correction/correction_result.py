@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.coefficients.baseline import describe_errors
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
+from balancing.correction.correction_words import error_document, error_words, method_words
 from balancing.correction.counsel import Counsel
 from balancing.correction.other_readings import OtherReading, assumptions, contradiction
+from balancing.data.columns import (
+    degrees,
+    known,
+    reading_columns,
+    rms,
+    three_figures,
+    vector_columns,
+    weight_columns,
+    weight_rows,
+)
 from balancing.data.conventions import Labels
 from balancing.data.errors import Source
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
-from balancing.solvers.methods import METHODS, VARIANTS
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.json import finite
-from rotorid.base.registry import Method, find
-from rotorid.base.text import capital, counted, figures, table, wrap
-from rotorid.base.units import rpm
+from rotorid.base.json import finite, plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import capital, counted, figures, wrap
 from rotorid.regression import coverage_factor
 
 if TYPE_CHECKING:
@@ -31,18 +40,10 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-SMALL = 5e-4
-"""Share of a reading that is not worth a word."""
 DUST = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
-
-_SOURCES = {
-    "stated": "as stated in the job",
-    "repeats": "from repeated readings",
-    "stated, enlarged by repeats": "stated ones, enlarged because repeated readings scatter more",
-    "residuals": "from the disagreement of the runs",
-    "assumed": "assumed: nothing states or measures them",
-}
+INVISIBLE = 1e-9
+"""Those below this share are zero to a reader."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,9 +193,64 @@ class Correction:
         total = dict(zip(self.planes, self.weights, strict=True))
         return np.array([total.get(p, 0.0) for p in planes], dtype=complex) - weights
 
+    def half_widths(self) -> tuple[FloatArray, FloatArray]:
+        """Half widths (P,) of 95 % intervals of the weights' sizes and angles (rad); NaN: not known."""
+        n, factor = len(self.planes), self.coverage_factor or np.nan
+        return factor * known(self.mass_std, n), factor * known(self.angle_std, n)
+
+    def places(self, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
+        """Where to work, degrees as the job counts them: opposite to a weight where material is removed."""
+        turn = [180.0 if plane in self.remove else 0.0 for plane in planes]
+        return np.asarray((self.labels.weight(weights)[1] + turn) % 360)
+
+    def plane_limits(self, p: int) -> dict[str, Any]:
+        """Largest weight and forbidden arcs of a plane as the job writes them: where to work, from and to."""
+        if self.limits is None:
+            return {"max_weight": None, "forbidden_deg": []}
+        opposite = self.planes[p] in self.remove
+        return {
+            "max_weight": finite(self.limits.max_weight[p] * self.labels.weight_scale),
+            "forbidden_deg": [self.labels.arc(*a, opposite=opposite) for a in self.limits.forbidden[p]],
+        }
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        return _correction_dict(self)
+        scale = self.labels.vibration_scale
+        old = np.abs(self.before) * scale
+        residuals = self._residual_columns()
+        new = np.array(residuals[4].values)
+        return plain(
+            {
+                "judgement": self.counsel.to_dict(self.labels),
+                "method": self.method,
+                "conventions": self.labels.conventions(),
+                "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
+                "corrections": rows(self._weight_columns()),
+                **self._mounted(),
+                "residuals": rows(residuals),
+                "rms_before": rms(old),
+                "rms_after": rms(new),
+                "rms_after_95": None if self.check_rms is None else self.check_rms * scale,
+                "max_before": old.max(),
+                "max_after": np.max(new),
+                "condition_number": self.condition_number,
+                "rank": self.rank,
+                "singular_values": self.singular_values,
+                "duality_gap": self.gap,
+                "chi_square": self.chi_square,
+                "chi_square_dof": self.fit_dof,
+                "limits": self._limits(),
+                "limits_that_bind": self.active,
+                "errors": error_document(
+                    self.error_source, self.errors, self.dof, self.run_errors, self.labels
+                ),
+                "convention_test": None if self.convention_test is None else asdict(self.convention_test),
+                "other_readings": [row for other in self.others for row in self._other_rows(other)],
+                "assumptions": assumptions(self.labels, self.convention_test, self.others),
+                "warnings": self.warnings,
+                "notes": self.notes,
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per plane: plane, mass, unit, angle_deg, mass_std, angle_std_deg (NaN where unknown).
@@ -203,353 +259,241 @@ class Correction:
         `equivalent_added_deg` the angle of the added weight that would do the same. Where a convention is
         assumed, `mass_if_…` and `angle_deg_if_…` say what the other reading gives.
         """
-        import pandas as pd
-
-        left_out = ("covariance", "action", "remove_at_deg")
-        rows = [{k: v for k, v in row.items() if k not in left_out} for row in self.to_dict()["corrections"]]
-        frame = pd.DataFrame(rows)
+        shown = frame([column for column in self._weight_columns() if column.name != "covariance"])
+        action, at = shown.pop("action"), shown.pop("remove_at_deg")
         if self.remove:
-            known = self.to_dict()["corrections"]
-            frame.insert(1, "action", [row["action"] for row in known])
-            frame["equivalent_added_deg"] = frame["angle_deg"]
-            frame["angle_deg"] = [
-                row["angle_deg"] if row["remove_at_deg"] is None else row["remove_at_deg"] for row in known
-            ]
+            shown.insert(1, "action", action)
+            shown["equivalent_added_deg"] = shown["angle_deg"]
+            shown["angle_deg"] = at.fillna(shown["angle_deg"])
         for other in self.others:
-            mass, angle = other.labels.weight(other.weights)
             word = other.words.replace(" ", "_")
-            frame[f"mass_if_{word}"] = mass
-            frame[f"angle_deg_if_{word}"] = (angle + [180.0 * (p in self.remove) for p in self.planes]) % 360
-        return frame.astype({"mass_std": float, "angle_std_deg": float})
+            shown[f"mass_if_{word}"] = other.labels.weight(other.weights)[0]
+            shown[f"angle_deg_if_{word}"] = self._other_places(other, self.planes, other.weights)
+        return shown
 
     def residuals_frame(self) -> pd.DataFrame:
         """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
-        import pandas as pd
-
-        frame = pd.DataFrame(self.to_dict()["residuals"]).drop(columns="after_covariance")
-        return frame.astype({"after_phase_deg": float})
+        return frame(self._residual_columns()[:-1])
 
     def summary(self) -> str:
         """Text for an engineer, 80 columns: warnings, corrections with 95 %, vibration before and after."""
-        return _text(self)
+        test = self.convention_test
+        contradicted = 0 if test is None else len(contradiction(test, self.labels))
+        blocks = [
+            "\n".join(wrap(line, "  ") for line in self.counsel.lines()),
+            *(wrap(f"Warning: {w}", "  ") for w in self.warnings[:contradicted]),
+            wrap(" ".join(assumptions(self.labels, test, self.others))),
+            *(wrap(f"Warning: {w}", "  ") for w in self.warnings[contradicted:]),
+            self._corrections_text(),
+            self._add_text(),
+            self._vibration_text(),
+            self._quality_text(),
+            *(wrap(f"Note: {w}.", "  ") for w in self.notes),
+        ]
+        return "\n\n".join(b for b in blocks if b)
 
-
-def _correction_dict(c: Correction) -> dict[str, Any]:
-    """`Correction.to_dict`: the keys of INTERFACE.md for `rotorid balance`, and a few more."""
-    mass, angle = c.labels.weight(c.weights)
-    old, old_phase = c.labels.vibration(c.before)
-    new, new_phase = c.labels.vibration(c.after)
-    # what an exact solution leaves is rounding, whose direction means nothing
-    new_phase = np.where(new > DUST * old.max(), new_phase, np.nan)
-    new = np.where(new > DUST * old.max(), new, 0.0)
-    covariance = None if c.plane_covariance is None else c.labels.weight_covariance(c.plane_covariance)
-    after_covariance = c.after_covariance
-    if after_covariance is not None:
-        after_covariance = c.labels.vibration_covariance(after_covariance)
-    mass_std, angle_std = c.mass_std, c.angle_std
-    unit = c.labels.weight_unit
-    return {
-        "judgement": c.counsel.to_dict(c.labels),
-        "method": c.method,
-        "conventions": c.labels.conventions(),
-        "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
-        "corrections": [
-            {
-                "plane": plane,
-                "mass": float(mass[p]),
-                "unit": unit,
-                "angle_deg": float(angle[p]),
-                "mass_std": None if mass_std is None else float(mass_std[p] * c.labels.weight_scale),
-                "angle_std_deg": None if angle_std is None else finite(np.degrees(angle_std[p])),
-                "covariance": None if covariance is None else covariance[p].tolist(),
-                "action": "remove" if plane in c.remove else "add",
-                "remove_at_deg": float((angle[p] + 180) % 360) if plane in c.remove else None,
-            }
-            for p, plane in enumerate(c.planes)
-        ],
-        **_mounted(c),
-        "residuals": [
-            {
-                "speed_rpm": rpm(speed),
-                "sensor": sensor,
-                "before": float(old[s, k]),
-                "before_phase_deg": float(old_phase[s, k]),
-                "after": float(new[s, k]),
-                "after_phase_deg": finite(new_phase[s, k]),
-                "after_covariance": None if after_covariance is None else after_covariance[s, k].tolist(),
-            }
-            for s, speed in enumerate(c.speeds)
-            for k, sensor in enumerate(c.sensors)
-        ],
-        "rms_before": float(np.sqrt(np.mean(old**2))),
-        "rms_after": float(np.sqrt(np.mean(new**2))),
-        "rms_after_95": None if c.check_rms is None else c.check_rms * c.labels.vibration_scale,
-        "max_before": float(old.max()),
-        "max_after": float(new.max()),
-        "condition_number": finite(c.condition_number),
-        "rank": c.rank,
-        "singular_values": c.singular_values.tolist(),
-        "duality_gap": c.gap,
-        "chi_square": c.chi_square,
-        "chi_square_dof": c.fit_dof,
-        "limits": _limits(c),
-        "limits_that_bind": list(c.active),
-        "errors": _errors(c),
-        "convention_test": None if c.convention_test is None else asdict(c.convention_test),
-        "other_readings": [row for other in c.others for row in _other_rows(c, other)],
-        "assumptions": list(assumptions(c.labels, c.convention_test, c.others)),
-        "warnings": list(c.warnings),
-        "notes": list(c.notes),
-    }
-
-
-def _text(c: Correction) -> str:
-    """`Correction.summary`."""
-    contradicted = 0 if c.convention_test is None else len(contradiction(c.convention_test, c.labels))
-    blocks = [
-        "\n".join(wrap(line, "  ") for line in c.counsel.lines()),
-        *(wrap(f"Warning: {w}", "  ") for w in c.warnings[:contradicted]),
-        wrap(" ".join(assumptions(c.labels, c.convention_test, c.others))),
-        *(wrap(f"Warning: {w}", "  ") for w in c.warnings[contradicted:]),
-        _corrections(c),
-        _add(c),
-        _vibration(c),
-        _quality(c),
-        *(wrap(f"Note: {w}.", "  ") for w in c.notes),
-    ]
-    return "\n\n".join(b for b in blocks if b)
-
-
-def _corrections(c: Correction) -> str:
-    mass, angle = c.labels.weight(c.weights)
-    unit, factor = c.labels.weight_unit, c.coverage_factor
-    rows = [["plane", unit, "angle", "95 %", ""]] if factor else [["plane", unit, "angle"]]
-    rows[0] += [f"if {o.words}" for o in c.others]
-    mass_std, angle_std = c.mass_std, c.angle_std
-    for p, plane in enumerate(c.planes):
-        gone = plane in c.remove
-        row = [f"{plane} (remove)" if gone else plane, figures(mass[p]), _degrees(angle[p] + 180 * gone)]
-        if factor and mass_std is not None and angle_std is not None:
-            width = factor * mass_std[p]
-            held = width < HELD * abs(c.weights[p])
-            row.append("at its limit" if held else f"± {figures(width * c.labels.weight_scale, 2)} {unit}")
-            half = factor * np.degrees(angle_std[p])
-            if np.isnan(half):
-                row.append("angle not determined")
-            else:
-                row.append("held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°")
-        rows.append(row + [_if_other(o, o.weights[p], row[1], gone=gone) for o in c.others])
-    head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
-    taken = f" ({' and '.join(c.labels.assumed)} assumed)" if c.labels.assumed else ""
-    foot = wrap(f"{capital(c.labels.turning_in_words())}; phases as {c.labels.phase}{taken}.", "")
-    return f"{head}\n{table(rows)}\n{foot}"
-
-
-def _if_other(other: OtherReading, weight: complex, shown: str, *, gone: bool) -> str:
-    """The angle if a convention is otherwise, and the mass where that is another than the one shown."""
-    mass, angle = other.labels.weight(weight)
-    at = _degrees(float(angle) + 180 * gone)
-    return at if figures(float(mass)) == shown else f"{figures(float(mass))} at {at}"
-
-
-def _other_rows(c: Correction, other: OtherReading) -> list[dict[str, Any]]:
-    said = {"if": other.words, "phase": other.labels.phase, "angles": other.labels.angle_words}
-    rows = _weights(other.labels, c.planes, other.weights)
-    at = [(row["angle_deg"] + 180) % 360 if row["plane"] in c.remove else None for row in rows]
-    return [{**said, **row, "remove_at_deg": place} for row, place in zip(rows, at, strict=True)]
-
-
-def _add(c: Correction) -> str:
-    if c.mounted is None or c.to_add is None:
-        return ""
-    run, planes, weights = c.mounted
-    mass, angle = c.labels.weight(weights)
-    more, more_angle = c.labels.weight(c.to_add)
-    unit = c.labels.weight_unit
-    rows = [["plane", f"mounted {unit}", "angle", f"add {unit}", "angle"]]
-    rows[0] += [f"if {o.words}" for o in c.others if o.to_add is not None]
-    for p, plane in enumerate(planes):
-        gone = plane in c.remove
-        name = f"{plane} (remove)" if gone else plane
-        more_at = _degrees(more_angle[p] + 180 * gone)
-        row = [name, figures(mass[p]), _degrees(angle[p]), figures(more[p]), more_at]
-        row += [_if_other(o, o.to_add[p], row[3], gone=gone) for o in c.others if o.to_add is not None]
-        rows.append(row)
-    head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
-    foot = ""
-    if any(plane in c.remove for plane in planes):
-        foot = "\nWhere material is removed, the last columns say how much and where."
-    return f"{head}\n{table(rows)}{foot}"
-
-
-def _vibration(c: Correction) -> str:
-    from balancing.solvers.error_propagation import region_radius
-
-    old, old_phase = c.labels.vibration(c.before)
-    new, new_phase = c.labels.vibration(c.after)
-    rows = [["rpm", "sensor", "before", "phase", "after", "phase"]]
-    bound: FloatArray | None = None
-    if c.after_covariance is not None:
-        largest = np.sqrt(np.linalg.eigvalsh(c.after_covariance)[..., -1]) * c.labels.vibration_scale
-        bound = region_radius(c.dof) * largest
-        rows[0].append("95 % within")
-    for s, speed in enumerate(c.speeds):
-        for k, sensor in enumerate(c.sensors):
-            row = [f"{rpm(speed):.6g}", sensor, figures(old[s, k], 3), _degrees(old_phase[s, k], 0)]
-            shown = small(new[s, k], old.max())
-            row += [shown, "" if shown == "0" else _degrees(new_phase[s, k], 0)]
-            if bound is not None:
-                row.append(f"± {figures(bound[s, k], 2)}")
-            rows.append(row)
-    unit = f" in {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
-    last = wrap(_rms(c, old, new), "")
-    return "\n".join([f"Vibration{unit}, bare rotor before and predicted after", table(rows, left=2), last])
-
-
-def _rms(c: Correction, old: FloatArray, new: FloatArray) -> str:
-    """Before and after, and what a check run will show."""
-    before = f"rms {figures(float(np.sqrt(np.mean(old**2))), 3)}"
-    checked = None if c.check_rms is None else figures(c.check_rms * c.labels.vibration_scale, 2)
-    if new.max() <= DUST * old.max():
-        if checked is None:
-            return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
-        return f"{before} → below {checked} in 95 of 100 check runs"
-    after = small(float(np.sqrt(np.mean(new**2))), old.max())
-    words = f"{before} → {after}, largest {figures(old.max(), 3)} → {small(new.max(), old.max())}"
-    return words if checked is None else f"{words}; rms of a check run below {checked} in 95 of 100"
-
-
-def _quality(c: Correction) -> str:
-    n = len(c.planes)
-    planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
-    unit, scale = c.labels.vibration_unit, c.labels.vibration_scale
-    numbers = f"rank {c.rank} of {n}, condition number {c.condition_number:.3g}"
-    lines = [method_words(c)]
-    if c.gap is not None:
-        lines[0] += f" The optimum is certified: at most {max(c.gap, 0.0):.1e} better is possible."
-    if c.active:
-        lines.append(f"Limits that bind: {'; '.join(c.active)}.")
-    soft = c.method in ("ridge", "truncated")
-    if not soft:
-        lines.append(f"{planes.capitalize()} determined ({numbers}).")
-    elif c.singular_values.size:
-        shown = ", ".join(f"{s:.3g}" for s in c.singular_values)
-        lines.append(f"{numbers.capitalize()}, singular values {shown}.")
-    if c.chi_square is not None and c.fit_dof:
-        lines.append(
-            f"What is left of the vibration is {np.sqrt(c.chi_square / c.fit_dof):.2g} times what the "
-            f"errors of the readings explain (χ² {c.chi_square:.1f} with "
-            f"{counted(c.fit_dof, 'degree')} of freedom)."
+    def _weight_columns(self) -> tuple[Column, ...]:
+        n, covariance = len(self.planes), self.plane_covariance
+        blocks = [None] * n if covariance is None else self.labels.weight_covariance(covariance)
+        gone = [plane in self.remove for plane in self.planes]
+        return (
+            *weight_columns(self.labels, self.planes, self.weights),
+            Column("mass_std", known(self.mass_std, n) * self.labels.weight_scale),
+            Column("angle_std_deg", np.degrees(known(self.angle_std, n))),
+            Column("covariance", blocks),
+            Column("action", ["remove" if away else "add" for away in gone]),
+            Column("remove_at_deg", np.where(gone, self.places(self.planes, self.weights), np.nan)),
         )
-    if c.covariance is None:
-        lines.append(
-            "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
-            if c.errors is None
-            else "No intervals: the errors of the readings are not known."
+
+    def _residual_columns(self) -> tuple[Column, ...]:
+        covariance = self.after_covariance
+        blocks: Sequence[Any] | FloatArray = [None] * self.before.size
+        if covariance is not None:
+            blocks = self.labels.vibration_covariance(covariance).reshape(-1, 2, 2)
+        return (*self.vibration_columns(DUST), Column("after_covariance", blocks))
+
+    def vibration_columns(self, dust: float, after: ComplexArray | None = None) -> tuple[Column, ...]:
+        """Speed, sensor, vibration before and after, one row a reading.
+
+        Parameters
+        ----------
+        dust
+            Amplitudes after, up to this share of the largest one before, are nothing.
+        after
+            In place of the prediction, (S, C).
+        """
+        nothing = dust * float(np.abs(self.before).max()) * self.labels.vibration_scale
+        return (
+            *reading_columns(self.speeds, self.sensors),
+            *vector_columns(self.labels, "before", self.before),
+            *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
         )
-    else:
-        lines.append(
-            f"One standard deviation of a reading: {describe_errors(c.errors, unit, scale)} "
-            f"({_SOURCES[c.error_source]}){_between_runs(c)}."
+
+    def _mounted(self) -> dict[str, Any]:
+        if self.mounted is None or self.to_add is None:
+            return {"mounted_in_last_run": None, "add_to_mounted": None}
+        run, planes, weights = self.mounted
+        return {
+            "mounted_in_last_run": {"run": run, "weights": weight_rows(self.labels, planes, weights)},
+            "add_to_mounted": weight_rows(self.labels, planes, self.to_add),
+        }
+
+    def _limits(self) -> dict[str, Any] | None:
+        """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
+        if self.limits is None:
+            return None
+        own = {plane: self.plane_limits(p) for p, plane in enumerate(self.planes)}
+        arcs = {plane: each["forbidden_deg"] for plane, each in own.items()}
+        return {
+            "max_weight": {plane: each["max_weight"] for plane, each in own.items()},
+            "amplitude": self.limits.residual.ravel() * self.labels.vibration_scale,
+            "forbidden_deg": {plane: pairs for plane, pairs in arcs.items() if pairs},
+        }
+
+    def _other_places(self, other: OtherReading, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
+        return replace(self, labels=other.labels).places(planes, weights)
+
+    def _other_rows(self, other: OtherReading) -> list[dict[str, Any]]:
+        n, at = len(self.planes), self._other_places(other, self.planes, other.weights)
+        gone = [plane in self.remove for plane in self.planes]
+        return rows(
+            (
+                Column("if", (other.words,) * n),
+                Column("phase", (other.labels.phase,) * n),
+                Column("angles", (other.labels.angle_words,) * n),
+                *weight_columns(other.labels, self.planes, other.weights),
+                Column("remove_at_deg", np.where(gone, at, np.nan)),
+            )
         )
-        if c.dof is not None and c.dof < 200:
-            lines[-1] += f" Degrees of freedom: {c.dof:.3g}."
-    return "\n".join(wrap(line, "") for line in lines)
 
+    def _other_columns(self, planes: Sequence[str], shown: FloatArray, *, add: bool) -> list[Column]:
+        """The angles if a convention is otherwise, and the mass where that is another than the one shown."""
+        found = []
+        for other in self.others:
+            weights = other.to_add if add else other.weights
+            if weights is None:
+                continue
+            at = [degrees(angle) for angle in self._other_places(other, planes, weights)]
+            masses = map(figures, other.labels.weight(weights)[0])
+            cells = [
+                place if mass == figures(own) else f"{mass} at {place}"
+                for place, mass, own in zip(at, masses, shown, strict=True)
+            ]
+            found.append(Column(f"if {other.words}", cells, str))
+        return found
 
-def _between_runs(c: Correction) -> str:
-    """What changes from run to run, in words."""
-    run, scale = c.run_errors, c.labels.vibration_scale
-    p, w, f = np.sqrt(np.sum(run.sizes**2, axis=1))
-    if run.origin == "none" or not (p or w or f):
-        return ""
-    floor = f"{figures(f * scale, 2)} {c.labels.vibration_unit}".rstrip()
-    shown = (
-        (p > SMALL, f"{100 * p:.2g} % of it"),
-        (w > SMALL, f"{100 * w:.2g} % of what the weights do"),
-        (f > 0, floor),
-    )
-    parts = [words for large, words in shown if large]
-    common = f", {100 * run.common:.0f} % of the variance common to the sensors" if run.common > 0.1 else ""
-    return f"; from run to run: {', '.join(parts)} ({run.origin}{common})"
+    def _plane_column(self, planes: Sequence[str]) -> Column:
+        return Column("plane", [f"{p} (remove)" if p in self.remove else p for p in planes], str)
 
+    def _corrections_text(self) -> str:
+        unit, mass = self.labels.weight_unit, self.labels.weight(self.weights)[0]
+        columns = [
+            self._plane_column(self.planes),
+            Column(unit, mass, figures),
+            Column("angle", self.places(self.planes, self.weights), degrees),
+        ]
+        if self.coverage_factor:
+            sizes, angles = self.half_widths()
+            held = sizes < HELD * np.abs(self.weights)
+            widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}" for width in sizes]
+            columns += [
+                Column("95 %", ["at its limit" if h else w for h, w in zip(held, widths, strict=True)], str),
+                Column("", [_angle_width(half) for half in np.degrees(angles)], str),
+            ]
+        columns += self._other_columns(self.planes, mass, add=False)
+        head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
+        taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
+        foot = wrap(f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}.", "")
+        return f"{head}\n{text(columns)}\n{foot}"
 
-def method_words(c: Correction) -> str:
-    """What the method makes small."""
-    every: tuple[Method[Any], ...] = (*METHODS, *VARIANTS)
-    method = find(every, c.method, "method")
-    about = method.about if c.row_weights is None else method.about.replace("amplitude", "weighted amplitude")
-    return f"{capital(method.title or method.name)}: {about}."
+    def _add_text(self) -> str:
+        if self.mounted is None or self.to_add is None:
+            return ""
+        run, planes, weights = self.mounted
+        (mass, angle), more = self.labels.weight(weights), self.labels.weight(self.to_add)[0]
+        unit = self.labels.weight_unit
+        columns = [
+            self._plane_column(planes),
+            Column(f"mounted {unit}", mass, figures),
+            Column("angle", angle, degrees),
+            Column(f"add {unit}", more, figures),
+            Column("angle", self.places(planes, self.to_add), degrees),
+            *self._other_columns(planes, more, add=True),
+        ]
+        head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
+        foot = ""
+        if any(plane in self.remove for plane in planes):
+            foot = "\nWhere material is removed, the last columns say how much and where."
+        return f"{head}\n{text(columns)}{foot}"
 
+    def within(self, covariance: FloatArray | None) -> FloatArray:
+        """Radius (S·C,) in the job's unit of the 95 % region of a check run's readings; NaN: not known."""
+        if covariance is None:
+            return known(None, self.before.size)
+        largest = np.sqrt(np.linalg.eigvalsh(covariance)[..., -1]) * self.labels.vibration_scale
+        return np.asarray(region_radius(self.dof) * largest.ravel())
 
-def _mounted(c: Correction) -> dict[str, Any]:
-    if c.mounted is None or c.to_add is None:
-        return {"mounted_in_last_run": None, "add_to_mounted": None}
-    run, planes, weights = c.mounted
-    return {
-        "mounted_in_last_run": {"run": run, "weights": _weights(c.labels, planes, weights)},
-        "add_to_mounted": _weights(c.labels, planes, c.to_add),
-    }
+    def _vibration_text(self) -> str:
+        columns = [*self.vibration_columns(INVISIBLE)]
+        if self.after_covariance is not None:
+            within = self.within(self.after_covariance)
+            columns.append(Column("95 % within", within, lambda reach: f"± {figures(reach, 2)}"))
+        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
+        head = f"Vibration{unit}, bare rotor before and predicted after"
+        return "\n".join([head, text(columns, left=2), wrap(self._rms_words(), "")])
 
+    def _rms_words(self) -> str:
+        """Before and after, and what a check run will show."""
+        scale = self.labels.vibration_scale
+        old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
+        before = f"rms {three_figures(rms(old))}"
+        checked = None if self.check_rms is None else figures(self.check_rms * scale, 2)
+        if new.max() <= DUST * old.max():
+            if checked is None:
+                return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
+            return f"{before} → below {checked} in 95 of 100 check runs"
+        after = f"{before} → {small(rms(new), old.max())}"
+        words = f"{after}, largest {three_figures(old.max())} → {small(new.max(), old.max())}"
+        return words if checked is None else f"{words}; rms of a check run below {checked} in 95 of 100"
 
-def _weights(labels: Labels, planes: tuple[str, ...], weights: ComplexArray) -> list[dict[str, Any]]:
-    mass, angle = labels.weight(weights)
-    return [
-        {"plane": p, "mass": float(mass[i]), "unit": labels.weight_unit, "angle_deg": float(angle[i])}
-        for i, p in enumerate(planes)
-    ]
-
-
-def _errors(c: Correction) -> dict[str, Any]:
-    e, run = c.errors, c.run_errors
-    p, w, f = (float(size) for size in np.sqrt(np.sum(run.sizes**2, axis=1)))
-    return {
-        "source": c.error_source,
-        "amplitude_percent": None if e is None else 100 * e.amplitude,
-        "phase_deg": None if e is None else float(np.degrees(e.phase)),
-        "floor": None if e is None else e.floor * c.labels.vibration_scale,
-        "degrees_of_freedom": c.dof,
-        "between_runs": {
-            "source": run.origin,
-            "percent": 100 * p,
-            "percent_of_effect": 100 * w,
-            "floor": f * c.labels.vibration_scale,
-            "rms": float(np.sqrt(run.kinds.sum())) * c.labels.vibration_scale,
-            "common_share": run.common,
-            "interval95": None
-            if run.interval is None
-            else [each * c.labels.vibration_scale for each in run.interval],
-        },
-    }
-
-
-def _limits(c: Correction) -> dict[str, Any] | None:
-    """Of the weights, and of each reading in the order of `residuals`; None where there is none."""
-    if c.limits is None:
-        return None
-    weight = c.limits.max_weight * c.labels.weight_scale
-    amplitude = c.limits.residual.ravel() * c.labels.vibration_scale
-    return {
-        "max_weight": {p: finite(w) for p, w in zip(c.planes, weight, strict=True)},
-        "amplitude": [finite(a) for a in amplitude],
-        "forbidden_deg": {
-            p: [_degrees_of(c, arc, 180.0 if p in c.remove else 0.0) for arc in arcs]
-            for p, arcs in zip(c.planes, c.limits.forbidden, strict=True)
-            if arcs
-        },
-    }
-
-
-def _degrees_of(c: Correction, arc: tuple[float, float], turn: float) -> list[float]:
-    """From and to of an arc, in the job's direction; turned to where material is taken away."""
-    ends = np.degrees([arc[0], arc[0] + arc[1]])[:: c.labels.angle_sign] * c.labels.angle_sign + turn
-    return [float(round(end, 9)) for end in np.mod(ends, 360.0)]
+    def _quality_text(self) -> str:
+        n = len(self.planes)
+        planes = {1: "the plane is", 2: "both planes are"}.get(n, f"all {n} planes are")
+        numbers = f"rank {self.rank} of {n}, condition number {self.condition_number:.3g}"
+        lines = [method_words(self.method, weighted=self.row_weights is not None)]
+        if self.gap is not None:
+            lines[0] += f" The optimum is certified: at most {max(self.gap, 0.0):.1e} better is possible."
+        if self.active:
+            lines.append(f"Limits that bind: {'; '.join(self.active)}.")
+        if self.method not in ("ridge", "truncated"):
+            lines.append(f"{planes.capitalize()} determined ({numbers}).")
+        elif self.singular_values.size:
+            shown = ", ".join(f"{s:.3g}" for s in self.singular_values)
+            lines.append(f"{numbers.capitalize()}, singular values {shown}.")
+        if self.chi_square is not None and self.fit_dof:
+            lines.append(
+                f"What is left of the vibration is {np.sqrt(self.chi_square / self.fit_dof):.2g} times what "
+                f"the errors of the readings explain (χ² {self.chi_square:.1f} with "
+                f"{counted(self.fit_dof, 'degree')} of freedom)."
+            )
+        if self.covariance is not None:
+            words = error_words(self.error_source, self.errors, self.dof, self.run_errors, self.labels)
+        elif self.errors is None:
+            words = (
+                "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
+            )
+        else:
+            words = "No intervals: the errors of the readings are not known."
+        return "\n".join(wrap(line, "") for line in [*lines, words])
 
 
 def small(value: float, scale: float) -> str:
     """A predicted amplitude; rounding dust of an exact solution is zero to a reader."""
-    return "0" if value <= 1e-9 * scale else figures(value, 3)
+    return "0" if value <= INVISIBLE * scale else three_figures(value)
 
 
-def _degrees(angle: float, places: int = 1) -> str:
-    return f"{round(angle, places) % 360:.{places}f}°"
+def _angle_width(half: float) -> str:
+    """Half width of an angle's interval, degrees, in words."""
+    if np.isnan(half):
+        return "angle not determined"
+    return "held by a limit" if half < np.degrees(HELD) else f"± {figures(half, 2)}°"

@@ -30,10 +30,10 @@ from typing import Any, Literal
 import numpy as np
 
 from balancing.coefficients.baseline import Start
-from balancing.coefficients.identifiability import acting_alike
+from balancing.coefficients.identifiability import acting_alike, resolution
 from balancing.coefficients.influence import Influence
-from balancing.coefficients.resolution import resolution
 from balancing.coefficients.significance import CLEAR
+from balancing.data.columns import rms
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.solvers.error_propagation import error_form, region_radius
@@ -41,6 +41,7 @@ from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import figures, listing
 from rotorid.base.units import rpm_text
+from rotorid.regression import solution
 
 Word = Literal["mount", "do not mount", "measure again"]
 
@@ -207,7 +208,7 @@ class Stakes:
         """Some of the planes, by least squares or with given weights."""
         R, F = self.forms
         columns = [p + 1 for p in planes]
-        found = -np.linalg.lstsq(R[:, columns], R[:, 0], rcond=None)[0] if weights is None else weights
+        found = -solution(R[:, columns], R[:, 0]) if weights is None else weights
         z = np.zeros(R.shape[1], dtype=complex)
         z[[0, *columns]] = [1.0, *found]
         error = float(np.sqrt(max(float(np.vdot(z, F @ z).real), 0.0)))
@@ -319,7 +320,7 @@ def coarse(influence: Influence) -> tuple[str, ...]:
     if trials is None or trials.steps is None:
         return ()
     step = float(np.nanmedian(trials.steps[0]))
-    size = float(np.sqrt(np.mean(np.abs(trials.mean) ** 2)))
+    size = rms(trials.mean)
     if step < COARSE * size:
         return ()
     steps, readings = _shown(labels, step, 2), _shown(labels, size, 2)
@@ -428,8 +429,7 @@ def _separating(stakes: Stakes) -> str:
         covariance = part.covariance[..., 2:, 2:].reshape(-1, 2 * n, 2 * n)
         if not covariance.any():
             return 0.0
-        found = resolution(part.W.reshape(-1, n), covariance)
-        return float(np.sqrt(found.chi_square / found.n))
+        return resolution(part.W.reshape(-1, n), covariance).ratio
 
     now = apart(stakes.used)
     others = {s: apart([s]) for s in range(len(influence.speeds)) if s not in stakes.used}

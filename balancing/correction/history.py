@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.coefficients.baseline import match_speeds
-from balancing.correction.refine import different, mounted_in
+from balancing.correction.refine import runs_and_weights
+from balancing.data.columns import known, mounted_rows
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.result import Column, rows
 from rotorid.base.text import figures, table, wrap
 from rotorid.base.units import rpm
 
@@ -82,23 +84,13 @@ class History:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions; what is unknown is None."""
-        mass, angle = self.labels.weight(self.weights)
         return {
             "conventions": self.labels.conventions(),
             "runs": [
                 {
                     "run": run,
                     "kind": _kind(self.checks[r]),
-                    "weights": [
-                        {
-                            "plane": plane,
-                            "mass": float(mass[r, p]),
-                            "unit": self.labels.weight_unit,
-                            "angle_deg": float(angle[r, p]),
-                        }
-                        for p, plane in enumerate(self.planes)
-                        if self.weights[r, p] != 0
-                    ],
+                    "weights": mounted_rows(self.labels, self.planes, self.weights[r]),
                     "speeds": self._speeds(r),
                 }
                 for r, run in enumerate(self.runs)
@@ -106,20 +98,19 @@ class History:
         }
 
     def _speeds(self, r: int) -> list[dict[str, Any]]:
-        scale, share = self.labels.vibration_scale, self.of_limit
-        size = np.where(self._read[r], np.abs(self.readings[r]), -1.0)
-        return [
-            {
-                "speed_rpm": rpm(speed),
-                "largest": float(self.largest[r, s] * scale),
-                "sensor": self.sensors[int(np.argmax(size[s]))],
-                "rms": float(self.rms[r, s] * scale),
-                "of_limit": None if share is None or np.isnan(share[r, s]) else float(share[r, s]),
-                "within_limits": None if share is None or np.isnan(share[r, s]) else bool(share[r, s] <= 1),
-            }
-            for s, speed in enumerate(self.speeds)
-            if self._read[r, s].any()
-        ]
+        read = self._read[r].any(axis=-1)
+        scale, share = self.labels.vibration_scale, known(self.of_limit, self.rms.shape)[r, read]
+        size = np.where(self._read[r], np.abs(self.readings[r]), -1.0)[read]
+        return rows(
+            (
+                Column("speed_rpm", [rpm(speed) for speed in self.speeds[read]]),
+                Column("largest", self.largest[r, read] * scale),
+                Column("sensor", [self.sensors[k] for k in np.argmax(size, axis=-1)]),
+                Column("rms", self.rms[r, read] * scale),
+                Column("of_limit", share),
+                Column("within_limits", [None if np.isnan(part) else bool(part <= 1) for part in share]),
+            )
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per run and speed: weights of each plane, largest and rms amplitude, share of the limit.
@@ -129,7 +120,7 @@ class History:
         """
         import pandas as pd
 
-        rows = []
+        found = []
         for run in self.to_dict()["runs"]:
             mounted = {weight["plane"]: weight for weight in run["weights"]}
             for row in run["speeds"]:
@@ -138,15 +129,15 @@ class History:
                     weight = mounted.get(plane)
                     own[f"{plane} weight"] = weight["mass"] if weight else np.nan
                     own[f"{plane} angle_deg"] = weight["angle_deg"] if weight else np.nan
-                rows.append({**own, **row})
-        return pd.DataFrame(rows).astype({"of_limit": float, "within_limits": object})
+                found.append({**own, **row})
+        return pd.DataFrame(found).astype({"of_limit": float, "within_limits": object})
 
     def summary(self) -> str:
         """One table of 80 columns: runs, what was mounted, vibration at each speed, share of the limit."""
         unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
         head = ["run", f"mounted {self.labels.weight_unit}".rstrip(), "rpm", "largest", "rms"]
         limited = self.of_limit is not None
-        rows = [[*head, "of limit"] if limited else head]
+        lines = [[*head, "of limit"] if limited else head]
         for run in self.to_dict()["runs"]:
             weights = [
                 f"{figures(weight['mass'])} at {round(weight['angle_deg']) % 360}° {weight['plane']}"
@@ -157,10 +148,10 @@ class History:
                 cells += (
                     _vibration(run["speeds"][k], limited=limited) if k < len(run["speeds"]) else ["", "", ""]
                 )
-                rows.append(cells + [""] * (len(rows[0]) - len(cells)))
+                lines.append(cells + [""] * (len(lines[0]) - len(cells)))
         turn = self.labels.turning_in_words()
         foot = f"Vibration{unit}: the largest of the sensors, and the root mean square of them; {turn}."
-        return f"History of the job\n{table(rows, left=2)}\n{wrap(foot)}"
+        return f"History of the job\n{table(lines, left=2)}\n{wrap(foot)}"
 
 
 def history(
@@ -187,15 +178,9 @@ def history(
     ValueError
         For check runs of other sensors or speeds, and where nobody says what was mounted in them.
     """
-    mounted = [mounted_in(check, corrections) for check in checks]
-    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names, blocks = list(trials.runs), [trials.mean]
-    weights = [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
-    weights[0][:, : len(trials.planes)] = trials.weights
-    for check, own in zip(checks, mounted, strict=True):
-        for name in check.runs:
-            names.append(different(name, names))
+    names, planes, weights = runs_and_weights(trials, checks, corrections)
+    blocks = [trials.mean]
+    for check in checks:
         for name in check.sensors:
             if name not in trials.sensors:
                 known = ", ".join(map(repr, trials.sensors))
@@ -206,21 +191,15 @@ def history(
         block = np.full(shape, complex(np.nan, np.nan))
         block[np.ix_(range(shape[0]), rows, columns)] = check.mean
         blocks.append(block)
-        empty = np.zeros(shape[0], dtype=complex)
-        weights.append(
-            np.column_stack([own.get(plane, empty) for plane in planes])
-            if planes
-            else np.zeros((shape[0], 0), dtype=complex)
-        )
     largest = None if limits is None or not np.isfinite(limits.residual).any() else limits.residual
     first = len(trials.runs)
     return History(
-        runs=tuple(names),
+        runs=names,
         speeds=trials.speeds,
         sensors=trials.sensors,
         planes=planes,
         checks=tuple(r >= first for r in range(len(names))),
-        weights=np.concatenate(weights),
+        weights=weights,
         readings=np.concatenate(blocks),
         limits=largest,
         labels=trials.labels,

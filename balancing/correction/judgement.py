@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.iso21940 import Tolerance
-from balancing.solvers.error_propagation import region_radius
+from balancing.solvers.error_propagation import region_edge, region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 Kind = Literal["plane", "bearing", "sensor"]
@@ -103,12 +103,10 @@ def judge(
         raise ValueError(f"the limit of {kind} {name!r} must be a finite number ≥ 0, not {limit}")
     if covariance is None:
         return Judgement(kind, name, speed, complex(value), float(limit))
+    region = region_edge(np.asarray(value, dtype=complex), np.asarray(covariance), dof, _POINTS)
+    size = np.abs(region)
     variances, axes = np.linalg.eigh(np.asarray(covariance, dtype=np.float64))
     reach = region_radius(dof) * np.sqrt(np.maximum(variances, 0.0))
-    turn = np.linspace(0.0, 2 * np.pi, _POINTS + 1)
-    edge = (axes * reach) @ np.stack((np.cos(turn), np.sin(turn)))
-    region = complex(value) + edge[0] + 1j * edge[1]
-    size = np.abs(region)
     centre = axes.T @ np.array([complex(value).real, complex(value).imag])
     safe = np.where(reach > 0, reach, 1.0)
     inside = bool(np.sum((centre / safe) ** 2) <= 1 and (reach > 0).all())

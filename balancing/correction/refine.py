@@ -15,7 +15,7 @@ of the total hold.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,28 +44,6 @@ _REGION = 5.991464547107979
 """χ² of two degrees of freedom that errors alone exceed with 5 %."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trim:
-    """What to add to what is mounted.
-
-    Attributes
-    ----------
-    planes
-        Names (P,), of the correction and of what is mounted.
-    mounted, target, add
-        Weights in the last run, wanted on the bare rotor, and the difference to mount; angle with the
-        rotation, kg or kg·m, shape (P,).
-    run
-        Name of the last run; None where nothing is mounted.
-    """
-
-    planes: tuple[str, ...]
-    mounted: ComplexArray
-    target: ComplexArray
-    add: ComplexArray
-    run: str | None
-
-
 def refine(
     trials: Trials, *checks: Trials, corrections: Correction | Mapping[str, complex] | None = None
 ) -> Influence:
@@ -84,7 +62,7 @@ def refine(
     Returns
     -------
     Influence
-        Its last run is the last check run, so that `correct` proposes what to add to it (`trim`). Where
+        Its last run is the last check run, so that `Correction.to_add` is what to add to it. Where
         check runs do not cover a sensor or speed, its coefficients are those of the trial runs alone.
         Warnings name every coefficient that moved by more than 50 % or 45°.
 
@@ -109,24 +87,6 @@ def refine(
     return replace(refined, warnings=refined.warnings + words)
 
 
-def trim(correction: Correction) -> Trim:
-    """What to add to the weights mounted in the last run, so that they become the correction.
-
-    Parameters
-    ----------
-    correction
-        By refined coefficients: `correct(refine(trials, check))`. Planes that it does not use but that hold
-        a weight are emptied.
-    """
-    if correction.mounted is None:
-        nothing = np.zeros(len(correction.planes), dtype=complex)
-        return Trim(correction.planes, nothing, correction.weights, correction.weights, None)
-    run, planes, mounted = correction.mounted
-    total = dict(zip(correction.planes, correction.weights.tolist(), strict=True))
-    target = np.array([total.get(plane, 0j) for plane in planes], dtype=complex)
-    return Trim(planes, mounted, target, target - mounted, run)
-
-
 def mounted_in(
     check: Trials, corrections: Correction | Mapping[str, complex] | None = None
 ) -> dict[str, ComplexArray]:
@@ -149,6 +109,34 @@ def mounted_in(
         return {plane: np.full(R, weight, dtype=complex) for plane, weight in corrections.items()}
     pairs = zip(corrections.planes, corrections.weights.tolist(), strict=True)
     return {plane: np.full(R, weight, dtype=complex) for plane, weight in pairs}
+
+
+def runs_and_weights(
+    trials: Trials, checks: Sequence[Trials], corrections: Correction | Mapping[str, complex] | None
+) -> tuple[tuple[str, ...], tuple[str, ...], ComplexArray]:
+    """Names of all runs (R), of the planes with a weight in any (P), and the weights (R, P).
+
+    Raises
+    ------
+    ValueError
+        As of `mounted_in`.
+    """
+    mounted = [mounted_in(check, corrections) for check in checks]
+    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
+    planes = tuple(dict.fromkeys((*trials.planes, *later)))
+    names = list(trials.runs)
+    for check in checks:
+        for name in check.runs:
+            names.append(different(name, names))
+    weights = np.zeros((len(names), len(planes)), dtype=complex)
+    weights[: len(trials.runs), : len(trials.planes)] = trials.weights
+    first = len(trials.runs)
+    for check, own in zip(checks, mounted, strict=True):
+        last = first + len(check.runs)
+        for p, plane in enumerate(planes):
+            weights[first:last, p] = own.get(plane, 0.0)
+        first = last
+    return tuple(names), planes, weights
 
 
 def different(name: str, names: Sequence[str]) -> str:
@@ -200,18 +188,10 @@ def _joined(
     columns: list[int],
 ) -> Trials:
     """Trial and check runs as one table, at speeds and sensors (indices of the trial runs') that all have."""
-    mounted = [mounted_in(check, corrections) for check in checks]
-    later = [plane for weights in mounted for plane, values in weights.items() if values.any()]
-    planes = tuple(dict.fromkeys((*trials.planes, *later)))
-    names, weights = list(trials.runs), [np.zeros((len(trials.runs), len(planes)), dtype=complex)]
-    weights[0][:, : len(trials.planes)] = trials.weights
+    names, planes, weights = runs_and_weights(trials, checks, corrections)
     blocks = [trials.readings[:, :, rows][..., columns]]
     steps = [_steps(trials)[:, :, :, rows][..., columns]]
-    for check, own in zip(checks, mounted, strict=True):
-        for name in check.runs:
-            names.append(different(name, names))
-        empty = np.zeros(len(check.runs), dtype=complex)
-        weights.append(np.column_stack([own.get(plane, empty) for plane in planes]))
+    for check in checks:
         speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
         sensors = _sensors(check, trials)
         at, of = [speeds.index(s) for s in rows], [sensors.index(c) for c in columns]
@@ -219,12 +199,12 @@ def _joined(
         steps.append(_steps(check)[:, :, :, at][..., of])
     rounded = any(each.steps is not None for each in (trials, *checks))
     return Trials(
-        runs=tuple(names),
+        runs=names,
         speeds=trials.speeds[rows],
         sensors=tuple(trials.sensors[c] for c in columns),
         planes=planes,
         readings=_side_by_side(blocks),
-        weights=np.concatenate(weights),
+        weights=weights,
         errors=next((each.errors for each in (trials, *checks) if each.errors is not None), None),
         run_errors=next((each.run_errors for each in (trials, *checks) if each.run_errors is not None), None),
         labels=trials.labels,

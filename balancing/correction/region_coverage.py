@@ -6,8 +6,8 @@ the weights, that of the worst combination of planes over the root mean square w
 spare runs tell are wide enough (by F), and are left alone.
 
 Least squares is shifted as well, towards zero by about 1/ρ² where ρ is the effect of the weakest combination
-of the planes in units of its errors (√(χ²/n), `balancing.coefficients.resolution`); its standard deviation
-falls with the number of readings N, so that it is optimistic below a ρ that grows as √N.
+of the planes in units of its errors (√(χ²/n) of `balancing.coefficients.identifiability`); its standard
+deviation falls with the number of readings N, so that it is optimistic below a ρ that grows as √N.
 
 The shares below are those of table d of `examples/coverage_balance.py`.
 """
@@ -19,8 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.coefficients.identifiability import acting_alike
-from balancing.coefficients.resolution import resolution
+from balancing.coefficients.identifiability import large, resolution, separation
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 WEIGHTED_LEVELS = ((1.0, "40 to 60 %"), (0.3, "65 to 90 %"))
@@ -79,10 +78,10 @@ def optimism(W: ArrayLike, covariance: ArrayLike, planes: Sequence[str]) -> str:
         cause = f"the effect of plane {planes[p]!r} is only {ratio:.2g} times the errors of the readings"
         remedy = f"repeat the trial run of plane {planes[p]!r} with a larger weight"
     else:
-        singular = np.linalg.svd(w / np.linalg.norm(w, axis=0), compute_uv=False)
-        named = " and ".join(repr(planes[q]) for q in acting_alike(w))
+        told = separation(w)
+        named = " and ".join(repr(planes[q]) for q in large(told.weakest))
         cause = (
-            f"planes {named} act so much alike (condition number {singular[0] / singular[-1]:.2g}) that the "
+            f"planes {named} act so much alike (condition number {told.condition_number:.2g}) that the "
             f"readings tell them apart by only {clearness(w, C):.2g} times their errors"
         )
         remedy = "use larger trial weights, add sensors or speeds, or leave a plane out"
@@ -106,8 +105,7 @@ def clearness(W: ArrayLike, covariance: ArrayLike) -> float:
     w, C = np.asarray(W, dtype=complex), np.asarray(covariance, dtype=np.float64)
     if not C.any():
         return np.inf
-    found = resolution(w, C)
-    return float(np.sqrt(found.chi_square / found.n)) if np.isfinite(found.chi_square) else np.inf
+    return resolution(w, C).ratio
 
 
 def _share(W: ComplexArray, covariance: FloatArray) -> str:

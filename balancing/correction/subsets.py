@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.baseline import match_speeds, starting_point
-from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.identifiability import UndeterminedError, scaled_columns
 from balancing.coefficients.influence import Influence
 from balancing.correction.choice import plane_indices, rows_of
+from balancing.data.columns import rms, three_figures, weight_rows
 from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
-from balancing.solvers.conditioning import check_stack, scaled_columns
+from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import error_form
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.text import counted, figures, table
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import counted
 from rotorid.regression import RCOND, gain
 
 if TYPE_CHECKING:
@@ -32,7 +35,6 @@ MOST = 20_000
 """More choices of planes than this are not tried."""
 
 _BATCH = 2**20
-_SHOWN = ("rms_after", "rms_expected", "max_after", "largest_weight", "condition_number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,74 +87,60 @@ class Subsets:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
-        mass, angle = self.labels.weight(self.weights)
         scale = self.labels.vibration_scale
-        return {
-            "criterion": self.criterion,
-            "conventions": self.labels.conventions(),
-            "rms_before": self.rms_before * scale,
-            "max_before": self.largest_before * scale,
-            "choices": self.choices,
-            "dependent_choices": self.dependent,
-            "rows": [
-                {
-                    "planes": list(names),
-                    "rms_after": float(self.rms[m] * scale),
-                    "rms_expected": float(self.expected[m] * scale),
-                    "max_after": float(self.largest[m] * scale),
-                    "largest_weight": float(mass[m].max()),
-                    "condition_number": float(self.condition_number[m]),
-                    "weights": [
-                        {
-                            "plane": name,
-                            "mass": float(mass[m, p]),
-                            "unit": self.labels.weight_unit,
-                            "angle_deg": float(angle[m, p]),
-                        }
-                        for p, name in enumerate(names)
-                    ],
-                }
-                for m, names in enumerate(self.planes)
-            ],
-        }
+        weights = [weight_rows(self.labels, *pair) for pair in zip(self.planes, self.weights, strict=True)]
+        return plain(
+            {
+                "criterion": self.criterion,
+                "conventions": self.labels.conventions(),
+                "rms_before": self.rms_before * scale,
+                "max_before": self.largest_before * scale,
+                "choices": self.choices,
+                "dependent_choices": self.dependent,
+                "rows": rows((*self._columns(), Column("weights", weights))),
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per choice: planes ("A, C"), rms_after, rms_expected, max_after, largest_weight, …"""
-        import pandas as pd
-
-        rows = [{k: v for k, v in row.items() if k != "weights"} for row in self.to_dict()["rows"]]
-        return pd.DataFrame([{**row, "planes": ", ".join(row["planes"])} for row in rows])
+        return frame((Column("planes", list(map(", ".join, self.planes))), *self._columns()[1:]))
 
     def summary(self) -> str:
         """Table of 80 columns, the best choice first."""
-        found = self.to_dict()
-        by = "rms" if self.criterion == "rms" else "largest amplitude"
-        if self.weighted:
-            by = "weighted rms" if self.criterion == "rms" else "largest weighted amplitude"
-        units = self.labels.weight_unit, self.labels.vibration_unit
-        rows = [
-            [
-                "planes",
-                "rms",
-                "expected",
-                "largest",
-                f"largest weight{f', {units[0]}' if units[0] else ''}",
-                "condition",
-            ]
+        scale, unit = self.labels.vibration_scale, self.labels.vibration_unit
+        nothing = (("(none)",), self.rms_before * scale, None, self.largest_before * scale, None, None)
+        shown = [
+            replace(column, values=[first, *column.values])
+            for first, column in zip(nothing, self._columns(), strict=True)
         ]
-        rows.append(["(none)", figures(found["rms_before"], 3), "", figures(found["max_before"], 3), "", ""])
-        for row in found["rows"]:
-            numbers = [row[key] for key in _SHOWN]
-            rows.append([", ".join(row["planes"]), *(figures(n, 3) for n in numbers)])
-        k = self.weights.shape[1]
-        choices = f"{counted(self.choices, 'choice')} of {counted(k, 'plane')}"
+        choices = f"{counted(self.choices, 'choice')} of {counted(self.weights.shape[1], 'plane')}"
+        by = criterion_words(self.criterion, weighted=self.weighted)
         head = f"The best of {choices}, by {by} after correction"
-        lines = [head + (f" ({units[1]})" if units[1] else ""), table(rows)]
+        lines = [head + (f" ({unit})" if unit else ""), text(shown)]
         if self.dependent:
             lines.append(
                 f"{self.dependent} more choices have planes that act alike: no weights are determined."
             )
         return "\n".join(lines)
+
+    def _columns(self) -> tuple[Column, ...]:
+        labels, scale = self.labels, self.labels.vibration_scale
+        heaviest = "largest weight" + (f", {labels.weight_unit}" if labels.weight_unit else "")
+        mass = np.abs(self.weights).max(axis=1) * labels.weight_scale
+        return (
+            Column("planes", self.planes, ", ".join),
+            Column("rms_after", self.rms * scale, three_figures, "rms"),
+            Column("rms_expected", self.expected * scale, three_figures, "expected"),
+            Column("max_after", self.largest * scale, three_figures, "largest"),
+            Column("largest_weight", mass, three_figures, heaviest),
+            Column("condition_number", self.condition_number, three_figures, "condition"),
+        )
+
+
+def criterion_words(criterion: Criterion, *, weighted: bool) -> str:
+    """What is made small; `weighted`: where readings count differently."""
+    word = "weighted " if weighted else ""
+    return f"{word}rms" if criterion == "rms" else f"largest {word}amplitude"
 
 
 def best_subsets(  # noqa: PLR0913
@@ -207,8 +195,8 @@ def best_subsets(  # noqa: PLR0913
     N, P = K.shape
     _check(planes, P, int(np.count_nonzero(w)), k, criterion, show)
     chosen = np.array(list(combinations(range(P), k)), dtype=np.int64)
-    rows, right, outside = _reduced(w[:, None] * K, w * y)
-    D, misfit, condition = _least_squares(rows, right, chosen)
+    reduced, right, outside = _reduced(w[:, None] * K, w * y)
+    D, misfit, condition = _least_squares(reduced, right, chosen)
     solid = np.isfinite(condition)
     if not solid.any():
         raise UndeterminedError(
@@ -235,7 +223,7 @@ def best_subsets(  # noqa: PLR0913
         objective=np.sqrt(size**2 + _errors(F, chosen[order], D[order])),
         condition_number=condition[order],
         criterion=criterion,
-        rms_before=float(np.sqrt(np.mean(np.abs(y) ** 2))),
+        rms_before=rms(y),
         largest_before=float(np.abs(y).max()),
         choices=int(np.count_nonzero(solid)),
         dependent=int(np.count_nonzero(~solid)),
@@ -345,7 +333,7 @@ def _by_maximum(
     F: ComplexArray,
 ) -> tuple[IntArray, ComplexArray]:
     """The best choices by the largest weighted reading and the errors; weights (M, k), theirs replaced."""
-    from balancing.solvers.cone import minmax_cone
+    from balancing.solvers.cone import problem, solve_cone
 
     K, y, w = readings
     D = D.copy()
@@ -353,7 +341,7 @@ def _by_maximum(
     for m in order:
         if len(best) == show and bound[m] >= best[-1][0]:
             break
-        found = minmax_cone(K[:, chosen[m]], y, row_weights=w)
+        found = solve_cone(problem(K[:, chosen[m]], y, w, minmax=True))
         D[m] = found.weights
         errors = float(_errors(F, chosen[[m]], D[[m]])[0])
         best = sorted([*best, (float(np.hypot(found.objective, np.sqrt(errors))), int(m))])[:show]

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
+from balancing.correction.subsets import Criterion, criterion_words
+from balancing.data.columns import three_figures, weight_rows
 from balancing.data.conventions import Labels
 from balancing.solvers.conditioning import check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.text import figures, table
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
 from rotorid.regression import gain
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Criterion = Literal["rms", "max"]
 
 KNEE = 3.0
 """A point is a knee where weight does on average at least so many times as much before it as behind it."""
@@ -68,66 +69,53 @@ class TradeOff:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's own units and conventions."""
-        mass, angle = self.labels.weight(self.weights)
-        scale = self.labels.vibration_scale
-        return {
-            "criterion": self.criterion,
-            "conventions": self.labels.conventions(),
-            "knee": self.knee,
-            "points": [
-                {
-                    "total": float(self.totals[k] * self.labels.weight_scale),
-                    "rms_after": float(self.rms[k] * scale),
-                    "max_after": float(self.largest[k] * scale),
-                    "weights": [
-                        {
-                            "plane": name,
-                            "mass": float(mass[k, p]),
-                            "unit": self.labels.weight_unit,
-                            "angle_deg": float(angle[k, p]),
-                        }
-                        for p, name in enumerate(self.planes)
-                    ],
-                }
-                for k in range(len(self.totals))
-            ],
-        }
+        weights = [weight_rows(self.labels, self.planes, own) for own in self.weights]
+        return plain(
+            {
+                "criterion": self.criterion,
+                "conventions": self.labels.conventions(),
+                "knee": self.knee,
+                "points": rows((*self._columns(), Column("weights", weights))),
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per point: total, rms_after, max_after, knee, and mass and angle of each plane.
 
         The columns of a plane NAME are `NAME_mass` and `NAME_angle_deg`.
         """
-        import pandas as pd
-
-        rows = [
-            {
-                **{name: point[name] for name in ("total", "rms_after", "max_after")},
-                "knee": k == self.knee,
-                **{
-                    f"{w['plane']}_{kind}": w[kind]
-                    for w in point["weights"]
-                    for kind in ("mass", "angle_deg")
-                },
-            }
-            for k, point in enumerate(self.to_dict()["points"])
+        mass, angle = self.labels.weight(self.weights)
+        each = [
+            Column(f"{plane}_{kind}", values[:, p])
+            for p, plane in enumerate(self.planes)
+            for kind, values in (("mass", mass), ("angle_deg", angle))
         ]
-        return pd.DataFrame(rows)
+        knee = Column("knee", np.arange(len(self.totals)) == self.knee)
+        return frame((*self._columns(), knee, *each))
 
     def summary(self) -> str:
         """Table of 80 columns, the knee marked."""
-        unit, vibration = self.labels.weight_unit, self.labels.vibration_unit
-        rows = [[f"total{f', {unit}' if unit else ''}", "rms", "largest", "of the whole effect", ""]]
+        vibration = self.labels.vibration_unit
         gained = self.objective[0] - self.objective[-1]
-        for k, point in enumerate(self.to_dict()["points"]):
-            share = (self.objective[0] - self.objective[k]) / gained if gained > 0 else 0.0
-            numbers = [figures(point[name], 3) for name in ("total", "rms_after", "max_after")]
-            rows.append([*numbers, f"{100 * share:.0f} %", "← knee" if k == self.knee else ""])
-        what = "rms" if self.criterion == "rms" else "largest amplitude"
-        if self.weighted:
-            what = "weighted rms" if self.criterion == "rms" else "largest weighted amplitude"
+        share = (self.objective[0] - self.objective) / (gained if gained > 0 else 1.0)
+        marks = ["← knee" if k == self.knee else "" for k in range(len(share))]
+        shown = (
+            *self._columns(),
+            Column("of the whole effect", share * (gained > 0), lambda part: f"{100 * part:.0f} %"),
+            Column("", marks, str),
+        )
+        what = criterion_words(self.criterion, weighted=self.weighted)
         head = f"The least {what} that a total weight leaves{f' ({vibration})' if vibration else ''}"
-        return f"{head}\n{table(rows, left=0)}\n{self._words()}"
+        return f"{head}\n{text(shown, left=0)}\n{self._words()}"
+
+    def _columns(self) -> tuple[Column, ...]:
+        labels, scale = self.labels, self.labels.vibration_scale
+        total = "total" + (f", {labels.weight_unit}" if labels.weight_unit else "")
+        return (
+            Column("total", self.totals * labels.weight_scale, three_figures, total),
+            Column("rms_after", self.rms * scale, three_figures, "rms"),
+            Column("max_after", self.largest * scale, three_figures, "largest"),
+        )
 
     def _words(self) -> str:
 
@@ -140,8 +128,8 @@ class TradeOff:
             self.objective[0] - self.objective[-1]
         )
         return (
-            f"The knee: {figures(self.totals[self.knee] * scale, 3)} {unit} of "
-            f"{figures(self.totals[-1] * scale, 3)} {unit} bring {100 * gain_there:.0f} % of the effect."
+            f"The knee: {three_figures(self.totals[self.knee] * scale)} {unit} of "
+            f"{three_figures(self.totals[-1] * scale)} {unit} bring {100 * gain_there:.0f} % of the effect."
         )
 
 
@@ -182,9 +170,9 @@ def trade_off(
 
     Notes
     -----
-    Each point is a cone program (`balancing.solvers.cone.weight_budget_cone`). The curve is convex.
+    Each point is a cone program (`balancing.solvers.cone`). The curve is convex.
     """
-    from balancing.solvers.cone import minmax_cone, weight_budget_cone
+    from balancing.solvers.cone import problem, solve_cone
 
     K, y, w = check_stack(W, Y, row_weights)
     if len(planes) != K.shape[1] or len(set(planes)) != K.shape[1]:
@@ -200,14 +188,14 @@ def trade_off(
         size = np.abs(w * (y + K @ D))
         return float(size.max() if criterion == "max" else np.sqrt(np.mean(size**2)))
 
-    best = minmax_cone(K, y, row_weights=w).weights if criterion == "max" else -gain(A) @ (w * y)
+    best = solve_cone(problem(K, y, w, minmax=True)).weights if criterion == "max" else -gain(A) @ (w * y)
     found = [(0.0, objective(np.zeros_like(best)), np.zeros_like(best))]
     total = float(np.abs(best).sum())
     if total > 0:
         found.append((total, objective(best), best))
     while 1 < len(found) < points:
         place, budget = _longest([t for t, _, _ in found], [v for _, v, _ in found])
-        D = weight_budget_cone(K, y, budget, minmax=criterion == "max", row_weights=w).weights
+        D = solve_cone(problem(K, y, w, minmax=criterion == "max", budget=budget)).weights
         D = np.where(np.abs(D) > DUST * budget, D, 0.0)
         found.insert(place, (budget, objective(D), D))
     return _result(planes, K, y, found, criterion, labels or Labels(), weighted=bool(np.ptp(w) > 0))

@@ -31,6 +31,7 @@ from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
 from balancing.solvers.methods import Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import wrap
 from rotorid.base.units import rpm
 
@@ -81,23 +82,20 @@ class Verdict:
         return {
             "source": self.source,
             "verdict": self.overall,
-            "rows": [self._row(row) for row in self.rows],
+            "rows": rows(self._columns()),
             "warnings": list(self.warnings),
         }
 
     def to_frame(self) -> pd.DataFrame:
         """One row per judgement: the keys of `to_dict`."""
-        import pandas as pd
-
-        frame = pd.DataFrame(self.to_dict()["rows"])
-        return frame.astype({name: float for name in ("speed_rpm", "low", "high") if name in frame})
+        return frame(self._columns())
 
     def summary(self) -> str:
         """Text of 80 columns."""
-        rows = self.to_dict()["rows"]
+        judged = rows(self._columns())
         lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
         lines.append(f"Verdict ({self.source}): {self.overall}")
-        for row in rows:
+        for row in judged:
             at = "" if row["speed_rpm"] is None else f" at {row['speed_rpm']:.6g} rpm"
             within = (
                 "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
@@ -107,7 +105,7 @@ class Verdict:
                 + f" ({within}), limit {row['limit']:.4g}: {row['verdict']}"
             )
             lines.append(wrap(line, "    "))
-        if any(row["verdict"] == "not decidable" for row in rows):
+        if any(row["verdict"] == "not decidable" for row in judged):
             words = (
                 "Not decidable: the 95 % region of the value lies on both sides of the limit, or the errors "
                 "are unknown; repeated readings or stated errors would tell."
@@ -115,28 +113,33 @@ class Verdict:
             lines.append(wrap(words))
         return "\n".join(lines)
 
-    def _row(self, row: Judgement) -> dict[str, Any]:
-        size_of = {
-            "plane": (self.labels.weight_scale, self.labels.weight_unit),
+    def _columns(self) -> tuple[Column, ...]:
+        labels = self.labels
+        scales = {
+            "plane": (labels.weight_scale, labels.weight_unit),
             "bearing": (_GRAM_MM, "g_mm"),
-            "sensor": (self.labels.vibration_scale, self.labels.vibration_unit),
+            "sensor": (labels.vibration_scale, labels.vibration_unit),
         }
-        scale, unit = size_of[row.kind]
-        angle = (
-            self.labels.vibration(row.value)[1] if row.kind == "sensor" else self.labels.weight(row.value)[1]
+        scale = np.array([scales[row.kind][0] for row in self.rows])
+        values = [
+            (labels.vibration if row.kind == "sensor" else labels.weight)(row.value) for row in self.rows
+        ]
+        size, low, high, limit, speeds = (
+            np.array([getattr(row, name) for row in self.rows], dtype=float)
+            for name in ("size", "low", "high", "limit", "speed")
         )
-        return {
-            "kind": row.kind,
-            "name": row.name,
-            "speed_rpm": None if row.speed is None else rpm(row.speed),
-            "size": row.size * scale,
-            "angle_deg": float(angle) if row.size else None,
-            "low": None if row.low is None else row.low * scale,
-            "high": None if row.high is None else row.high * scale,
-            "limit": row.limit * scale,
-            "unit": unit,
-            "verdict": row.verdict,
-        }
+        return (
+            Column("kind", [row.kind for row in self.rows]),
+            Column("name", [row.name for row in self.rows]),
+            Column("speed_rpm", [rpm(speed) for speed in speeds]),
+            Column("size", size * scale),
+            Column("angle_deg", [float(angle) if amount else np.nan for amount, angle in values]),
+            Column("low", low * scale),
+            Column("high", high * scale),
+            Column("limit", limit * scale),
+            Column("unit", [scales[row.kind][1] for row in self.rows]),
+            Column("verdict", [row.verdict for row in self.rows]),
+        )
 
 
 def verdict_of_prediction(
@@ -167,14 +170,14 @@ def verdict_of_prediction(
     """
     c = correction
     D = c.weights if mounted is None else np.asarray(mounted, dtype=complex)
-    rows: list[Judgement] = []
+    judged: list[Judgement] = []
     if tolerance is not None:
         u = D - c.weights
-        rows += judge_unbalance(u, c.covariance, tolerance, c.planes, radii=radii, dof=c.dof)
+        judged += judge_unbalance(u, c.covariance, tolerance, c.planes, radii=radii, dof=c.dof)
     readings = c.after if after is None else np.asarray(after, dtype=complex)
     limit = None if c.limits is None else c.limits.residual
-    rows += _readings(c.sensors, c.speeds, readings, c.after_covariance, limit, c.dof)
-    return _verdict(rows, "prediction", c.labels)
+    judged += _readings(c.sensors, c.speeds, readings, c.after_covariance, limit, c.dof)
+    return _verdict(judged, "prediction", c.labels)
 
 
 def verdict_of_check(
@@ -225,7 +228,7 @@ def verdict_of_check(
     )
     start = starting_point(known, bare)
     warnings = start.warnings
-    rows: list[Judgement] = []
+    judged: list[Judgement] = []
     if tolerance is not None:
         chosen = plane_indices(known, planes or tolerance.planes)
         used = tuple(known.planes[p] for p in chosen)
@@ -238,11 +241,11 @@ def verdict_of_check(
         covariance, dof = (None, None) if errors is None else errors.weights(found)
         if errors is not None and not errors.explain(found.weights, POOR):
             warnings += (_UNEXPLAINED,)
-        rows += judge_unbalance(-found.weights, covariance, tolerance, used, radii=radii, dof=dof)
+        judged += judge_unbalance(-found.weights, covariance, tolerance, used, radii=radii, dof=dof)
     own_errors = None if start.covariance is None else start.covariance[..., :2, :2]
     limit = None if limits is None else limits.residual[pick]
-    rows += _readings(check.sensors, known.speeds, start.readings, own_errors, limit, start.model.dof)
-    return _verdict(rows, f"check run {name}", start.labels, warnings)
+    judged += _readings(check.sensors, known.speeds, start.readings, own_errors, limit, start.model.dof)
+    return _verdict(judged, f"check run {name}", start.labels, warnings)
 
 
 def _readings(

@@ -7,19 +7,23 @@ people of the job write them. The signs are derived in docs/conventions.md.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 
 Phase = Literal["lead", "lag"]
 Angles = Literal["with rotation", "against rotation"]
 Rotation = Literal["clockwise", "counter-clockwise"]
 View = Literal["drive end", "free end"]
+PHASES = ("lead", "lag")
+ANGLES = ("with rotation", "against rotation")
+Angle = TypeVar("Angle", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,8 @@ class Labels:
     Raises
     ------
     ValueError
-        If `clock` is set or `view` is given without `rotation`.
+        If `phase`, `angles`, `rotation` or `view` is none of its words, and where `clock` is set or `view` is
+        given without `rotation`.
     """
 
     vibration_unit: str = "m"
@@ -67,7 +72,28 @@ class Labels:
     assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.phase not in PHASES:
+            raise ValueError(f"phase must be 'lead' or 'lag', not {self.phase!r}")
+        if self.angles not in ANGLES:
+            raise ValueError(f"angles must be 'with rotation' or 'against rotation', not {self.angles!r}")
         check_turning(self.rotation, self.view, clock=self.clock)
+
+    def vibration_from(self, amplitude: ArrayLike, phase: ArrayLike) -> ComplexArray:
+        """Vibrations from amplitudes (SI) and phases (rad) as the job counts them; turns back `vibration`.
+
+        A reading s(t) = A cos(ω t + φ) has the lead φ and is A e^{iφ}. A job that writes the lag −φ writes
+        its conjugate.
+        """
+        value = polar(amplitude, phase)
+        return value if self.phase_sign > 0 else np.conj(value)
+
+    def weight_from(self, size: ArrayLike, angle: ArrayLike) -> ComplexArray:
+        """Weights from sizes (SI) and angles (rad) as the job counts them; turns back `weight`.
+
+        A weight m at α with the rotation is m e^{iα}. A job that counts against the rotation writes −α.
+        """
+        value = polar(size, angle)
+        return value if self.angle_sign > 0 else np.conj(value)
 
     def vibration(self, amplitude: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Amplitude in the job's unit and phase in degrees, 0 ≤ phase < 360, as the job counts it."""
@@ -76,6 +102,29 @@ class Labels:
     def weight(self, weight: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Weight in the job's unit and angle in degrees, 0 ≤ angle < 360, as the job counts it."""
         return _polar(weight, self.weight_scale, self.angle_sign)
+
+    def with_rotation(self, angle: Angle) -> Angle:
+        """Angles counted as the job does, counted with the rotation; the same turns them back. Any unit."""
+        return self.angle_sign * angle + 0.0
+
+    def leading(self, phase: float) -> float:
+        """A phase as the job writes it as a lead; the same turns it back. Any unit."""
+        return self.phase_sign * phase
+
+    def arc_from(self, first: float, last: float, *, opposite: bool = False) -> tuple[float, float]:
+        """First angle and width, rad with the rotation, of the degrees from → to as the job writes them.
+
+        Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material
+        is removed a job says where nothing can be taken away; the weight that would have to be added instead
+        stands `opposite`, and so does the arc of the correction.
+        """
+        start = (first if self.angle_sign > 0 else -last) + (180.0 if opposite else 0.0)
+        return math.radians(start % 360.0), math.radians((last - first) % 360.0)
+
+    def arc(self, start: float, width: float, *, opposite: bool = False) -> list[float]:
+        """From and to, degrees as the job writes them, of an arc in rad: turns back `arc_from`."""
+        ends = np.degrees([start, start + width])[:: self.angle_sign] * self.angle_sign
+        return [float(round(end, 9)) for end in np.mod(ends + (180.0 if opposite else 0.0), 360.0)]
 
     def amplitude_words(self, size: float) -> str:
         """An amplitude, given in SI."""
@@ -128,6 +177,29 @@ class Labels:
         if not self.clock or self.rotation is None:
             return self.angles
         return self.rotation if self.angle_sign > 0 else opposite(self.rotation)
+
+    @property
+    def side(self) -> str:
+        """How angles count: "with" or "against" the rotation."""
+        return self.angles.partition(" ")[0]
+
+    @property
+    def counted_alike(self) -> bool:
+        """Whether the angle of a weight adds to the phase of its vibration.
+
+        Inside it does (W e^{iα} leads by α more); turning both round, phases and angles, changes nothing.
+        """
+        return self.phase_sign == self.angle_sign
+
+    @property
+    def angles_on_paper(self) -> int:
+        """+1 where angles as the job counts them grow counter-clockwise in a picture, −1 clockwise."""
+        return self.angle_sign * self.drawn_sign
+
+    @property
+    def phases_on_paper(self) -> int:
+        """+1 where phases as the job writes them grow counter-clockwise in a picture: leads do."""
+        return self.phase_sign
 
     @property
     def drawn_sign(self) -> int:
@@ -186,8 +258,7 @@ class Labels:
         if self.clock:
             end = "" if self.view is None else f" seen from the {self.view}"
             return f"angles from the mark {self.angle_words}{end}, the rotor turns {self.rotation}"
-        turn = "with" if self.angle_sign > 0 else "against"
-        words = f"angles from the mark {turn} the rotation"
+        words = f"angles from the mark {self.side} the rotation"
         if self.rotation is not None:
             words += f", which is {self.rotation}"
             words += "" if self.view is None else f" seen from the {self.view}"
@@ -232,6 +303,15 @@ def check_turning(rotation: str | None, view: str | None, *, clock: bool) -> Non
             f"{what} cannot be understood without the direction of rotation seen from the same end: "
             "state rotation as clockwise or counter-clockwise"
         )
+
+
+def polar(size: ArrayLike, angle: ArrayLike) -> ComplexArray:
+    """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
+    turns = np.asarray(angle, dtype=float) / (np.pi / 2)
+    quarter = np.round(turns)
+    exact = np.abs(turns - quarter) < 1e-15 * np.maximum(np.abs(turns), 1.0)
+    unit = np.where(exact, 1j ** np.mod(np.where(exact, quarter, 0.0), 4), np.exp(1j * np.asarray(angle)))
+    return np.asarray(size * unit, dtype=complex)
 
 
 def _polar(value: ArrayLike, scale: float, sign: int) -> tuple[FloatArray, FloatArray]:

@@ -103,6 +103,27 @@ def symmetric(covariance: FloatArray) -> FloatArray:
     return np.asarray((covariance + np.swapaxes(covariance, -1, -2)) / 2)
 
 
+def inverse_root(covariance: FloatArray, least: float) -> FloatArray:
+    """R (n, n) with C⁻¹ = R Rᵀ; scaled variances count as no less than `least` of the largest."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(symmetric(covariance / np.outer(std, std)))
+    return np.asarray(vectors / np.sqrt(np.maximum(values, least * values[-1])) / std[:, None])
+
+
+def mean_variance(covariance: FloatArray) -> FloatArray:
+    """Mean variance of both directions, (…), of covariances (…, 2, 2)."""
+    return np.asarray(np.trace(covariance, axis1=-2, axis2=-1) / 2)
+
+
+def hermitian(covariance: FloatArray) -> ComplexArray:
+    """S[p, q] = E[dz_p conj(dz_q)] / 2 from covariances (N, 2P, 2P); half: the variance in one direction."""
+    N, n, _ = covariance.shape
+    C = covariance.reshape(N, n // 2, 2, n // 2, 2)
+    real = C[:, :, 0, :, 0] + C[:, :, 1, :, 1]
+    imaginary = C[:, :, 1, :, 0] - C[:, :, 0, :, 1]
+    return np.asarray((real + 1j * imaginary) / 2)
+
+
 def mean_covariance(trials: Trials, errors: ReadingErrors | None) -> FloatArray:
     """Covariance (R, S, C, 2, 2) of the means of repeated readings; without errors that of their digits."""
     rounding = _rounding(trials)

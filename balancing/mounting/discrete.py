@@ -13,20 +13,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.data.limits import Limits
+from balancing.mounting.attainable import Attainable, nearest
 from balancing.mounting.discrete_relax import best_form, form, project_out, relax
-from balancing.mounting.discrete_search import Found, Leaves, nearest, polish, search
-from balancing.mounting.discrete_sets import LONGEST, Attainable
-from balancing.mounting.discrete_steps import StepSums, attainable
+from balancing.mounting.discrete_search import Found, polish, search
+from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
-from balancing.solvers.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from balancing.mounting.piece_sums import LONGEST, PieceSums
+from balancing.solvers.certificate import Problem
+from balancing.solvers.cone import InfeasibleError, problem, solve_cone
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.regression import solution
 
 __all__ = ["Discrete", "solve_discrete"]
 
@@ -110,25 +113,22 @@ def solve_discrete(
         raise ValueError("the time limit must be a number of seconds above 0")
     residual = None if limits is None else limits.residual.ravel()
     most = None if limits is None else limits.max_weight
-    checked = problem(W, Y, row_weights, most, residual)
-    P = checked.W.shape[1]
+    task = problem(W, Y, row_weights, most, residual, minmax=method == "minmax")
+    P = task.W.shape[1]
     named = tuple(names) or tuple(str(p + 1) for p in range(P))
     if len(planes) != P or len(named) != P:
         raise ValueError(f"there must be holes, or None, and a name for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
     usable = [_usable(h, a, name) for h, a, name in zip(planes, arcs, named, strict=True)]
-    joint = _Joint(
-        checked.W, checked.Y, checked.row_weights, checked.residual, checked.max_weight, planes, usable, named
-    )
-    return joint.best(method == "minmax", start, time_limit)
+    return _Joint(task, planes, usable, named).best(start, time_limit)
 
 
-def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray | None:
+def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray:
     """Free holes outside the forbidden arcs."""
     if holes is None:
         if arcs:
             raise ValueError(f"plane {name} has forbidden angles but no holes: list its holes")
-        return None
+        return np.zeros(0, dtype=bool)
     kept = holes.free.copy()
     for first, width in arcs:
         after = np.mod(holes.angles - first, 2 * np.pi)
@@ -145,111 +145,102 @@ class _Joint:
 
     def __init__(
         self,
-        W: ComplexArray,
-        Y: ComplexArray,
-        row_weights: FloatArray,
-        residual: FloatArray,
-        max_weight: FloatArray,
+        task: Problem,
         planes: Sequence[Holes | None],
-        usable: Sequence[BoolArray | None],
+        usable: Sequence[BoolArray],
         names: tuple[str, ...],
     ) -> None:
-        self.W, self.Y, self.w, self.residual, self.max_weight = W, Y, row_weights, residual, max_weight
-        self.planes, self.usable, self.names = planes, usable, names
-        self.limited = np.flatnonzero(np.isfinite(residual))
-        reach = self._needed()
-        self.sets: list[Attainable | None] = []
-        for p, (holes, own) in enumerate(zip(planes, usable, strict=True)):
-            if holes is None or own is None:
-                self.sets.append(None)
-                continue
-            heaviest = min(holes.max_weight, float(max_weight[p]))
-            if holes.free_amounts and not np.isfinite(min(reach[p], heaviest)):
-                raise ValueError(
-                    f"the readings do not tell how much plane {names[p]} needs: state its largest weight"
-                )
-            one = attainable(holes, own, heaviest, float(reach[p]), LONGEST // len(planes))
-            free = isinstance(one, StepSums) and not holes.step and one.surround and np.isinf(heaviest)
-            self.sets.append(None if free else one)
+        self.task, self.planes, self.usable, self.names = task, planes, usable, names
+        on = task.row_weights > 0
+        self.A, self.y = (task.row_weights[:, None] * task.W)[on], (task.row_weights * task.Y)[on]
+        self.limited = np.flatnonzero(np.isfinite(task.residual))
+        self.sets = [self._set(p, float(needed)) for p, needed in enumerate(self._needed())]
+        self.own = [s for s in self.sets if s is not None]
         self.fixed = np.array([p for p, s in enumerate(self.sets) if s is not None], dtype=np.int64)
         self.free = np.array([p for p, s in enumerate(self.sets) if s is None], dtype=np.int64)
-        self.own = [s for s in self.sets if s is not None]
+        # least squares: continuous planes without limits cancel what they can
+        self.inner, self.known = project_out(self.A[:, self.free], self.A[:, self.fixed], self.y)
+        limited = len(self.limited) or np.isfinite(task.max_weight[self.free]).any()
+        self.exact = not len(self.free) or not (task.minmax or limited)
 
     def _needed(self) -> FloatArray:
         """Largest weights that can be better than none (ten times that where there are limits)."""
-        A, y = self.w[:, None] * self.W, self.w * self.Y
-        ls = np.linalg.lstsq(A, -y, rcond=None)[0]
+        A, y = self.A, self.y
+        free = solution(A, -y)
         room = np.sqrt(len(y)) * np.linalg.norm(y)
         reach = np.full(A.shape[1], np.inf)
         for p in range(A.shape[1]):
             (rest,) = project_out(np.delete(A, p, axis=1), A[:, p])
             size = float(np.linalg.norm(rest))
             if size > 1e-9 * np.linalg.norm(A[:, p]):
-                reach[p] = abs(ls[p]) + room / size
+                reach[p] = abs(free[p]) + room / size
         return reach * (10.0 if len(self.limited) else 1.0)
 
-    def best(self, minmax: bool, start: float, limit: float) -> Discrete:
+    def _set(self, p: int, needed: float) -> Attainable | None:
+        """What a plane can take; None for any weight."""
+        holes, usable = self.planes[p], self.usable[p]
+        if holes is None:
+            return None
+        heaviest = min(holes.max_weight, float(self.task.max_weight[p]))
+        if not holes.free_amounts:
+            return PieceSums(holes, usable, heaviest, longest=LONGEST // len(self.planes))
+        if not np.isfinite(min(needed, heaviest)):
+            raise ValueError(
+                f"the readings do not tell how much plane {self.names[p]} needs: state its largest weight"
+            )
+        amounts = FreeAmounts(holes, usable, heaviest, needed)
+        return None if not holes.step and amounts.surround and np.isinf(heaviest) else amounts
+
+    def best(self, start: float, limit: float) -> Discrete:
         """Solve; `solve_discrete` says what it raises."""
-        rows = self.w > 0
-        A, y = (self.w[:, None] * self.W)[rows], (self.w * self.Y)[rows]
-        continuous = self._continuous(minmax)
-        if not len(self.fixed):
-            return self._result(minmax, continuous, np.zeros((0, 3), dtype=np.int64), None, np.inf)
-        simple = not minmax and not len(self.limited) and np.isinf(self.max_weight[self.free]).all()
-        relaxed, prices = relax(A, y, self.sets, minmax=minmax)
-        if simple:  # continuous planes cancel what they can
-            Af, yf = project_out(A[:, self.free], A[:, self.fixed], y)
-        else:
-            Af, yf = A[:, self.fixed], y
-        exact = simple or not len(self.free)
-
-        def leaves(D: ComplexArray, bounds: FloatArray, best: float) -> FloatArray:
-            if exact:
-                return self._squares(Af, yf, D, minmax)
-            return self._with_continuous(D, bounds, best, minmax)
-
-        found = Found(np.inf, np.zeros(len(self.fixed), dtype=complex), np.zeros((0, 3), dtype=np.int64))
-        rounded = None
-        for target in (continuous, relaxed, np.zeros_like(continuous)):
-            picks = [nearest(s, complex(z)) for s, z in zip(self.own, target[self.fixed], strict=True)]
-            D, keys = np.array([d for d, _ in picks]), np.array([k for _, k in picks])
-            rounded = D if rounded is None else rounded
-            square = float(leaves(D[None], np.zeros(1), found.square)[0])
-            if square < found.square or not len(found.keys):
-                found = Found(square, D, keys)
+        continuous = self._continuous()
+        if not self.own:
+            return self._result(continuous, (), continuous, np.inf)
+        relaxed, prices = relax(self.A, self.y, self.sets, minmax=self.task.minmax)
+        for s, z in zip(self.own, relaxed[self.fixed], strict=True):
+            s.aim(complex(z))
+        tried = [self._rounded(near[self.fixed]) for near in (continuous, relaxed, np.zeros_like(relaxed))]
+        found, plane_by_plane = min(tried, key=lambda one: one.square), tried[0].D
         if np.isinf(found.square):
-            found = self._feasible(found, start, limit, leaves)
-        polish(self.own, leaves, found, start + (0.2 if exact else 0.1) * limit)
-        if minmax:
-            sharp = best_form(A, y, prices, self.fixed, self.own, np.sqrt(found.square), (0.0,)).bound
-            q = best_form(A, y, prices, self.fixed, self.own, np.sqrt(found.square))
+            found = self._feasible(start, limit)
+        polish(self.own, self._squares, found, start + (0.2 if self.exact else 0.1) * limit)
+        if self.task.minmax:
+            shares = (self.A, self.y, prices, self.fixed, self.own, np.sqrt(found.square))
+            sharp, q = best_form(*shares, (0.0,)).bound, best_form(*shares)
         else:
-            B, c = project_out(A[:, self.free], A[:, self.fixed], y)
-            q = form(B, c, relax(B, c, self.own, minmax=False)[0], self.own)
+            centre = relax(self.inner, self.known, self.own, minmax=False)[0]
+            q = form(self.inner, self.known, centre, self.own)
             sharp = q.bound
-        found.unexplored = sharp
+        unexplored = sharp
         if found.square * (1 - _SHARP) > sharp:
-            found = search(q, self.own, leaves, found, start + limit, 4096 if exact else 8)
+            unexplored = search(q, self.own, self._squares, found, start + limit, 4096 if self.exact else 8)
             if not all(s.complete for s in self.own):
-                found.unexplored = min(found.unexplored, q.bound)
-            found.unexplored = max(found.unexplored, sharp)
-        weights = continuous.copy()
-        weights[self.fixed] = found.D
-        weights[self.free] = self._follow(found.D, minmax)
-        split = continuous.copy()
-        split[self.fixed] = rounded
-        return self._result(minmax, weights, found.keys, split, found.unexplored)
+                unexplored = min(unexplored, q.bound)
+            unexplored = max(unexplored, sharp)
+        mountings = tuple(s.mount(key) for s, key in zip(self.own, found.keys, strict=True))
+        weights, rounded = continuous.copy(), continuous.copy()
+        weights[self.fixed], rounded[self.fixed] = found.D, plane_by_plane
+        weights[self.free] = self._follow(found.D)
+        return self._result(weights, mountings, rounded, unexplored)
 
-    def _feasible(self, found: Found, start: float, limit: float, leaves: Leaves) -> Found:
+    def _rounded(self, D: ComplexArray) -> Found:
+        """Every plane by itself: the nearest vectors that can be mounted."""
+        picks = [nearest(s, complex(z)) for s, z in zip(self.own, D, strict=True)]
+        near = np.array([vectors[0] for vectors, _ in picks])
+        square = float(self._squares(near[None], np.zeros(1), np.inf)[0])
+        return Found(square, near, np.array([keys[0] for _, keys in picks]))
+
+    def _feasible(self, start: float, limit: float) -> Found:
         """A mounting that keeps every limit: the largest share of a limit made smallest."""
-        tight = self.residual[self.limited]
+        tight = self.task.residual[self.limited]
         if (tight <= 0).any():
             raise InfeasibleError("a limit of an amplitude is 0, which pieces cannot reach: relax it")
-        w = np.zeros(len(self.Y))
-        w[self.limited] = 1 / tight
-        none = np.full(len(self.Y), np.inf)
-        other = _Joint(self.W, self.Y, w, none, self.max_weight, self.planes, self.usable, self.names)
-        answer = other.best(True, start, 0.5 * limit)
+        shares = np.zeros(len(self.task.Y))
+        shares[self.limited] = 1 / tight
+        unlimited = np.full(len(shares), np.inf)
+        task = replace(self.task, row_weights=shares, residual=unlimited, minmax=True)
+        other = _Joint(task, self.planes, self.usable, self.names)
+        answer = other.best(start, 0.5 * limit)
         if answer.objective > _KEPT:
             if answer.bound > 1:
                 raise InfeasibleError(
@@ -258,85 +249,87 @@ class _Joint:
             raise InfeasibleError(
                 "no mounting that keeps every limit was found in time: allow more time, or relax a limit"
             )
-        D = answer.weights[self.fixed]
-        keys = np.array([nearest(s, complex(d))[1] for s, d in zip(self.own, D, strict=True)])
-        return Found(float(leaves(D[None], np.zeros(1), np.inf)[0]), D, keys)
+        self.own = other.own  # where not all vectors are listed these are near what keeps the limits
+        return self._rounded(answer.weights[self.fixed])
 
-    def _squares(self, A: ComplexArray, y: ComplexArray, D: ComplexArray, minmax: bool) -> FloatArray:
-        size = np.abs(y + D @ A.T) ** 2
-        squares = size.max(axis=1) if minmax else size.sum(axis=1)
-        if len(self.limited):
-            left = np.abs(self.Y[self.limited] + D @ self.W[np.ix_(self.limited, self.fixed)].T)
-            squares[(left > self.residual[self.limited] * _KEPT).any(axis=1)] = np.inf
+    def _squares(self, D: ComplexArray, bounds: FloatArray, best: float) -> FloatArray:
+        """Squared objectives of vectors (M, P'), infinite where a limit is broken; see `Squares`."""
+        if not self.exact:
+            return self._with_continuous(D, bounds, best)
+        size = np.abs(self.known + D @ self.inner.T) ** 2
+        squares = size.max(axis=1) if self.task.minmax else size.sum(axis=1)
+        if len(self.limited):  # then no plane is continuous
+            left = np.abs(self.task.Y[self.limited] + D @ self.task.W[self.limited].T)
+            squares[(left > self.task.residual[self.limited] * _KEPT).any(axis=1)] = np.inf
         return np.asarray(squares)
 
-    def _with_continuous(self, D: ComplexArray, bounds: FloatArray, best: float, minmax: bool) -> FloatArray:
+    def _with_continuous(self, D: ComplexArray, bounds: FloatArray, best: float) -> FloatArray:
         squares = np.full(len(D), np.inf)
+        weights = np.zeros(self.task.W.shape[1], dtype=complex)
         for n, (d, bound) in enumerate(zip(D, bounds, strict=True)):
             if bound > min(best, squares.min()):
                 continue
-            weights = np.zeros(self.W.shape[1], dtype=complex)
+            weights[self.fixed] = d
             try:
-                weights[self.free] = self._follow(d, minmax)
+                weights[self.free] = self._follow(d)
             except InfeasibleError:
                 continue
-            weights[self.fixed] = d
-            squares[n] = self._value(weights, minmax) ** 2
+            squares[n] = self._value(weights) ** 2
         return squares
 
-    def _follow(self, d: ComplexArray, minmax: bool) -> ComplexArray:
+    def _follow(self, d: ComplexArray) -> ComplexArray:
         """Best continuous planes for given vectors of the others."""
-        if not len(self.free):
-            return np.zeros(0, dtype=complex)
-        left = self.Y + self.W[:, self.fixed] @ d
-        return self._solve_free(self.W[:, self.free], left, self.max_weight[self.free], self.residual, minmax)
+        W, free = self.task.W, self.free
+        left = self.task.Y + W[:, self.fixed] @ d
+        most, sectors = self.task.max_weight[free], (None,) * len(free)
+        return _optimum(replace(self.task, W=W[:, free], Y=left, max_weight=most, sectors=sectors))
 
-    def _continuous(self, minmax: bool) -> ComplexArray:
+    def _continuous(self) -> ComplexArray:
         """The continuous answer, without regard to pieces; limits only where no plane has holes."""
-        most = np.where(np.isin(np.arange(len(self.sets)), self.free), self.max_weight, np.inf)
-        residual = self.residual if not len(self.fixed) else np.full(len(self.Y), np.inf)
-        return self._solve_free(self.W, self.Y, most, residual, minmax)
+        most = self.task.max_weight.copy()
+        most[self.fixed] = np.inf
+        residual = np.full(len(self.task.Y), np.inf) if self.own else self.task.residual
+        return _optimum(replace(self.task, max_weight=most, residual=residual))
 
-    def _solve_free(
-        self, W: ComplexArray, Y: ComplexArray, most: FloatArray, residual: FloatArray, minmax: bool
-    ) -> ComplexArray:
-        if not minmax and np.isinf(most).all() and np.isinf(residual).all():
-            return np.asarray(np.linalg.lstsq(self.w[:, None] * W, -self.w * Y, rcond=None)[0])
-        solver = minmax_cone if minmax else least_squares_cone
-        return solver(W, Y, row_weights=self.w, max_weight=most, residual=residual).weights
-
-    def _value(self, weights: ComplexArray, minmax: bool) -> float:
-        left = self.Y + self.W @ weights
-        if (np.abs(left[self.limited]) > self.residual[self.limited] * _KEPT).any():
-            return np.inf
-        return float(np.max(self.w * np.abs(left)) if minmax else np.linalg.norm(self.w * left))
+    def _value(self, weights: ComplexArray) -> float:
+        left = np.abs(self.task.Y + self.task.W @ weights)
+        return self.task.objective(weights) if (left <= self.task.residual * _KEPT).all() else np.inf
 
     def _result(
         self,
-        minmax: bool,
         weights: ComplexArray,
-        keys: IntArray,
-        split: ComplexArray | None,
+        mounted: tuple[Mounting, ...],
+        rounded: ComplexArray,
         unexplored: float,
     ) -> Discrete:
-        objective = self._value(weights, minmax)
-        rounded = objective if split is None else self._value(split, minmax)
+        objective, plane_by_plane = self._value(weights), self._value(rounded)
+        if plane_by_plane >= objective * (1 - 1e-7):
+            plane_by_plane = max(plane_by_plane, objective)
         lower = min(float(np.sqrt(unexplored)), objective)
         proven = bool(lower >= objective * (1 - _SHARP))
         mountings: list[Mounting | None] = [None] * len(weights)
-        for k, p in enumerate(self.fixed):
-            mountings[p] = self.own[k].mount(keys[k])
+        for p, found in zip(self.fixed, mounted, strict=True):
+            mountings[p] = found
         for p in self.free:
-            holes, usable = self.planes[p], self.usable[p]
-            if holes is not None and usable is not None:
-                mountings[p] = StepSums(holes, usable, np.inf, max(abs(weights[p]), 1e-300)).place(weights[p])
+            holes = self.planes[p]
+            if holes is not None:
+                mountings[p] = FreeAmounts(holes, self.usable[p], np.inf, np.inf).place(complex(weights[p]))
         return Discrete(
             mountings=tuple(mountings),
             weights=weights,
-            residual=self.Y + self.W @ weights,
+            residual=self.task.Y + self.task.W @ weights,
             objective=objective,
             bound=objective if proven else lower,
             gap=0.0 if proven else (objective - lower) / objective,
             proven=proven,
-            rounded_objective=max(rounded, objective) if rounded >= objective * (1 - 1e-7) else rounded,
+            rounded_objective=plane_by_plane,
         )
+
+
+def _optimum(task: Problem) -> ComplexArray:
+    """The weights of a continuous problem."""
+    if not task.W.shape[1]:
+        return np.zeros(0, dtype=complex)
+    if task.minmax or np.isfinite(task.max_weight).any() or np.isfinite(task.residual).any():
+        return solve_cone(task).weights
+    return np.asarray(solution(task.row_weights[:, None] * task.W, -task.row_weights * task.Y), dtype=complex)

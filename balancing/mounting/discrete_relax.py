@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from balancing.mounting.discrete_sets import Attainable
+from balancing.mounting.attainable import Attainable
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
+from rotorid.regression import solution, stretch, unstretch
 
 __all__ = ["Form", "best_form", "form", "project_out", "relax"]
 
@@ -128,7 +129,7 @@ def relax(
         Where the solver finds nothing.
     """
     equal = np.full(len(Y), 1.0 / len(Y))
-    free = np.linalg.lstsq(W, -Y, rcond=None)[0]
+    free = solution(W, -Y)
     rows = [_polygon(s) for s in sets]
     inside = all(_within(n, s, d) for d, (n, s) in zip(free, rows, strict=True))
     if inside and not minmax:
@@ -164,25 +165,19 @@ def _program(
         use = (n != 0) & np.isfinite(s)
         if use.any():
             block = np.zeros((int(use.sum()), 2 * P + 1))
-            block[:, p], block[:, P + p] = n[use].real, n[use].imag
+            block[:, 2 * p], block[:, 2 * p + 1] = n[use].real, n[use].imag
             size = float(np.abs(s[use]).max()) * scale[p] / unit or 1.0
             parts.append(block / size)
             right.append(s[use] * scale[p] / unit / size)
             cones.append(clarabel.NonnegativeConeT(int(use.sum())))
-    V, y = W / scale, Y / unit
-    real, imag = np.hstack((V.real, -V.imag)), np.hstack((V.imag, V.real))
-    if minmax:
-        block = np.zeros((N, 3, 2 * P + 1))
-        block[:, 0, -1], block[:, 1, :-1], block[:, 2, :-1] = -1.0, -real, -imag
-        parts.append(block.reshape(3 * N, -1))
-        right.append(np.column_stack((np.zeros(N), y.real, y.imag)).ravel())
-        cones += [clarabel.SecondOrderConeT(3)] * N
-    else:
-        block = np.zeros((2 * N + 1, 2 * P + 1))
-        block[0, -1], block[1 : N + 1, :-1], block[N + 1 :, :-1] = -1.0, -real, -imag
-        parts.append(block)
-        right.append(np.concatenate(([0.0], y.real, y.imag)))
-        cones.append(clarabel.SecondOrderConeT(2 * N + 1))
+    count = N if minmax else 1  # cones of one reading each, or of all
+    rows_of = np.zeros((count, 2 * N // count + 1, 2 * P + 1))
+    rows_of[:, 0, -1] = -1.0
+    rows_of[:, 1:, :-1] = -stretch(W / scale).reshape(count, -1, 2 * P)
+    parts.append(rows_of.reshape(-1, 2 * P + 1))
+    known = np.column_stack((np.zeros(count), stretch(Y / unit).reshape(count, -1)))
+    right.append(known.ravel())
+    cones += [clarabel.SecondOrderConeT(2 * N // count + 1)] * count
     q = np.zeros(2 * P + 1)
     q[-1] = 1.0
     settings = clarabel.DefaultSettings()
@@ -193,7 +188,7 @@ def _program(
     x, z = np.array(found.x), np.array(found.z)
     if not np.isfinite(x).all():
         raise RuntimeError("the solver found no continuous optimum: state largest weights of the planes")
-    D = (x[:P] + 1j * x[P : 2 * P]) * unit / scale
+    D = unstretch(x[:-1]) * unit / scale
     prices: FloatArray = np.full(N, 1.0 / N)
     if minmax:
         dual = np.maximum(z[-3 * N :: 3], 0.0)

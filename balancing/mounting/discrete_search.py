@@ -15,16 +15,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from balancing.mounting.attainable import MOST, Attainable, apart
 from balancing.mounting.discrete_relax import Form
-from balancing.mounting.discrete_sets import Attainable
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-__all__ = ["Found", "Leaves", "nearest", "polish", "search"]
+__all__ = ["Found", "Squares", "polish", "search"]
 
-Leaves = Callable[[ComplexArray, FloatArray, float], FloatArray]
+Squares = Callable[[ComplexArray, FloatArray, float], FloatArray]
 """Squared objectives (M,) of vectors (M, P), given lower bounds (M,) and the best known square."""
 
-_MOST = 1_500_000
 _FIRST = 24.0
 _ROUNDING = 1e-9
 _NEAR = 400
@@ -38,35 +37,9 @@ class Found:
     square: float
     D: ComplexArray
     keys: IntArray
-    unexplored: float = np.inf
 
 
-def nearest(one: Attainable, z: complex) -> tuple[complex, IntArray]:
-    """The vector nearest to z and its key."""
-    low = _apart(one, z)
-    radius = max(low, 0.0) + one.spacing
-    while radius < 4 * (abs(z) + one.reach):
-        hit = one.near(z, low, radius, _MOST)
-        if hit is None:
-            radius = max(low, 0.0) + (radius - max(low, 0.0)) / 8
-            continue
-        if len(hit[0]):
-            return complex(hit[0][0]), hit[1][0]
-        low, radius = radius, radius + 2 * (radius - max(low, 0.0))
-    raise ValueError("nothing can be mounted within the largest weight of a plane")
-
-
-def _apart(one: Attainable, z: complex) -> float:
-    """A distance from z (or −1) within which there are no vectors."""
-    far = -1.0
-    for towards in (z, z + one.mounted):
-        if towards != 0:
-            n = towards / abs(towards)
-            far = max(far, float((np.conj(n) * z).real) + one.lowest(-n))
-    return far - 1e-9 * (abs(z) + one.spacing) if far > 0 else -1.0
-
-
-def polish(sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float) -> None:
+def polish(sets: Sequence[Attainable], squares: Squares, best: Found, until: float) -> None:
     """Improve a mounting by exchanging vectors of one plane, and of two planes, for near ones."""
     P, gain = len(sets), True
     while gain and time.perf_counter() < until:
@@ -85,10 +58,10 @@ def polish(sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float
                     )
                 D = np.repeat(best.D[None], len(i), axis=0)
                 D[:, p], D[:, q] = own[0][i], other[0][j]
-                squares = leaves(D, np.zeros(len(i)), best.square)
-                n = int(np.argmin(squares))
-                if squares[n] < best.square:
-                    best.square, best.D = float(squares[n]), D[n]
+                found = squares(D, np.zeros(len(i)), best.square)
+                n = int(np.argmin(found))
+                if found[n] < best.square:
+                    best.square, best.D = float(found[n]), D[n]
                     best.keys[p], best.keys[q] = own[1][i[n]], other[1][j[n]]
         gain = best.square < before * (1 - _ROUNDING)
 
@@ -97,7 +70,7 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
     """About `count` vectors near z."""
     radius = one.spacing * float(np.sqrt(count / np.pi))
     for _ in range(60):
-        hit = one.near(z, -1.0, radius, _MOST)
+        hit = one.near(z, -1.0, radius, MOST)
         if hit is None:
             radius /= 2
         elif len(hit[0]) < count / 8 and radius < 4 * one.reach:
@@ -108,8 +81,8 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
 
 
 def search(
-    form: Form, sets: Sequence[Attainable], leaves: Leaves, start: Found, until: float, chunk: int = 4096
-) -> Found:
+    form: Form, sets: Sequence[Attainable], squares: Squares, start: Found, until: float, chunk: int = 4096
+) -> float:
     """Improve `start` until nothing better can exist, or the time (`time.perf_counter`) is `until`.
 
     Parameters
@@ -118,7 +91,7 @@ def search(
         Lower bound of the squared objective.
     sets
         Attainable vectors of each plane, in the order of the planes.
-    leaves
+    squares
         Squared objectives; infinite where a limit is broken.
     start
         Best mounting known; its square may be infinite.
@@ -129,20 +102,18 @@ def search(
 
     Returns
     -------
-    Found
-        With `unexplored` the lowest bound of what was not looked at, infinite if nothing was left out.
+    The lowest bound of what was not looked at, infinite if nothing was left out.
     """
-    run = _Run(form, sets, leaves, start, until, chunk)
-    start.unexplored = run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
-    return start
+    run = _Run(form, sets, squares, start, until, chunk)
+    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
 
 
 class _Run:
     def __init__(
-        self, form: Form, sets: Sequence[Attainable], leaves: Leaves, best: Found, until: float, chunk: int
+        self, form: Form, sets: Sequence[Attainable], squares: Squares, best: Found, until: float, chunk: int
     ) -> None:
         self.chunk = chunk
-        self.form, self.leaves, self.best, self.until = form, leaves, best, until
+        self.form, self.squares, self.best, self.until = form, squares, best, until
         self.sets = [sets[p] for p in form.order]
         self.size = np.abs(np.diagonal(form.R)) ** 2
         self.keys = np.zeros((len(form.order), 3), dtype=np.int64)
@@ -162,7 +133,7 @@ class _Run:
         # |R|²|d − c|² + linear(d) = |R|²|d − z|² + shift
         base = bound - self.form.m[k] + shift
         everything = 2 * self.sets[k].reach + abs(c)
-        low, left = _apart(self.sets[k], c), np.inf
+        low, left = apart(self.sets[k], c), np.inf
         known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST))
         while True:
             needed = everything
@@ -178,7 +149,7 @@ class _Run:
             if time.perf_counter() > self.until:
                 return min(left, float(max(bound, base + size * inner**2)))
             radius = min(max(known, 1e-9 * everything), needed)
-            hit = self.sets[k].near(c, low, radius, _MOST)
+            hit = self.sets[k].near(c, low, radius, MOST)
             if hit is None:
                 thinner = inner + (radius - inner) / 4
                 if thinner - inner < 1e-9 * everything or not thinner < radius:
@@ -238,7 +209,7 @@ class _Run:
         points, keys, bounds = points[good], keys[good], bounds[good]
         vectors = np.repeat(D[None], len(points), axis=0)
         vectors[:, 0] = points
-        squares = self.leaves(vectors[:, self.back], bounds, self.best.square)
+        squares = self.squares(vectors[:, self.back], bounds, self.best.square)
         n = int(np.argmin(squares))
         if squares[n] < self.best.square:
             self.keys[0] = keys[n]

@@ -116,7 +116,7 @@ class Mounting:
     vector: complex
 
 
-def equal_holes(n: int, first: float = 0.0, direction: int = 1) -> FloatArray:
+def equal_holes(n: int, first: float = 0.0) -> FloatArray:
     """Angles of n equally spaced holes, 0 … 2π, shape (n,).
 
     Parameters
@@ -124,26 +124,22 @@ def equal_holes(n: int, first: float = 0.0, direction: int = 1) -> FloatArray:
     n
         Number of holes.
     first
-        Angle of hole 1, rad with the rotation.
-    direction
-        +1 where the numbers grow with the rotation, −1 against it.
+        Angle of hole 1, rad.
 
     Returns
     -------
-    In rad with the rotation, 0 … 2π, in the order of the numbers.
+    In rad, 0 … 2π, in the order of the numbers, which grow as angles are counted.
 
     Raises
     ------
     ValueError
-        For fewer than one hole, an angle that is not finite, another direction.
+        For fewer than one hole, an angle that is not finite.
     """
     if isinstance(n, bool) or n != int(n) or n < 1:
         raise ValueError(f"the number of holes must be a whole number of 1 or more; got {n}")
-    if direction not in (1, -1):
-        raise ValueError(f"the holes are numbered with (+1) or against (−1) the rotation; got {direction}")
     if not np.isfinite(first):
         raise ValueError("the angle of the first hole must be a finite number")
-    angles = np.mod(first + direction * 2 * np.pi * np.arange(int(n)) / int(n), 2 * np.pi)
+    angles = np.mod(first + 2 * np.pi * np.arange(int(n)) / int(n), 2 * np.pi)
     return np.where(angles >= 2 * np.pi, 0.0, angles)
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,14 +13,10 @@ from balancing.correction.correction_result import Correction
 from balancing.correction.stack_errors import stack_errors
 from balancing.data.trials import Trials
 from balancing.mounting.discrete import solve_discrete
-from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.holes import Holes
 from balancing.mounting.mounted_result import Mounted
-from balancing.mounting.split import split
 from balancing.solvers.error_propagation import prediction_covariance
 from rotorid.base.arrays import FloatArray
-
-if TYPE_CHECKING:
-    pass
 
 
 def mount(
@@ -96,17 +90,6 @@ def mount(
         time_limit=time_limit,
         names=planes,
     )
-    found = replace(found, mountings=tuple(map(_fewest, found.mountings, own)))
     after = Y + (W @ found.weights).reshape(Y.shape)
     after_covariance = None if errors is None else errors.check_run(total + found.weights, after)
     return Mounted(correction, own, found, after, after_covariance, None if stays is None else stays[0])
-
-
-def _fewest(chosen: Mounting | None, holes: Holes | None) -> Mounting | None:
-    """The same vector with the fewest pieces: opposite ones that cancel are left out."""
-    if chosen is None or holes is None or holes.free_amounts:
-        return chosen
-    same = split(chosen.vector, holes)
-    if abs(same.error) > 1e-9 * max(abs(chosen.vector), float(holes.pieces.min())):
-        return chosen
-    return same.mounting if same.pieces < int(chosen.counts.sum()) else chosen

@@ -13,11 +13,12 @@ the hole is symmetric about its axis, so only the distance R − z along the axi
 material does less. A drill of diameter d and tip angle τ leaves a cone of height t = (d/2)/tan(τ/2) below the
 cylinder of depth h. With A = π d²/4, the cone's volume A t/3 and its centre of mass t/4 below its base,
 
-    u/ρ = A h (R − h/2) + (A t/3)(R − h − t/4),
+    u/ρ = A h (R − h/2) + (A t/3)(R − h − t/4).
 
-a quadratic equation for h. A tip that has not yet gone in up to the full diameter leaves a cone of height
-s < t only, u/ρ = (π/3) tan²(τ/2) s³ (R − s/4). Both rise with depth as long as the tip stays outside the
-centre of the rotor. The surface is taken as flat across the hole (the part missing is d²/(32 R) of depth).
+A tip that has not yet gone in up to the full diameter leaves a cone of height s < t only, u/ρ =
+(A t/3)(s/t)³(R − s/4). Both rise with depth as long as the tip stays outside the centre of the rotor, and
+the depth follows from u as the root. The surface is taken as flat across the hole (the part missing is
+d²/(32 R) of depth).
 
 **Axial hole** (parallel to the axis of the rotor, at the radius r): u = ρ V r, the same V(h).
 
@@ -131,30 +132,16 @@ class Drill:
                 f"{1e6 * unbalance:.4g} g·mm: even down to the centre it takes "
                 f"{1e6 * self.removed(self.radius)[1]:.4g} g·mm; use a larger drill or several holes"
             )
-        t, A = self.tip_height, np.pi * self.diameter**2 / 4
-        if unbalance <= self.removed(t)[1]:
-            return self._tip_only(unbalance)
-        volume = unbalance / (self.density * A)
-        if self.way == "axial":
-            return float(volume / self.radius - t / 3 + t)
-        b, c = self.radius - t / 3, volume - t / 3 * (self.radius - t / 4)
-        return float(2 * c / (b + np.sqrt(max(b * b - 2 * c, 0.0))) + t)
+        from scipy.optimize import brentq
 
-    def _tip_only(self, unbalance: float) -> float:
-        """Depth of a hole that is a part of the tip's cone only."""
-        if unbalance == 0:
-            return 0.0
-        slope = np.tan(self.tip_angle / 2)
-        cube = 3 * unbalance / (self.density * np.pi * slope**2)
-        if self.way == "axial":
-            return float(np.cbrt(cube / self.radius))
-        s = float(np.cbrt(cube / self.radius))
-        for _ in range(100):  # s³ = cube/(R − s/4) contracts: s ≤ t < R changes it little
-            new = float(np.cbrt(cube / (self.radius - s / 4)))
-            if abs(new - s) <= 1e-16 * self.radius:
-                break
-            s = new
-        return s
+        area = self.density * np.pi * self.diameter**2 / 4
+        flat = unbalance / (area * self.radius)
+        deepest = self.radius if self.way == "radial" else 2 * flat + self.tip_height
+
+        def missing(depth: float) -> float:
+            return self.removed(depth)[1] - unbalance
+
+        return float(brentq(missing, 0.0, deepest, xtol=1e-15 * deepest, rtol=1e-15)) if unbalance else 0.0
 
 
 @dataclass(frozen=True, eq=False)

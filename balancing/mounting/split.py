@@ -17,15 +17,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from balancing.data.conventions import Labels
-from balancing.mounting.holes import Holes, Mounting, mounting
-from balancing.mounting.split_amounts import nearest_amounts
-from balancing.mounting.split_pieces import nearest_pieces
+from balancing.mounting.attainable import Attainable, nearest
+from balancing.mounting.free_amounts import FreeAmounts
+from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.piece_sums import PieceSums
 from rotorid.base.text import percent
 
 _PROVEN = 1e-9
+_TIE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ class Split:
         """What goes where, hole by hole, such as "2 × 10 g in hole 7 (at 120°)"."""
         out = []
         for h in np.flatnonzero(self.mounting.amounts):
-            angle = float(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            (angle,) = labels.directions(self.holes.angles[[h]])
             out.append(
                 f"{self._content(int(h), labels)} in hole {self.holes.names[h]} (at {_degrees(angle)})"
             )
@@ -88,15 +89,15 @@ class Split:
         """As JSON types, in the labels' unit and angles."""
         rows = []
         for h in np.flatnonzero(self.mounting.amounts):
-            angle = _plain(labels.weight(np.exp(1j * self.holes.angles[h]))[1])
+            entry = labels.weight_entry(self.mounting.amounts[h] * np.exp(1j * self.holes.angles[h]))
             counts = self.mounting.counts[h]
             rows.append(
                 {
                     "hole": self.holes.names[h],
-                    "angle_deg": angle,
-                    "mass": _plain(self.mounting.amounts[h] * labels.weight_scale),
+                    "angle_deg": entry["angle_deg"],
+                    "mass": entry["mass"],
                     "pieces": [
-                        {"count": int(n), "mass": _plain(piece * labels.weight_scale)}
+                        {"count": int(n), "mass": labels.weight_entry(piece)["mass"]}
                         for n, piece in zip(counts, self.holes.pieces, strict=bool(counts.size))
                         if n
                     ],
@@ -226,12 +227,7 @@ def split(
 
 
 def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
-    if holes.free_amounts:
-        amounts = nearest_amounts(target, holes)
-        mounted, bound = mounting(holes, amounts=amounts), np.inf
-    else:
-        counts, bound = nearest_pieces(target, holes, most_pieces)
-        mounted = mounting(holes, counts=counts)
+    mounted, bound = _mounted(target, holes, most_pieces)
     error = mounted.vector - target
     size = abs(error)
     bound = min(bound, size)
@@ -246,6 +242,30 @@ def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
         bound=bound,
         proven=bool(size - bound <= _PROVEN * scale),
     )
+
+
+def _mounted(target: complex, holes: Holes, most_pieces: int | None) -> tuple[Mounting, float]:
+    """The nearest vector, and a distance within which there is nothing else."""
+    scale = max(abs(target), holes.step, float(holes.pieces.max(initial=0.0)))
+    if not holes.free_amounts:
+        sums = PieceSums(holes, holes.free, holes.max_weight, most_pieces)
+        sums.aim(target)
+        return _fewest(sums, target, scale), np.inf if sums.complete else sums.bound(target)
+    needed = np.inf if np.isfinite(holes.max_weight) else 2 * scale
+    amounts = FreeAmounts(holes, holes.free, holes.max_weight, needed)
+    return _fewest(amounts, target, scale) if holes.step else amounts.place_nearest(target), np.inf
+
+
+def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
+    """Of the nearest vectors that of the fewest pieces (or holes in use), then of the least weight."""
+    toward = np.conj(target) / (abs(target) or 1.0)
+
+    def cost(found: Mounting) -> tuple[float, ...]:
+        number = found.counts.sum() if found.counts.size else np.count_nonzero(found.amounts)
+        along = (toward * found.vector).real  # of equal weights that nearest to the direction of the target
+        return float(number), round(found.amounts.sum() / scale, 9), round(-along / scale, 9)
+
+    return min((one.mount(key) for key in nearest(one, target, _TIE * scale)[1]), key=cost)
 
 
 def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
@@ -265,8 +285,3 @@ def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
 
 def _degrees(angle: float) -> str:
     return f"{round(angle, 2) % 360:g}°"
-
-
-def _plain(value: ArrayLike) -> float:
-    """Without the last digits, in which conversions of units and angles show."""
-    return float(f"{float(np.asarray(value)):.12g}")

@@ -186,10 +186,9 @@ def mounted_discs(m: Mounted) -> Figure:
 def seen_from(labels: Labels, clockwise: bool = False) -> str:
     """From which end the discs are seen and how angles count, in words."""
     way = "clockwise" if clockwise else "counter-clockwise"
-    turn = "with" if labels.angle_sign > 0 else "against"
     return (
         f"Seen from the end from which the rotor turns {way}; "
-        f"angles from the mark (triangle) {turn} the rotation"
+        f"angles from the mark (triangle) {labels.side} the rotation"
     )
 
 
@@ -220,7 +219,7 @@ def _at(z: complex, clockwise: bool) -> tuple[float, float]:
 def _dial(ax: Axes, labels: Labels, clockwise: bool) -> None:
     """Degrees around the disc as the job counts them, and the mark at 0°."""
     for degrees in range(0, 360, 30):
-        way = complex(np.exp(1j * np.radians(labels.angle_sign * degrees)))
+        way = complex(np.exp(1j * np.radians(labels.with_rotation(degrees))))
         (x0, y0), (x1, y1) = _at(way, clockwise), _at(1.03 * way, clockwise)
         ax.plot([x0, x1], [y0, y1], color="black", lw=0.8)
         x, y = _at((_TICKS + 0.02) * way, clockwise)

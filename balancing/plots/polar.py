@@ -79,7 +79,7 @@ def overview(c: Correction) -> Figure:
 
 def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     """Polar picture of the correction weights, one arrow per plane, with 95 % regions and largest weights."""
-    polar = _polar(ax, c.labels.angle_sign * c.labels.drawn_sign)
+    polar = polar_axes(ax, c.labels.angles_on_paper, "vectors")
     mass, angle = c.labels.weight(c.weights)
     regions = _regions(c)
     for p, plane in enumerate(c.planes):
@@ -113,17 +113,10 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
 
 def _regions(c: Correction) -> ComplexArray | None:
     """Boundary (P, n) of the 95 % region of each weight; None where errors are unknown."""
-    from balancing.solvers.error_propagation import region_radius
+    from balancing.solvers.error_propagation import region_edge
 
     covariance = c.plane_covariance
-    if covariance is None:
-        return None
-    values, axes = np.linalg.eigh(covariance)
-    turn = np.linspace(0.0, 2 * np.pi, 181)
-    circle = np.stack((np.cos(turn), np.sin(turn)))
-    reach = region_radius(c.dof) * np.sqrt(np.maximum(values, 0.0))
-    edge = (axes * reach[:, None, :]) @ circle
-    return np.asarray(c.weights[:, None] + edge[:, 0] + 1j * edge[:, 1])
+    return None if covariance is None else region_edge(c.weights, covariance, c.dof, 180)
 
 
 def _largest_weights(polar: PolarAxes, c: Correction, reach: float) -> None:
@@ -171,7 +164,7 @@ def _amplitude_limits(ax: Axes, c: Correction, x: FloatArray) -> None:
 
 def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: bool = True) -> Axes:
     """Polar picture of the vibration vectors at one speed (index), before and after, one per sensor."""
-    polar = _polar(ax, c.labels.phase_sign)
+    polar = polar_axes(ax, c.labels.phases_on_paper, "vectors")
     old, old_phase = (v[speed] for v in c.labels.vibration(c.before))
     new, new_phase = (v[speed] for v in c.labels.vibration(c.after))
     for k, sensor in enumerate(c.sensors):
@@ -192,8 +185,6 @@ def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: 
 
 def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     """Amplitudes before and after for every speed and sensor, with 95 % of a check run where known."""
-    from balancing.solvers.error_propagation import region_radius
-
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -205,8 +196,7 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     note = "predicted after"
     error: Any = None
     if c.after_covariance is not None:
-        spread = np.sqrt(np.linalg.eigvalsh(c.after_covariance)[..., -1]).ravel() * c.labels.vibration_scale
-        reach = region_radius(c.dof) * spread
+        reach = c.within(c.after_covariance)
         error = [np.minimum(reach, new), reach]
         note += ", 95 % of a check run"
     _amplitude_limits(ax, c, x)
@@ -249,13 +239,20 @@ def _name_bars(ax: Axes, c: Correction, x: FloatArray) -> None:
     upper.spines["top"].set_visible(False)
 
 
-def _polar(ax: Axes | None, sign: int) -> PolarAxes:
+def polar_axes(ax: Axes | None, sign: int, what: str, height: float = 5) -> PolarAxes:
+    """The axes, or those of a new figure: angles grow counter-clockwise where `sign` is +1.
+
+    Raises
+    ------
+    ValueError
+        For axes that are not polar; begins with `what` is drawn.
+    """
     if ax is None:
         from matplotlib.figure import Figure
 
-        ax = Figure(figsize=(5, 5), layout="constrained").add_subplot(projection="polar")
+        ax = Figure(figsize=(5, height), layout="constrained").add_subplot(projection="polar")
     if ax.name != "polar":
-        raise ValueError("vectors are drawn in polar axes: make them with projection='polar'")
+        raise ValueError(f"{what} are drawn in polar axes: make them with projection='polar'")
     polar = cast("PolarAxes", ax)
     polar.set_theta_zero_location("E")
     polar.set_theta_direction(1 if sign > 0 else -1)

@@ -6,11 +6,11 @@ job says; angles are written as the job counts them.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.plots.polar import MARKERS, corrections
+from balancing.plots.polar import MARKERS, corrections, polar_axes
 from rotorid.base.style import COLORS
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def overview(c: Correction, v: Verdict) -> Figure:
 
 def tolerance_circles(t: Tolerance, ax: Axes | None = None) -> Axes:
     """Circles of the permissible residual unbalance of each plane (without planes: of the rotor), g·mm."""
-    polar = _axes(ax, 1)
+    polar = polar_axes(ax, 1, "tolerance circles", 6)
     circles = dict(zip(t.planes, t.limits * _GRAM_MM, strict=True)) or {"whole rotor": t.total * _GRAM_MM}
     for k, (name, limit) in enumerate(circles.items()):
         _circle(polar, float(limit), k, f"{name}: {limit:.4g} g·mm")
@@ -70,7 +70,7 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
     rows = [row for row in v.rows if row.kind == "plane"]
     if not rows:
         raise ValueError("this verdict has no planes to draw: give a tolerance")
-    polar = _axes(ax, v.labels.angle_sign * v.labels.drawn_sign)
+    polar = polar_axes(ax, v.labels.angles_on_paper, "tolerance circles", 6)
     scale = v.labels.weight_scale
     largest = max(max(row.limit, row.size) for row in rows) * scale
     for k, row in enumerate(rows):
@@ -109,7 +109,7 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
         raise ValueError(
             "this trial weight has no angle to draw: give the phase of the initial reading and the lag"
         )
-    polar = _axes(ax, t.labels.angle_sign * t.labels.drawn_sign)
+    polar = polar_axes(ax, t.labels.angles_on_paper, "tolerance circles", 6)
     size, angle = t.labels.weight(t.amount * np.exp(1j * t.angle))
     theta, radius = np.deg2rad(float(angle)), float(size)
     polar.plot([theta, theta], [0, radius], color=COLORS[0], lw=2.2)
@@ -134,17 +134,3 @@ def _circle(polar: PolarAxes, limit: float, k: int, label: str) -> None:
 
 def _legend(polar: PolarAxes) -> None:
     polar.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize="small", ncols=2)
-
-
-def _axes(ax: Axes | None, sign: int) -> PolarAxes:
-    if ax is None:
-        from matplotlib.figure import Figure
-
-        ax = Figure(figsize=(5, 6), layout="constrained").add_subplot(projection="polar")
-    if ax.name != "polar":
-        raise ValueError("tolerance circles are drawn in polar axes: make them with projection='polar'")
-    polar = cast("PolarAxes", ax)
-    polar.set_theta_direction(1 if sign > 0 else -1)
-    polar.tick_params(labelsize="small")
-    polar.grid(color="#CCCCCC", lw=0.6)
-    return polar

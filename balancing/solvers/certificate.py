@@ -14,12 +14,13 @@ bound needs no trust in the solver that proposed a and u; it holds up to the rou
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from balancing.data.limits import Arc
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.regression import gain
 
 _ROUNDING = 1e-11
 _SPREAD = 1e-6
@@ -58,6 +59,15 @@ class Problem:
         """What is minimised."""
         size = self.row_weights * np.abs(self.Y + self.W @ weights)
         return float(size.max() if self.minmax else np.linalg.norm(size))
+
+    def of_planes(self, chosen: BoolArray) -> Problem:
+        """The same of some planes (P,) only."""
+        return replace(
+            self,
+            W=self.W[:, chosen],
+            max_weight=self.max_weight[chosen],
+            sectors=tuple(s for s, c in zip(self.sectors, chosen, strict=True) if c),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,16 +148,11 @@ def _corrected(problem: Problem, a: ComplexArray, u: ComplexArray) -> tuple[Comp
     there = np.zeros(len(w))
     np.divide(np.abs(z), unit, out=there, where=unit > 0)
     spread = unit * (np.sqrt(there + _SPREAD * there.max()) if problem.minmax else 1.0)
-    scale = np.linalg.norm(W, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    Q, R = np.linalg.qr(spread[:, None] * (W / scale))  # (spread W)ᴴ δ' = Rᴴ Qᴴ δ'
+    smallest = gain(spread[:, None] * W).conj().T  # of the solutions δ' of (spread W)ᴴ δ' = move
     for _ in range(2):
         g = W.conj().T @ (a + u)
-        move = np.array([project(-v, s) for v, s in zip(g.tolist(), sectors, strict=True)]) / scale
-        try:
-            change = spread * (Q @ np.linalg.solve(R.conj().T, move))
-        except np.linalg.LinAlgError:  # dependent planes: any solution will do
-            change = spread * (Q @ np.linalg.lstsq(R.conj().T, move, rcond=1e-13)[0])
+        move = np.array([project(-v, s) for v, s in zip(g.tolist(), sectors, strict=True)])
+        change = spread * (smallest @ move)
         a, u = a + np.where(on, change, 0.0), u + np.where(on, 0.0, change)
     return a, u
 

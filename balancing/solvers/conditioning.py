@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from balancing.coefficients.identifiability import scaled_columns, separation
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.json import finite
-from rotorid.base.text import counted, sentence
-from rotorid.regression import RCOND
+from rotorid.base.json import plain
+from rotorid.base.result import Column, rows
+from rotorid.base.text import counted, sentence, wrap
+from rotorid.regression import solution
 
 ALIKE = 0.1
 """Planes are named that do the same but for this share of their effect (two such: condition number 20)."""
@@ -47,7 +48,7 @@ class Alike:
         parts = [_part(r, other) for r, other in zip(self.ratios, self.others, strict=True)]
         names = ", ".join(map(repr, self.others))
         do = "does" if len(parts) == 1 else "together do"
-        but = f", but for {_percent(self.share)} of the effect" if self.share > NOTHING else ""
+        but = f", but for {100 * self.share:.2g} % of the effect" if self.share > NOTHING else ""
         return (
             f"planes {names} and {self.plane!r} act alike: {' and '.join(parts)} {do} "
             f"what a weight does in {self.plane!r}{but}"
@@ -102,31 +103,21 @@ class Conditioning:
         lines += [sentence(a.words) for a in self.alike]
         if not self.alike and not self.without_effect and P > 1:
             lines.append(
-                f"No planes act alike: each does more than {_percent(ALIKE)} that the others cannot do."
+                f"No planes act alike: each does more than {100 * ALIKE:g} % that the others cannot do."
             )
-        return "\n".join(textwrap.fill(line, 80, subsequent_indent="  ") for line in lines)
+        return "\n".join(wrap(line, "  ") for line in lines)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; an infinite condition number is None, ratios count angles with the rotation."""
-        return {
-            "planes": list(self.planes),
-            "readings": self.readings,
-            "singular_values": self.singular_values.tolist(),
-            "condition_number": finite(self.condition_number),
-            "rank": self.rank,
-            "without_effect": list(self.without_effect),
-            "alike": [
-                {
-                    "plane": a.plane,
-                    "others": list(a.others),
-                    "ratios": np.abs(a.ratios).tolist(),
-                    "turned_deg": np.degrees(np.angle(a.ratios)).tolist(),
-                    "share_not_alike": a.share,
-                    "words": a.words,
-                }
-                for a in self.alike
-            ],
-        }
+        alike = (
+            Column("plane", [a.plane for a in self.alike]),
+            Column("others", [a.others for a in self.alike]),
+            Column("ratios", [np.abs(a.ratios) for a in self.alike]),
+            Column("turned_deg", [np.degrees(np.angle(a.ratios)) for a in self.alike]),
+            Column("share_not_alike", [a.share for a in self.alike]),
+            Column("words", [a.words for a in self.alike]),
+        )
+        return plain({**vars(self), "alike": rows(alike)})
 
 
 def conditioning(W: ArrayLike, planes: Sequence[str], row_weights: ArrayLike | None = None) -> Conditioning:
@@ -160,27 +151,25 @@ def conditioning(W: ArrayLike, planes: Sequence[str], row_weights: ArrayLike | N
       rotation, does what a weight does in 'B', but for 0.82 % of the effect.
     """
     K, _, w = check_stack(W, np.zeros(len(np.atleast_1d(W))), row_weights)
-    N, P = K.shape
+    P = K.shape[1]
     if len(planes) != P or len(set(planes)) != P:
         raise ValueError(f"{P} different names of planes are needed; got {list(planes)}")
     K = w[:, None] * K
-    B, lengths = scaled_columns(K)
-    singular = np.zeros(P)
-    singular[: min(N, P)] = np.linalg.svd(B, compute_uv=False)
-    rank = int(np.count_nonzero(singular > RCOND * singular[0]))
+    told = separation(K)
+    there = np.flatnonzero(told.lengths)
     return Conditioning(
         planes=tuple(planes),
         readings=int(np.count_nonzero(w)),
-        singular_values=singular,
-        condition_number=float(singular[0] / singular[-1]) if rank == P else float("inf"),
-        rank=rank,
-        without_effect=tuple(name for name, length in zip(planes, lengths, strict=True) if length == 0),
-        alike=_groups(K, [int(p) for p in np.flatnonzero(lengths > 0)], planes),
+        singular_values=told.singular_values,
+        condition_number=told.condition_number,
+        rank=told.rank,
+        without_effect=tuple(planes[p] for p in range(P) if p not in there),
+        alike=_groups(K, [int(p) for p in there], planes),
     )
 
 
 def check_stack(
-    W: ArrayLike, Y: ArrayLike, row_weights: ArrayLike | None
+    W: ArrayLike, Y: ArrayLike, row_weights: ArrayLike | None = None
 ) -> tuple[ComplexArray, ComplexArray, FloatArray]:
     """W (N, P), Y (N,) and row weights (N,; default 1) as arrays; NaN and shapes that do not fit are refused.
 
@@ -190,22 +179,29 @@ def check_stack(
         In plain words.
     """
     K, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    if K.ndim != 2 or y.shape != K.shape[:1] or 0 in K.shape:
+    if K.ndim != 2 or 0 in K.shape:
         raise ValueError(
-            f"W must be (readings, planes) and Y (readings,), not empty; got {K.shape} and {y.shape}"
+            f"the influence coefficients must have shape (readings, planes), not empty; got {K.shape}"
         )
+    if y.shape != K.shape[:1]:
+        raise ValueError(f"the vibration must have shape {K.shape[:1]}; got {y.shape}")
     if not (np.isfinite(K).all() and np.isfinite(y).all()):
-        raise ValueError("the influence coefficients and vibrations must be numbers; found NaN or infinity")
+        raise ValueError("influence coefficients and vibration must be finite; found NaN or infinity")
     w = np.ones(len(y)) if row_weights is None else np.asarray(row_weights, dtype=np.float64)
     if w.shape != y.shape or not np.isfinite(w).all() or (w < 0).any() or not w.any():
-        raise ValueError("there must be one weight per reading, none negative or NaN, not all zero")
+        raise ValueError(f"the row weights must be {len(y)} finite numbers ≥ 0, not all zero")
     return K, y, w
 
 
-def scaled_columns(K: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-    """Columns of K (N, P) divided by their lengths (P,), and these; columns of zeros stay."""
-    lengths = np.linalg.norm(K, axis=0)
-    return K / np.where(lengths > 0, lengths, 1.0), lengths
+def check_channels(channels: ArrayLike, W: ComplexArray) -> FloatArray:
+    """Covariances of (Re Y, Im Y, Re W₁, …) of each reading, as arrays that fit W (N, P)."""
+    C = np.asarray(channels, dtype=np.float64)
+    N, P = W.shape
+    if C.shape != (N, 2 * P + 2, 2 * P + 2):
+        raise ValueError(f"the covariances must have shape {(N, 2 * P + 2, 2 * P + 2)}; got {C.shape}")
+    if not np.isfinite(C).all():
+        raise ValueError("the covariances must be finite; found NaN or infinity")
+    return C
 
 
 def _groups(K: ComplexArray, left: list[int], planes: Sequence[str]) -> tuple[Alike, ...]:
@@ -239,11 +235,9 @@ def _most_alike_pair(K: ComplexArray, left: list[int]) -> tuple[list[int], int]:
 
 def _stand_in(K: ComplexArray, others: list[int], plane: int) -> tuple[ComplexArray, float]:
     """Weights in the others that do most nearly what 1 does in the plane, and the share they leave."""
-    B, lengths = scaled_columns(K[:, others])
-    size = float(np.linalg.norm(K[:, plane]))
-    unit = K[:, plane] / size
-    x = np.linalg.lstsq(B, unit, rcond=RCOND)[0]
-    return np.asarray(x * size / lengths), min(float(np.linalg.norm(unit - B @ x)), 1.0)
+    x = solution(K[:, others], K[:, plane])
+    share = np.linalg.norm(K[:, plane] - K[:, others] @ x) / np.linalg.norm(K[:, plane])
+    return np.asarray(x), min(float(share), 1.0)
 
 
 def _part(ratio: complex, plane: str) -> str:
@@ -254,7 +248,3 @@ def _part(ratio: complex, plane: str) -> str:
         return text
     turn = "" if abs(degrees) == 180 else f" {'with' if degrees > 0 else 'against'} the rotation"
     return f"{text}, turned by {abs(degrees)}°{turn},"
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"

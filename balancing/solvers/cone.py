@@ -16,17 +16,15 @@ from numpy.typing import ArrayLike
 
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Bound, Problem, lower_bound
+from balancing.solvers.conditioning import check_stack
 from balancing.solvers.cone_program import TIGHTER, InfeasibleError, Program, SolverError, within_limits
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 __all__ = [
     "Cone",
     "InfeasibleError",
-    "least_squares_cone",
-    "minmax_cone",
     "problem",
     "solve_cone",
-    "weight_budget_cone",
 ]
 
 AT_LIMIT = 1e-6
@@ -72,16 +70,18 @@ class Cone:
     weight_prices: FloatArray
 
 
-def least_squares_cone(
+def problem(
     W: ArrayLike,
     Y: ArrayLike,
-    *,
     row_weights: ArrayLike | None = None,
     max_weight: ArrayLike | None = None,
     residual: ArrayLike | None = None,
     sectors: Sequence[Arc | None] | None = None,
-) -> Cone:
-    """Weights D that minimise sqrt(Σ wᵢ² |Yᵢ + Wᵢ D|²) within limits.
+    *,
+    minmax: bool = False,
+    budget: float = np.inf,
+) -> Problem:
+    """The problem: weights D that minimise sqrt(Σ wᵢ² |Yᵢ + Wᵢ D|²) within limits.
 
     Parameters
     ----------
@@ -96,87 +96,31 @@ def least_squares_cone(
     sectors
         For each plane None or the convex arc (start, width ≤ π), rad, in which its weight must stand (or be
         zero).
-
-    Raises
-    ------
-    InfeasibleError
-        Where no weights are within the limits.
-    ValueError
-        For NaN, shapes that do not fit, negative limits.
-    SolverError
-        Where the solver does not come near the optimum.
-    """
-    return solve_cone(problem(W, Y, row_weights, max_weight, residual, sectors))
-
-
-def minmax_cone(
-    W: ArrayLike,
-    Y: ArrayLike,
-    *,
-    row_weights: ArrayLike | None = None,
-    max_weight: ArrayLike | None = None,
-    residual: ArrayLike | None = None,
-    sectors: Sequence[Arc | None] | None = None,
-) -> Cone:
-    """Weights D that minimise max wᵢ |Yᵢ + Wᵢ D| within limits; parameters as for `least_squares_cone`."""
-    return solve_cone(problem(W, Y, row_weights, max_weight, residual, sectors, minmax=True))
-
-
-def weight_budget_cone(
-    W: ArrayLike,
-    Y: ArrayLike,
-    budget: float,
-    *,
-    minmax: bool = False,
-    row_weights: ArrayLike | None = None,
-    max_weight: ArrayLike | None = None,
-    residual: ArrayLike | None = None,
-    sectors: Sequence[Arc | None] | None = None,
-) -> Cone:
-    """Minimise as `least_squares_cone` or `minmax_cone` does, with Σ|D_p| ≤ budget besides."""
-    return solve_cone(problem(W, Y, row_weights, max_weight, residual, sectors, minmax=minmax, budget=budget))
-
-
-def problem(
-    W: ArrayLike,
-    Y: ArrayLike,
-    row_weights: ArrayLike | None = None,
-    max_weight: ArrayLike | None = None,
-    residual: ArrayLike | None = None,
-    sectors: Sequence[Arc | None] | None = None,
-    *,
-    minmax: bool = False,
-    budget: float = np.inf,
-) -> Problem:
-    """Check and complete the numbers of a problem.
+    minmax
+        Minimise max wᵢ |Yᵢ + Wᵢ D| instead.
+    budget
+        Largest Σ|D_p|.
 
     Raises
     ------
     ValueError
         For NaN, shapes that do not fit, negative limits.
     """
-    A, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    if A.ndim != 2 or y.shape != A.shape[:1] or 0 in A.shape:
-        raise ValueError(f"W must be (N, P) and Y (N,), neither empty; got {A.shape} and {y.shape}")
-    if not (np.isfinite(A).all() and np.isfinite(y).all()):
-        raise ValueError("influence coefficients and readings must be finite; found NaN or infinity")
+    A, y, w = check_stack(W, Y, row_weights)
     N, P = A.shape
-    w = _numbers(row_weights, N, 1.0, "row weights")
-    if np.isinf(w).any() or not w.any():
-        raise ValueError("the row weights must be finite and not all zero")
     arcs = tuple(sectors) if sectors is not None else (None,) * P
     if len(arcs) != P or not all(s is None or 0 < s[1] <= np.pi * (1 + 1e-12) for s in arcs):
         raise ValueError("there must be one sector, of a width up to π, or None for every plane")
     if not budget >= 0:
         raise ValueError(f"the total weight must be a number ≥ 0; got {budget}")
-    L = _numbers(residual, N, np.inf, "limits of amplitudes")
-    M = _numbers(max_weight, P, np.inf, "largest weights")
+    L = _limits(residual, N, "limits of amplitudes")
+    M = _limits(max_weight, P, "largest weights")
     return Problem(A, y, w, L, M, arcs, float(budget), minmax)
 
 
-def _numbers(values: ArrayLike | None, n: int, default: float, what: str) -> FloatArray:
+def _limits(values: ArrayLike | None, n: int, what: str) -> FloatArray:
     if values is None:
-        return np.full(n, default)
+        return np.full(n, np.inf)
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (n,) or not (array >= 0).all():  # NaN is not ≥ 0
         raise ValueError(f"the {what} must be {n} numbers ≥ 0")
@@ -184,21 +128,23 @@ def _numbers(values: ArrayLike | None, n: int, default: float, what: str) -> Flo
 
 
 def solve_cone(problem: Problem) -> Cone:
-    """Solve a checked problem; `least_squares_cone` says what it raises."""
+    """Solve a checked problem.
+
+    Raises
+    ------
+    InfeasibleError
+        Where no weights are within the limits.
+    SolverError
+        Where the solver does not come near the optimum.
+    """
     free = (problem.max_weight > 0) & (problem.budget > 0)
     if free.all():
         weights, bound = _optimum(problem)
     else:
         weights = np.zeros(len(free), dtype=complex)
         prices = np.zeros(len(free))
-        part = replace(
-            problem,
-            W=problem.W[:, free],
-            max_weight=problem.max_weight[free],
-            sectors=tuple(s for s, f in zip(problem.sectors, free, strict=True) if f),
-        )
         if free.any():
-            weights[free], bound = _optimum(part)
+            weights[free], bound = _optimum(problem.of_planes(free))
             prices[free] = bound.weight_prices
         else:
             bound = _empty(problem)
@@ -222,18 +168,23 @@ def _result(problem: Problem, weights: ComplexArray, bound: Bound) -> Cone:
     if problem.minmax:
         w = problem.row_weights
         limit = np.minimum(limit, np.divide(objective, w, out=np.full(len(w), np.inf), where=w > 0))
-    without = problem.objective(np.zeros_like(weights))
     lower = min(bound.value, objective)
     return Cone(
         weights=weights,
         objective=objective,
         bound=lower,
-        gap=(objective - lower) / (max(objective, NEGLIGIBLE * without) or 1.0),
+        gap=relative_gap(problem, objective, lower),
         active_weights=_active(np.abs(weights), problem.max_weight, bound.weight_prices / (objective or 1.0)),
         active_residuals=_active(size, limit, bound.residual_prices / (objective or 1.0)),
         residual_prices=bound.residual_prices,
         weight_prices=bound.weight_prices,
     )
+
+
+def relative_gap(problem: Problem, objective: float, lower: float) -> float:
+    """Distance of an objective from a bound, relative to it; see `Cone.gap`."""
+    without = problem.objective(np.zeros(problem.W.shape[1], dtype=complex))
+    return (objective - lower) / (max(objective, NEGLIGIBLE * without) or 1.0)
 
 
 def _active(size: FloatArray, limit: FloatArray, price: FloatArray) -> BoolArray:
@@ -265,18 +216,17 @@ def _optimum(problem: Problem) -> tuple[ComplexArray, Bound]:
                 continue
             bound = lower_bound(problem, a, u)
             objective = problem.objective(weights)
-            gap = objective - bound.value
+            gap = relative_gap(problem, objective, bound.value)
             if best is None or gap < best[0]:
                 best = gap, weights, bound
-            if gap <= _ACCEPTED_GAP * max(objective, NEGLIGIBLE * without):
+            if gap <= _ACCEPTED_GAP:
                 return weights, bound
             break
     if best is None:
         raise InfeasibleError(
             "the limits can be met only to within rounding: relax a limit of the amplitudes a little"
         )
-    largest = max(problem.objective(best[1]), NEGLIGIBLE * without)
-    if best[0] > _POOR_GAP * largest:
+    if best[0] > _POOR_GAP:
         raise SolverError(
             "the solver did not come near the best weights: leave out a plane that acts like another, "
             "or relax the limits"

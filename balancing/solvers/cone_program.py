@@ -10,7 +10,6 @@ same for micrometres and grams as for metres and kilograms.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,7 @@ import numpy as np
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem, project
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import RCOND, gain, stretch, unstretch
+from rotorid.regression import gain, solution, stretch, unstretch
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_matrix
@@ -67,7 +66,7 @@ class Program:
         self.unit = float(np.abs(known).max())
         kept = bool((np.abs(self.residual) <= problem.residual).all())
         if not kept and self.unit <= _NOTHING * float(np.abs(w * problem.Y).max()):  # what do limits cost?
-            needed = np.linalg.lstsq(limit_rows, -self.residual[self.limited] / self.own, rcond=RCOND)[0]
+            needed = solution(limit_rows, -self.residual[self.limited] / self.own)
             self.unit = float(np.abs(rows @ needed).max())
         self.unit = self.unit or float(np.abs(rows).max()) or 1.0
         self.transform = self._orthogonal(np.concatenate((rows / self.unit, limit_rows)))
@@ -205,11 +204,8 @@ def quadratic_minimum(
     if not free.all():
         found, both = np.zeros_like(start), np.repeat(free, 2)
         if free.any():
-            sectors = tuple(s for s, f in zip(problem.sectors, free, strict=True) if f)
-            part = replace(
-                problem, W=problem.W[:, free], max_weight=problem.max_weight[free], sectors=sectors
-            )
-            found[free] = quadratic_minimum(part, start[free], gradient[both], hessian[np.ix_(both, both)])
+            inner = hessian[np.ix_(both, both)]
+            found[free] = quadratic_minimum(problem.of_planes(free), start[free], gradient[both], inner)
         return found
     n, M, newton = len(gradient), problem.max_weight, unstretch(np.linalg.solve(hessian, -gradient))
     size = np.abs(start)  # a start may be beyond the limits, even where the gradient is 0
@@ -260,13 +256,10 @@ def within_limits(problem: Problem, weights: ComplexArray) -> ComplexArray:
 
 def _start(problem: Problem, rows: ComplexArray) -> ComplexArray:
     """Least-squares weights within the limits of weights, or none where that is better; rows are w W."""
-    scale = np.linalg.norm(rows, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
     on = problem.row_weights > 0
     known = problem.row_weights[on] * problem.Y[on]
     none = np.zeros(rows.shape[1], dtype=complex)
-    free = np.linalg.lstsq(rows / scale, -known, rcond=RCOND)[0] / scale
-    start = within_limits(problem, free)
+    start = within_limits(problem, solution(rows, -known))
     return start if problem.objective(start) < problem.objective(none) else none
 
 

@@ -23,26 +23,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
+from balancing.coefficients.repeatability import tail
+from balancing.data.errors import mean_variance
+from balancing.solvers.conditioning import check_channels, check_stack
+from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.likelihood import (
+    Minimum,
     Problem,
     State,
-    constraint,
     covariance,
     derivatives,
-    evaluate,
+    descend,
     gradient,
     hessian,
     jacobian,
     problem_of,
 )
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import gain, stretch, unstretch
+from rotorid.regression import gain, solution, stretch, unstretch
 
 FLOOR = 1e-4
 """Every residual gets a further error of this share of the root mean square error of all residuals."""
@@ -50,7 +53,7 @@ FLOOR = 1e-4
 UNEXPLAINED = 0.95
 """Level of the χ² test beyond which the residuals are larger than the errors explain."""
 
-_STEPS, _HALVINGS = 100, 40
+_STEPS = 100
 _DONE = 1e-13  # predicted decrease: a step of 3e-7 standard deviations, after which Newton is at rounding
 _NO_SHARE, _SEARCHED = 1e-9, 1e-13  # of the mean variance
 _STUCK = 1e-10  # above it, no way down means lost and not rounding
@@ -64,8 +67,6 @@ class Effective:
     ----------
     weights
         Corrections, shape (P,).
-    residual
-        Y + W D with the coefficients as measured, shape (N,).
     covariance
         Of (Re D₁, Im D₁, …), shape (2P, 2P), for the stated errors and `model_error`.
     chi_square
@@ -77,21 +78,17 @@ class Effective:
     model_error
         Where it is beyond: standard deviation of what else stands in both parts of every reading, in the unit
         of Y, as large as the residuals say; weights and covariance allow for it. Else 0.
-    iterations
-        Newton steps.
     converged
         False where no minimum is in reach: the trial runs tell too little, and the weights grow without
         bound. They are not to be used then.
     """
 
     weights: ComplexArray
-    residual: ComplexArray
     covariance: FloatArray
     chi_square: float
     dof: int
     inflation: float
     model_error: float
-    iterations: int
     converged: bool
     derivatives: FloatArray
     """Of (Re D₁, …) by (Re Y, Im Y, Re W₁, …) of each reading of weight > 0, else 0; (N, 2P, 2P + 2)."""
@@ -150,113 +147,68 @@ def effective_variance(
     If the cause is errors of the trial runs that are larger than stated, the covariance is too small: times
     `inflation`² it holds the truth for either cause.
     """
-    w, y, C, weight = _checked(W, Y, channels, row_weights)
+    w, y, weight = check_stack(W, Y, row_weights)
+    C = check_channels(channels, w)
     used = weight > 0
     P = w.shape[1]
     w_used, y_used, weight = w[used], y[used], weight[used]
     check_planes(w_used, [str(p + 1) for p in range(P)])
     first = stretch(-(gain(weight[:, None] * w_used) @ (weight * y_used)))
-    variance = _variance(C[used], first)
+    variance = float(mean_variance(prediction_covariance(unstretch(first), C[used])).mean())
+    if not variance > 0:
+        raise ValueError("no reading has any error: a fit by errors needs some; use least squares instead")
     given = first if start is None else stretch(start)
     if given.shape != (2 * P,) or not np.isfinite(given).all():
         raise ValueError(f"the corrections to begin with must be {P} finite numbers")
 
-    def fit(share: float, d: FloatArray) -> _Minimum:
-        wider = _widened(C[used], (FLOOR**2 + share) * variance)
-        return _minimise(problem_of(w_used, y_used, wider, weight), d)
+    def fit(share: float, d: FloatArray) -> Minimum:
+        wider = widened(C[used], (FLOOR**2 + share) * variance)
+        problem = problem_of(w_used, y_used, wider, weight)
+        return descend(
+            problem, d, lambda _, at: _step(problem, at), most=_STEPS, settled=_DONE, rounding=_STUCK
+        )
 
     best = fit(0.0, given)
-    chi_square, dof = best.chi_square, 2 * (len(weight) - P)
-    share, steps = 0.0, best.steps
+    chi_square, dof, share = float(best.at.each.sum()), 2 * (len(weight) - P), 0.0
     unexplained = dof > 0 and chi_square > dof
     if unexplained:
-        within = explained is not None and best.converged and explained(unstretch(best.d))
-        unexplained = not within if explained is not None else chi_square > _quantile(dof)
+        within = explained is not None and best.settled and explained(unstretch(best.d))
+        unexplained = not within if explained is not None else tail(chi_square, dof) < 1 - UNEXPLAINED
     if unexplained:
-        best, share, more = _explained(fit, first, chi_square / dof, dof)
-        steps += more
-    D = unstretch(best.d)
+        best, share = _explained(fit, first, chi_square / dof, dof)
     moved = np.zeros((len(y), 2 * P, 2 * P + 2))
     moved[used] = derivatives(best.problem, best.at, best.d)
     return Effective(
-        weights=D,
-        residual=y + w @ D,
+        weights=unstretch(best.d),
         covariance=covariance(best.problem, best.at),
         chi_square=chi_square,
         dof=dof,
         inflation=float(np.sqrt(chi_square / dof)) if unexplained else 1.0,
         model_error=float(np.sqrt(share * variance)),
-        iterations=steps,
-        converged=best.converged,
+        converged=best.settled,
         derivatives=moved,
     )
 
 
-def _checked(
-    W: ArrayLike, Y: ArrayLike, channels: ArrayLike, row_weights: ArrayLike | None
-) -> tuple[ComplexArray, ComplexArray, FloatArray, FloatArray]:
-    w, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    C = np.asarray(channels, dtype=np.float64)
-    if w.ndim != 2 or 0 in w.shape:
-        raise ValueError(f"the influence coefficients must have shape (readings, planes); got {w.shape}")
-    N, P = w.shape
-    weight = np.ones(N) if row_weights is None else np.asarray(row_weights, dtype=np.float64)
-    for name, array, shape in (
-        ("vibration", y, (N,)),
-        ("covariance of the readings", C, (N, 2 * P + 2, 2 * P + 2)),
-        ("weights of the readings", weight, (N,)),
-    ):
-        if array.shape != shape:
-            raise ValueError(f"the {name} must have shape {shape}; got {array.shape}")
-    if not all(np.isfinite(a).all() for a in (w, y, C, weight)):
-        raise ValueError(
-            "coefficients, vibration, covariances and weights must be finite; found NaN or infinity"
-        )
-    if (weight < 0).any() or not weight.any():
-        raise ValueError("the weights of the readings must not be negative, and not all of them zero")
-    return w, y, C, weight
-
-
-def _variance(C: FloatArray, d: FloatArray) -> float:
-    """Mean variance of both parts of all residuals at the stretched D."""
-    B = constraint(d)
-    variance = float(np.mean(np.einsum("nij,ij->n", B @ C, B))) / 2
-    if not variance > 0:
-        raise ValueError("no reading has any error: a fit by errors needs some; use least squares instead")
-    return variance
-
-
-def _widened(C: FloatArray, variance: float) -> FloatArray:
-    """C with a further variance of both parts of Y."""
+def widened(C: FloatArray, variance: float) -> FloatArray:
+    """Covariances (N, 2P + 2, 2P + 2) with a further variance of both parts of Y."""
     out = C.copy()
     out[:, [0, 1], [0, 1]] += variance
     return out
 
 
-class _Minimum(NamedTuple):
-    d: FloatArray
-    problem: Problem
-    at: State
-    steps: int
-    converged: bool
-
-    @property
-    def chi_square(self) -> float:
-        return float(self.at.each.sum())
-
-
 def _explained(
-    fit: Callable[[float, FloatArray], _Minimum], first: FloatArray, ratio: float, dof: int
-) -> tuple[_Minimum, float, int]:
-    """The fit with a further share of the mean variance such that χ² = dof; the share; steps taken."""
+    fit: Callable[[float, FloatArray], Minimum], first: FloatArray, ratio: float, dof: int
+) -> tuple[Minimum, float]:
+    """The fit with a further share of the mean variance such that χ² = dof, and the share."""
     from scipy.optimize import brentq
 
-    tried: dict[float, _Minimum] = {}
+    tried: dict[float, Minimum] = {}
 
     def excess(share: float) -> float:
         near = min(tried, key=lambda other: abs(other - share), default=None)
         tried[share] = fit(share, first if near is None else tried[near].d)
-        return tried[share].chi_square / dof - 1
+        return float(tried[share].at.each.sum()) / dof - 1
 
     low = high = ratio - 1  # χ² falls with the share
     if excess(high) > 0:
@@ -267,28 +219,7 @@ def _explained(
             high = low
     share = brentq(excess, low, high, xtol=_SEARCHED * low, rtol=_SEARCHED) if low > _NO_SHARE else 0.0
     excess(share)
-    return tried[share], share, sum(one.steps for one in tried.values())
-
-
-def _minimise(problem: Problem, d: FloatArray) -> _Minimum:
-    at = evaluate(problem, d)
-    for k in range(1, _STEPS + 1):
-        step, decrease, convex = _step(problem, at)
-        small = decrease <= _DONE * (1 + at.objective)
-        t = 1.0
-        for _ in range(_HALVINGS):
-            new = evaluate(problem, d + t * step)
-            # rounding of Q says nothing of so small a step: it is taken whole
-            if small or new.objective <= at.objective - 1e-4 * t * decrease:
-                break
-            t /= 2
-        if new.objective >= at.objective and not small:
-            rounding = decrease <= _STUCK * (1 + at.objective)
-            return _Minimum(d, problem, at, k, rounding and convex)
-        d, at = d + t * step, new
-        if small:
-            return _Minimum(d, problem, at, k, convex)
-    return _Minimum(d, problem, at, _STEPS, False)
+    return tried[share], share
 
 
 def _step(problem: Problem, at: State) -> tuple[FloatArray, float, bool]:
@@ -299,14 +230,5 @@ def _step(problem: Problem, at: State) -> tuple[FloatArray, float, bool]:
     H = hessian(problem, at) / np.outer(scale, scale)
     curvatures = np.linalg.eigvalsh(H)
     convex = bool(curvatures[0] > len(H) * np.finfo(float).eps * curvatures[-1])
-    if convex:
-        step = -np.linalg.solve(H, g / scale) / scale
-    else:
-        step = -np.linalg.lstsq(J / scale, r, rcond=None)[0] / scale
+    step = -np.linalg.solve(H, g / scale) / scale if convex else -solution(J, r)
     return step, max(float(-g @ step), 0.0), convex
-
-
-def _quantile(dof: int) -> float:
-    from scipy.special import chdtri
-
-    return float(chdtri(dof, 1 - UNEXPLAINED))

@@ -6,8 +6,7 @@ dWᴴ r + Wᴴ (dY₀ + dW D + W dD) = 0, gives
     dD = −W⁺ (dY₀ + dW D) − (WᴴW)⁻¹ dWᴴ r.
 
 The last term vanishes only where the residual does. It is linear in the *conjugate* of dW, hence everything
-stands in real, stretched form: z as [[Re z, −Im z], [Im z, Re z]], and dW ↦ conj(dW) r as
-[[Re r, Im r], [Im r, −Re r]].
+stands in real, stretched form (`real_jacobian`).
 
 A reading in a check run, with the proposed D mounted, differs from its prediction Y₀ + W D by the errors of
 both, dY₀ + dW D, and by its own.
@@ -19,10 +18,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from balancing.coefficients.resolution import hermitian
-from balancing.data.errors import symmetric
+from balancing.data.errors import hermitian, symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression import gain
+from rotorid.regression import gain, stretch
 
 
 def correction_jacobian(W: ComplexArray, D: ComplexArray, r: ComplexArray) -> FloatArray:
@@ -41,23 +39,22 @@ def correction_jacobian(W: ComplexArray, D: ComplexArray, r: ComplexArray) -> Fl
     -------
     Shape (N, 2P, 2P + 2).
     """
-    N, P = W.shape
-    pinv = gain(W)
-    inverse = pinv @ pinv.conj().T  # (WᴴW)⁻¹
-    J = np.empty((N, P, 2, P + 1, 2))
-    J[:, :, :, 0] = -_block(pinv.T)
-    along = _block(pinv.T[:, :, None] * D)  # (N, P, P, 2, 2)
-    mirrored = np.empty((N, 2, 2))
-    mirrored[:, 0, 0], mirrored[:, 1, 1] = r.real, -r.real
-    mirrored[:, 0, 1] = mirrored[:, 1, 0] = r.imag
-    across = np.einsum("pqab,nbc->npqac", _block(inverse), mirrored)
-    J[:, :, :, 1:] = -np.swapaxes(along + across, 2, 3)
-    return J.reshape(N, 2 * P, 2 * P + 2)
+    G = gain(W)
+    inverse = G @ G.conj().T  # (WᴴW)⁻¹
+    along = -G.T[:, :, None] * np.concatenate(([1.0], D))
+    across = np.zeros_like(along)
+    across[:, :, 1:] = -inverse * r[:, None, None]
+    return real_jacobian(along, across)
+
+
+def real_jacobian(along: ComplexArray, across: ComplexArray) -> FloatArray:
+    """Real matrices (…, 2m, 2n) of the changes δ ↦ along δ + across δ̄, both (…, m, n)."""
+    return np.asarray(stretch(along) + stretch(across) * np.tile([1.0, -1.0], across.shape[-1]))
 
 
 def prediction_covariance(D: ComplexArray, covariance: FloatArray) -> FloatArray:
     """Covariance (N, 2, 2) of Y₀ + W D at given D, from that of each reading's (Y₀, W)."""
-    B = np.concatenate([_block(np.asarray(z)) for z in (1.0, *D)], axis=1)
+    B = stretch([[1.0, *D]])
     return symmetric(B @ covariance @ B.T)
 
 
@@ -86,7 +83,7 @@ def common_covariance(J: FloatArray, common: ComplexArray) -> tuple[FloatArray, 
         As `balancing.Influence.common`, (2, M, S, C, P + 1), N = S C.
     """
     _, M, S, C, n = common.shape
-    F = _block(common).reshape(2, M, S * C, 2 * n, 2)
+    F = stretch(common[..., None]).reshape(2, M, S * C, 2 * n, 2)
     moved = np.einsum("nqz,kmnzu->kmnqu", J, F).reshape(2, M, S, C, J.shape[1], 2).sum(axis=3)
     run, speed = moved[0].sum(axis=1), moved[1].reshape(M * S, J.shape[1], 2)
     first, second = (np.einsum("mqu,mpu->qp", part, part) for part in (run, speed))
@@ -127,8 +124,7 @@ def whitening(
 
 def real_columns(common: ComplexArray) -> FloatArray:
     """Columns (M, S, n) of complex numbers as real ones of real and imaginary parts, (S, 2n, 2M)."""
-    M, S, n = common.shape
-    return np.asarray(np.transpose(_block(common), (1, 2, 3, 0, 4)).reshape(S, 2 * n, 2 * M))
+    return stretch(np.transpose(common, (1, 2, 0)))
 
 
 def region_radius(dof: float | None) -> float:
@@ -138,10 +134,10 @@ def region_radius(dof: float | None) -> float:
     return float(np.sqrt(chdtri(2, 0.05) if dof is None else 2 * fdtri(2, dof, 0.95)))
 
 
-def _block(z: ComplexArray) -> FloatArray:
-    """Stretch every number of an array (…) into its 2 × 2 block, (…, 2, 2)."""
-    out = np.empty((*z.shape, 2, 2))
-    out[..., 0, 0] = out[..., 1, 1] = z.real
-    out[..., 0, 1] = -z.imag
-    out[..., 1, 0] = z.imag
-    return out
+def region_edge(values: ComplexArray, covariance: FloatArray, dof: float | None, points: int) -> ComplexArray:
+    """Points (…, points + 1) on the edge of the 95 % region of values (…) of covariance (…, 2, 2)."""
+    variances, axes = np.linalg.eigh(covariance)
+    turn = np.linspace(0.0, 2 * np.pi, points + 1)
+    reach = region_radius(dof) * np.sqrt(np.maximum(variances, 0.0))
+    edge = (axes * reach[..., None, :]) @ np.stack((np.cos(turn), np.sin(turn)))
+    return np.asarray(values[..., None] + edge[..., 0, :] + 1j * edge[..., 1, :])

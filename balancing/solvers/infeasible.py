@@ -18,6 +18,7 @@ from balancing.solvers.certificate import Problem
 from balancing.solvers.cone_program import InfeasibleError, SolverError
 from balancing.solvers.sectors import solve_sectors
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
 
 PRICED = 1e-5
 """A limit takes part in a conflict if its share in the price of all is above this."""
@@ -183,25 +184,19 @@ def explain(
         f"{readings[i]} (limit {amplitude(whole.residual[i])}) stays at {amplitude(found.best[i])}"
         for i in named
     ]
-    with_ = f"with {_joined(conditions)}, " if conditions else "whatever the weights, "
+    with_ = f"with {listing(conditions, 'and')}, " if conditions else "whatever the weights, "
     others = f" (and {more} more readings at their own)" if more > 1 else " (and 1 more reading at its own)"
-    text = f"the limits cannot be met: {with_}{_joined(stays)} at best{others if more else ''}"
+    text = f"the limits cannot be met: {with_}{listing(stays, 'and')} at best{others if more else ''}"
     ways = []
     if np.isfinite(found.amplitudes):
         ways.append(f"relaxing all amplitude limits {_up(found.amplitudes)} times works")
     if np.isfinite(found.weights):
         ways.append(f"all weight limits {_up(found.weights)} times")
-    if len(ways) == 2:
-        return f"{text}; {ways[0]}, or {ways[1]}"
     if np.isfinite(found.amplitudes):
-        return f"{text}; {ways[0]}"
+        return f"{text}; {', or '.join(ways)}"
     if ways:
         return f"{text}; relaxing {ways[0]} works"
     return f"{text}; an amplitude of zero cannot be reached, give a larger limit"
-
-
-def _joined(parts: Sequence[str]) -> str:
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
 def _up(factor: float) -> str:

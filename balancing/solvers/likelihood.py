@@ -25,14 +25,16 @@ chapters 2 and 3.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.errors import symmetric
+from balancing.data.errors import inverse_root, symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
+_HALVINGS = 40
 LEAST_INFORMATION = 0.1
 """Share of M that is left to A in any direction; smaller ones count as this much."""
 
@@ -70,6 +72,9 @@ class State(NamedTuple):
     L: FloatArray
 
 
+Step = Callable[[FloatArray, State], tuple[FloatArray, float, bool]]
+
+
 def constraint(d: FloatArray) -> FloatArray:
     """B = [1, D₁, …] stretched, (2, 2P + 2), from the stretched D."""
     return stretch(np.concatenate(([1.0], unstretch(d)))[None])
@@ -92,8 +97,8 @@ def evaluate(problem: Problem, d: FloatArray) -> State:
     r = _whiten(L, (Y + W @ d)[..., None])[..., 0]
     u2 = r[:, 1] / l22
     U = _both_parts(np.stack(((r[:, 0] - l21 * u2) / l11, u2), axis=1))
-    adjustment = (A @ r[..., None]).reshape(N, P + 1, 2)[:, 1:]
-    J = _whiten(L, W - _columns(adjustment))
+    adjustment = unstretch((A @ r[..., None])[:, 2:, 0])
+    J = _whiten(L, W - stretch(adjustment[:, None]))
     F = np.swapaxes(A.reshape(N, P + 1, 2, 2)[:, 1:], 2, 3) @ np.swapaxes(U, 1, 2)[:, None]  # (N, P, 2, 2)
     each = np.einsum("ni,ni->n", r, r)
     return State(float(weight @ each), each, r, J, np.swapaxes(F, 1, 2).reshape(N, 2, 2 * P), U, A, L)
@@ -135,10 +140,52 @@ def derivatives(problem: Problem, at: State, d: FloatArray) -> FloatArray:
 
 def _corrected_inverse(problem: Problem, at: State) -> FloatArray:
     """A⁻¹: that of M less what the errors of Ŵ put into it."""
-    root = _inverse_root(_gram(at.J, problem.weight))
+    root = inverse_root(_gram(at.J, problem.weight), 1e-15)
     share, vectors = np.linalg.eigh(symmetric(root.T @ _noise(problem, at) @ root))
     X = root @ vectors
     return np.asarray((X / np.maximum(1 - share, LEAST_INFORMATION)) @ X.T)
+
+
+class Minimum(NamedTuple):
+    """Where steps ended: stretched weights, the problem, what is known there, whether Q falls no further."""
+
+    d: FloatArray
+    problem: Problem
+    at: State
+    settled: bool
+
+
+def descend(
+    problem: Problem, d: FloatArray, step: Step, *, most: int, settled: float, rounding: float
+) -> Minimum:
+    """Steps down from the stretched D, each shortened until Q falls.
+
+    Parameters
+    ----------
+    problem, d
+        What is minimised, and where to start.
+    step
+        At some D: a step, how far it should lead down, and whether Q is convex enough to end there.
+    most
+        Number of steps.
+    settled
+        Share of 1 + Q below which a step is the last one, and taken whole: rounding of Q says nothing of it.
+    rounding
+        The same where no part of a step leads down: above it the search is stuck.
+    """
+    at = evaluate(problem, d)
+    for _ in range(most):
+        move, expected, sound = step(d, at)
+        new, t = evaluate(problem, d + move), 1.0
+        if expected <= settled * (1 + at.objective):
+            return Minimum(d + move, problem, new, sound)
+        while not new.objective <= at.objective - 1e-4 * t * expected and t > 0.5**_HALVINGS:
+            t /= 2
+            new = evaluate(problem, d + t * move)
+        if new.objective >= at.objective:
+            return Minimum(d, problem, at, sound and expected <= rounding * (1 + at.objective))
+        d, at = d + t * move, new
+    return Minimum(d, problem, at, False)
 
 
 def _blocks(C: FloatArray) -> FloatArray:
@@ -155,16 +202,6 @@ def _whiten(L: FloatArray, X: FloatArray) -> FloatArray:
     out[:, 0] = X[:, 0] / l11
     out[:, 1] = (X[:, 1] - l21 * out[:, 0]) / l22
     return out
-
-
-def _columns(v: FloatArray) -> FloatArray:
-    """Stretch complex rows given as pairs (N, P, 2) into matrices (N, 2, 2P)."""
-    N, P, _ = v.shape
-    out = np.empty((N, 2, P, 2))
-    out[:, 0, :, 0] = out[:, 1, :, 1] = v[..., 0]
-    out[:, 0, :, 1] = -v[..., 1]
-    out[:, 1, :, 0] = v[..., 1]
-    return out.reshape(N, 2, 2 * P)
 
 
 def _both_parts(u: FloatArray) -> FloatArray:
@@ -185,22 +222,10 @@ def _across(U: FloatArray, covariances: FloatArray, weight: FloatArray) -> Float
     return np.asarray((covariances @ outer).reshape(P, P, 2, 2).transpose(0, 2, 1, 3).reshape(2 * P, 2 * P))
 
 
-def _remaining(at: State, C: FloatArray) -> FloatArray:
-    """Blocks of K = C − C Bᵀ Σ⁻¹ B C."""
-    return _blocks(C - at.A @ np.swapaxes(at.A, 1, 2))
-
-
 def _noise(problem: Problem, at: State) -> FloatArray:
     """Σ w² E[eᵀ Σ⁻¹ e], (2P, 2P): as U K Uᵀ, with the rows of L⁻¹ for u."""
     l11, l21, l22 = at.L
-    K = _remaining(at, problem.C)
+    K = _blocks(problem.C - at.A @ np.swapaxes(at.A, 1, 2))  # of K = C − C Bᵀ Σ⁻¹ B C
     first = np.stack((1 / l11, np.zeros_like(l11)), axis=1)
     second = np.stack((-l21 / (l11 * l22), 1 / l22), axis=1)
     return _across(_both_parts(first), K, problem.weight) + _across(_both_parts(second), K, problem.weight)
-
-
-def _inverse_root(M: FloatArray) -> FloatArray:
-    """R with M⁻¹ = R Rᵀ; directions at rounding are kept finite."""
-    scale = np.sqrt(np.diag(M))
-    values, vectors = np.linalg.eigh(symmetric(M / np.outer(scale, scale)))
-    return np.asarray(vectors / np.sqrt(np.maximum(values, 1e-15 * values.max())) / scale[:, None])

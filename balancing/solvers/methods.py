@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from balancing.coefficients.identifiability import UndeterminedError
-from balancing.coefficients.resolution import HOPELESS
+from balancing.coefficients.identifiability import HOPELESS, UndeterminedError
 from balancing.coefficients.run_errors import marginal
-from balancing.data.errors import symmetric
+from balancing.data.errors import mean_variance, symmetric
 from balancing.data.limits import Limits
 from balancing.solvers.cone import AT_LIMIT
-from balancing.solvers.effective_variance import FLOOR, Effective, effective_variance
+from balancing.solvers.effective_variance import FLOOR, Effective, effective_variance, widened
 from balancing.solvers.error_propagation import common_covariance, correction_jacobian
 from balancing.solvers.regularised import ridge, truncated
 from balancing.solvers.sampling import sampled_covariance
@@ -282,10 +281,8 @@ def _weighted_within(stack: Stack, channels: FloatArray, limits: Limits, free: E
 
 def _regular(channels: FloatArray, model_error: float) -> FloatArray:
     """Errors of the readings with the further one that explains the residuals, and none that is exactly 0."""
-    wider = channels.copy()
-    least = FLOOR**2 * float(np.trace(channels[:, :2, :2], axis1=1, axis2=2).mean()) / 2
-    wider[:, [0, 1], [0, 1]] += model_error**2 + least
-    return wider
+    least = FLOOR**2 * float(mean_variance(channels[:, :2, :2]).mean())
+    return widened(channels, model_error**2 + least)
 
 
 def _sampled(

@@ -27,10 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.coefficients.identifiability import UndeterminedError
+from balancing.coefficients.identifiability import check_effect, scaled_columns, separation
 from balancing.data.errors import symmetric
-from balancing.solvers.conditioning import check_stack, scaled_columns
-from balancing.solvers.error_propagation import error_form
+from balancing.solvers.conditioning import check_channels, check_stack
+from balancing.solvers.error_propagation import error_form, real_jacobian
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND
 
@@ -178,10 +178,9 @@ def harmless(W: ArrayLike, channels: FloatArray | None, row_weights: ArrayLike |
     if channels is None:
         return np.inf
     K, _, w = check_stack(W, np.ones(np.shape(W)[0]), row_weights)
-    B, S = scaled_columns(w[:, None] * K)
-    s, Vh = np.linalg.svd(B, full_matrices=False)[1:]
+    S, s, V = separation(w[:, None] * K)
     errors = error_form(channels, w)[1:, 1:] / np.outer(S, S)
-    squares = np.einsum("kp,pq,kq->k", Vh, errors, Vh.conj()).real
+    squares = np.einsum("pk,pq,qk->k", V.conj(), errors, V).real
     clear = s[s**2 > DETERMINED**2 * squares]
     return float(clear.min() / s[0] * np.sqrt(BIAS / (1 - BIAS))) if clear.size else np.inf
 
@@ -281,17 +280,13 @@ def _problem(
     W: ArrayLike, Y: ArrayLike, row_weights: ArrayLike | None, planes: Sequence[str] | None
 ) -> _Problem:
     K, y, w = check_stack(W, Y, row_weights)
-    N, P = K.shape
-    names = list(planes) if planes is not None else [str(p + 1) for p in range(P)]
+    told = separation(w[:, None] * K)
+    check_effect(told, planes or [str(p + 1) for p in range(K.shape[1])])
     B, S = scaled_columns(w[:, None] * K)
-    for p in np.flatnonzero(S == 0):
-        raise UndeterminedError(f"plane {names[p]!r} has no effect on any reading: leave it out")
-    U, s, Vh = np.linalg.svd(B, full_matrices=N < P)
     # what is zero to rounding is zero: a weak ridge would blow up the rounding
-    sigma, BV = np.zeros(P), np.zeros((N, P), dtype=complex)
-    sigma[: len(s)] = np.where(s > RCOND * s[0], s, 0.0)
-    BV[:, : len(s)] = U * sigma[: len(s)]
-    return _Problem(K, y, w, S, B, BV, sigma, np.asarray(Vh.conj().T))
+    solid = np.arange(len(S)) < told.rank
+    sigma = np.where(solid, told.singular_values, 0.0)
+    return _Problem(K, y, w, S, B, B @ told.directions * solid, sigma, told.directions)
 
 
 def _solution(
@@ -306,6 +301,9 @@ def _solution(
 ) -> Regularised:
     D = -(problem.V @ (f * problem.c)) / problem.S
     J = _jacobian(problem, f, F, D, strength)
+    covariance = None
+    if channels is not None:
+        covariance = symmetric(np.sum(J @ check_channels(channels, problem.W) @ np.swapaxes(J, 1, 2), axis=0))
     effective, P = float(np.sum(problem.sigma**2 * f)), len(D)
     if kept is None:
         words += f": {effective:.2g} of {P}"
@@ -316,7 +314,7 @@ def _solution(
     return Regularised(
         weights=D,
         residual=problem.Y + problem.W @ D,
-        covariance=None if channels is None else _covariance(J, channels),
+        covariance=covariance,
         jacobian=J,
         strength=strength,
         kept=kept,
@@ -324,13 +322,6 @@ def _solution(
         singular_values=problem.sigma,
         words=words,
     )
-
-
-def _covariance(J: FloatArray, channels: FloatArray) -> FloatArray:
-    expected = (len(J), J.shape[2], J.shape[2])
-    if np.shape(channels) != expected:
-        raise ValueError(f"the errors of the readings must have shape {expected}; got {np.shape(channels)}")
-    return symmetric(np.sum(J @ channels @ np.swapaxes(J, 1, 2), axis=0))
 
 
 def _jacobian(
@@ -356,15 +347,8 @@ def _jacobian(
     to_W = w[:, None, None] / (S[:, None] * S)
     lin = (lin - lengths * B.conj()[:, None, :]) * to_W
     anti = (anti - lengths * B[:, None, :]) * to_W
-    J = np.zeros((N, P, 2, P + 1, 2))
     to_Y = -np.einsum("pi,i,ni->np", V, f, BV.conj()) * w[:, None] / S
-    _fill(J[:, :, :, :1], to_Y[:, :, None], np.zeros((N, P, 1), dtype=complex))
-    _fill(J[:, :, :, 1:], lin, anti)
-    return J.reshape(N, 2 * P, 2 * P + 2)
-
-
-def _fill(J: FloatArray, lin: ComplexArray, anti: ComplexArray) -> None:
-    """Real blocks (N, P, 2, Q, 2) of δ ↦ lin δ + anti conj(δ), from (N, P, Q)."""
-    by_real, by_imaginary = lin + anti, 1j * (lin - anti)
-    J[:, :, 0, :, 0], J[:, :, 1, :, 0] = by_real.real, by_real.imag
-    J[:, :, 0, :, 1], J[:, :, 1, :, 1] = by_imaginary.real, by_imaginary.imag
+    return real_jacobian(
+        np.concatenate((to_Y[:, :, None], lin), axis=2),
+        np.concatenate((np.zeros((N, P, 1)), anti), axis=2),
+    )

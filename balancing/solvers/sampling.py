@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.data.errors import symmetric
+from balancing.solvers.conditioning import check_channels, check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
 
@@ -54,19 +55,10 @@ def sampled_covariance(
     ValueError
         For shapes that do not fit, NaN, too few draws, and if more than 20 % of the draws have no solution.
     """
-    w, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    C = np.asarray(channels, dtype=np.float64)
-    if w.ndim != 2 or 0 in w.shape:
-        raise ValueError(f"the influence coefficients must have shape (readings, planes); got {w.shape}")
+    w, y, _ = check_stack(W, Y)
+    C = check_channels(channels, w)
     N, P = w.shape
     n = 2 * P + 2
-    if y.shape != (N,) or C.shape != (N, n, n):
-        raise ValueError(
-            f"the vibration must have shape {(N,)} and the covariances {(N, n, n)}; "
-            f"got {y.shape} and {C.shape}"
-        )
-    if not (np.isfinite(w).all() and np.isfinite(y).all() and np.isfinite(C).all()):
-        raise ValueError("coefficients, vibration and covariances must be finite; found NaN or infinity")
     if draws <= n:
         raise ValueError(f"{P} planes need more than {n} draws to have a covariance; got {draws}")
     root = _root(C)

@@ -17,7 +17,8 @@ import numpy as np
 
 from balancing.data.limits import Arc
 from balancing.solvers.certificate import Problem
-from balancing.solvers.cone import NEGLIGIBLE, Cone, InfeasibleError, solve_cone
+from balancing.solvers.cone import Cone, InfeasibleError, relative_gap, solve_cone
+from rotorid.base.arrays import ComplexArray
 
 _TOUCHING = 1e-9
 _ENOUGH = 1e-9
@@ -79,6 +80,15 @@ def stands_in(weight: complex, sectors: Sequence[Arc] | None) -> bool:
     return any(b <= 2 * _ON_EDGE for b in beyond)
 
 
+def meets(problem: Problem, sectors: Sequence[Sequence[Arc] | None], weights: ComplexArray) -> bool:
+    """Whether weights are within every limit of a problem, and stand in one of their plane's sectors each."""
+    return bool(
+        (np.abs(weights) <= problem.max_weight).all()
+        and (np.abs(problem.Y + problem.W @ weights) <= problem.residual).all()
+        and all(stands_in(complex(v), s) for v, s in zip(weights, sectors, strict=True))
+    )
+
+
 def solve_sectors(problem: Problem, sectors: Sequence[Sequence[Arc] | None]) -> Cone:
     """Weights of the smallest objective that stand in one of their plane's sectors each, or are zero.
 
@@ -127,10 +137,11 @@ def solve_sectors(problem: Problem, sectors: Sequence[Sequence[Arc] | None]) -> 
     if best is None:
         raise InfeasibleError("no weights at allowed angles are within the limits")
     lower = min(best.objective, aside)
-    without = problem.objective(np.zeros(len(sectors), dtype=complex))
-    gap = (best.objective - lower) / (max(best.objective, NEGLIGIBLE * without) or 1.0)
     return replace(
-        best, bound=lower, gap=gap, active_weights=best.active_weights & ~(empty & (problem.max_weight > 0))
+        best,
+        bound=lower,
+        gap=relative_gap(problem, best.objective, lower),
+        active_weights=best.active_weights & ~(empty & (problem.max_weight > 0)),
     )
 
 

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.identifiability import UndeterminedError, check_planes
 from balancing.data.limits import Limits
 from balancing.solvers.certificate import Problem
+from balancing.solvers.conditioning import check_stack
 from balancing.solvers.cone import Cone, InfeasibleError, problem
 from balancing.solvers.infeasible import explain
-from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
-from rotorid.base.arrays import BoolArray, ComplexArray
-from rotorid.regression import RCOND
+from balancing.solvers.sectors import allowed_sectors, meets, solve_sectors
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.regression import solution_and_rank
 
 Criterion = Literal["least-squares", "minmax"]
 
@@ -102,29 +103,26 @@ def solve(  # noqa: PLR0913
     """
     if method not in ("least-squares", "minmax"):
         raise ValueError(f"the method must be 'least-squares' or 'minmax'; got {method!r}")
-    A, y = np.asarray(W, dtype=complex), np.asarray(Y, dtype=complex)
-    if A.ndim != 2 or y.shape != A.shape[:1] or 0 in A.shape:
-        raise ValueError(f"W must be (N, P) and Y (N,), neither empty; got {A.shape} and {y.shape}")
+    A, y, w = check_stack(W, Y, row_weights)
     N, P = A.shape
     planes = [str(p + 1) for p in range(P)] if names is None else list(names)
     if len(planes) != P or (readings is not None and len(readings) != N):
         raise ValueError(f"{P} planes and {N} readings need as many names")
     limited = limits is not None and limits.any
     if method == "least-squares" and not limited:
-        weights = _closed_form(A, y, row_weights, planes)
+        weights = _closed_form(A, y, w, planes)
         residual = y + A @ weights
-        size = residual if row_weights is None else np.asarray(row_weights) * residual
         free = np.zeros(P, dtype=bool), np.zeros(N, dtype=bool)
-        return Solution(weights, residual, method, float(np.linalg.norm(size)), None, *free)
-    whole, sectors = _within(A, y, row_weights, limits, minmax=method == "minmax")
+        return Solution(weights, residual, method, float(np.linalg.norm(w * residual)), None, *free)
+    whole, sectors = _within(A, y, w, limits, minmax=method == "minmax")
     may = np.array([m > 0 and s != () for m, s in zip(whole.max_weight, sectors, strict=True)])
     if may.any():
         own = [name for name, m in zip(planes, may, strict=True) if m]
         start = np.zeros(P, dtype=complex)
-        start[may] = _closed_form(A[:, may], y, whole.row_weights, own)
+        start[may] = _closed_form(A[:, may], y, w, own)
         reached = whole.objective(start)
         exact = reached <= _ROUNDING * whole.objective(np.zeros(P, dtype=complex))  # no reading stays
-        if (method == "least-squares" or exact) and _meets(whole, sectors, start):
+        if (method == "least-squares" or exact) and meets(whole, sectors, start):
             none = np.zeros(N, dtype=bool)
             left_out = whole.max_weight == 0
             return Solution(start, y + A @ start, method, reached, None, left_out, none)
@@ -145,28 +143,13 @@ def solve(  # noqa: PLR0913
     )
 
 
-def _closed_form(
-    W: ComplexArray, Y: ComplexArray, row_weights: ArrayLike | None, names: Sequence[str]
-) -> ComplexArray:
-    """Least squares of the row-weighted, column-scaled equations; refuses NaN and dependent planes."""
-    A, right = W, -Y
-    if row_weights is not None:
-        w = np.asarray(row_weights, dtype=np.float64)
-        if w.shape != Y.shape or not (np.isfinite(w).all() and (w >= 0).all() and w.any()):
-            raise ValueError(f"the row weights must be {len(Y)} finite numbers ≥ 0, not all zero")
-        kept = w > 0
-        if not kept.all():
-            A, right, w = A[kept], right[kept], w[kept]
-        A, right = w[:, None] * A, w * right
-    square = np.einsum("np,np->p", A.real, A.real) + np.einsum("np,np->p", A.imag, A.imag)
-    scale = np.sqrt(square)
-    if not (np.isfinite(scale).all() and np.isfinite(right).all()):
-        raise ValueError("influence coefficients and readings must be finite; found NaN or infinity")
-    N, P = A.shape
-    if N >= P and scale.all():
-        found, _, rank, _ = np.linalg.lstsq(A / scale, right, rcond=RCOND)
-        if rank == P:
-            return np.asarray(found / scale)
+def _closed_form(W: ComplexArray, Y: ComplexArray, w: FloatArray, names: Sequence[str]) -> ComplexArray:
+    """Least squares of the row-weighted, column-scaled equations; refuses dependent planes."""
+    kept = w > 0
+    A, right = w[kept, None] * W[kept], w[kept] * Y[kept]
+    found, rank = solution_and_rank(A, -right)
+    if rank == W.shape[1]:
+        return np.asarray(found)
     check_planes(A, names)
     raise UndeterminedError(
         f"planes {', '.join(map(repr, names))} act alike to within rounding: leave one out, "
@@ -175,27 +158,16 @@ def _closed_form(
 
 
 def _within(
-    W: ComplexArray, Y: ComplexArray, row_weights: ArrayLike | None, limits: Limits | None, *, minmax: bool
+    W: ComplexArray, Y: ComplexArray, w: FloatArray, limits: Limits | None, *, minmax: bool
 ) -> tuple[Problem, list[tuple[tuple[float, float], ...] | None]]:
     """The problem and, for each plane, the sectors its weight may stand in."""
     N, P = W.shape
     if limits is None:
-        return problem(W, Y, row_weights, minmax=minmax), [None] * P
+        return problem(W, Y, w, minmax=minmax), [None] * P
     if limits.residual.size != N or len(limits.max_weight) != P:
         raise ValueError(
             f"the limits are for {limits.residual.size} readings and {len(limits.max_weight)} planes; "
             f"there are {N} and {P}"
         )
-    whole = problem(W, Y, row_weights, limits.max_weight, limits.residual.reshape(N), minmax=minmax)
+    whole = problem(W, Y, w, limits.max_weight, limits.residual.reshape(N), minmax=minmax)
     return whole, [allowed_sectors(arcs) for arcs in limits.forbidden]
-
-
-def _meets(
-    whole: Problem, sectors: Sequence[tuple[tuple[float, float], ...] | None], weights: ComplexArray
-) -> bool:
-    """Whether weights are within every limit."""
-    return bool(
-        (np.abs(weights) <= whole.max_weight).all()
-        and (np.abs(whole.Y + whole.W @ weights) <= whole.residual).all()
-        and all(stands_in(complex(v), s) for v, s in zip(weights, sectors, strict=True))
-    )

@@ -25,7 +25,7 @@ from balancing.solvers import likelihood
 from balancing.solvers.certificate import Problem
 from balancing.solvers.cone import problem
 from balancing.solvers.cone_program import InfeasibleError, quadratic_minimum
-from balancing.solvers.sectors import allowed_sectors, stands_in
+from balancing.solvers.sectors import allowed_sectors, meets
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 
@@ -37,7 +37,7 @@ SPREAD, PROJECTED, STARTS = 300, 60, 24
 RIVAL = 16.0
 """For drawn readings the ends are started from again whose Q is larger than the best by at most so much."""
 
-_ROUNDING, _HALVINGS = 1e-7, 40
+_ROUNDING = 1e-7
 _LEAST_CURVATURE = 1e-9
 _SAME = 1e-4
 _BEYOND = 3.0
@@ -52,12 +52,7 @@ class LimitedProblem(NamedTuple):
 
     def kept(self, D: ComplexArray) -> bool:
         """Whether weights are within the limits."""
-        limits = self.limits
-        return bool(
-            (np.abs(D) <= limits.max_weight).all()
-            and (np.abs(limits.Y + limits.W @ D) <= limits.residual).all()
-            and all(stands_in(v, s) for v, s in zip(D, self.sectors, strict=True))
-        )
+        return meets(self.limits, self.sectors, D)
 
     def chi_square(self, D: ComplexArray) -> float:
         """Σ rᵀ Σ⁻¹ r, without row weights (readings of weight 0 left out)."""
@@ -133,29 +128,20 @@ def descend_all(given: LimitedProblem, starts: Iterable[ComplexArray], settled: 
 
 def _descend(given: LimitedProblem, D: ComplexArray, settled: float) -> End:
     """Steps down from some weights; the first one is taken whole where they are beyond the limits."""
-    d, kept = stretch(D), given.kept(D)
-    at = likelihood.evaluate(given.fit, d)
-    for _ in range(STEPS):
+
+    def step(d: FloatArray, at: likelihood.State) -> tuple[FloatArray, float, bool]:
         g = likelihood.gradient(given.fit, at)
         H = _convex(likelihood.hessian(given.fit, at))
         D, down = unstretch(d), -unstretch(g)
         limits = replace(given.limits, sectors=_sectors_at(given, np.where(D == 0, down, D)))
-        step = stretch(quadratic_minimum(limits, D, g, H)) - d
-        expected, t = float(-2 * g @ step - step @ H @ step), 1.0
-        new = likelihood.evaluate(given.fit, d + step)
-        if kept and expected <= settled * (1 + at.objective):
-            # rounding of Q says nothing of so small a step, after which Newton is at rounding: taken whole
-            return End(unstretch(d + step), new.objective, True)
-        if not kept:
-            d, at, kept = d + step, new, True
-            continue
-        while new.objective > at.objective - 1e-4 * t * expected and t > 0.5**_HALVINGS:
-            t /= 2
-            new = likelihood.evaluate(given.fit, d + t * step)
-        if new.objective >= at.objective:
-            return End(unstretch(d), at.objective, expected <= _ROUNDING * (1 + at.objective))
-        d, at = d + t * step, new
-    return End(unstretch(d), at.objective, False)
+        move = stretch(quadratic_minimum(limits, D, g, H)) - d
+        return move, float(-2 * g @ move - move @ H @ move), True
+
+    d = stretch(D)
+    if not given.kept(D):
+        d = d + step(d, likelihood.evaluate(given.fit, d))[0]
+    end = likelihood.descend(given.fit, d, step, most=STEPS, settled=settled, rounding=_ROUNDING)
+    return End(unstretch(end.d), end.at.objective, end.settled)
 
 
 def _convex(H: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.matrices.elements import Layout, bending_terms, gyroscopic_terms, mass_terms
+from fem.matrices.strain import strains
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray, IndexArray
 
@@ -31,39 +32,27 @@ class Matrices:
     shaft
         Stiffness of the shaft (and tilting springs) without the supports' stiffness, upper band of shape
         (width + 1, size).
-    stiffness
-        The same with the supports that are plain: one constant stiffness, on the ground.
     mass
         Shaft and discs; tilting inertia if the model has `rotary_inertia`.
     gyroscopic
         G, polar inertia of shaft and discs on the slopes; zero unless the model has `gyroscopic`.
     material
         B, Σ β K of the elements.
-    damped
-        Unknowns (from 0) on which damping of plain supports acts, shape (d,).
-    damping
-        Its coefficients, N·s/m, shape (d,).
-    rigid
-        Number of rigid-body motions that no stiffness of plain supports resists: 0, 1 or 2.
     stride, width
         Unknowns per node, and entries of a band above its diagonal.
     """
 
     shaft: FloatArray
-    stiffness: FloatArray
     mass: FloatArray
     gyroscopic: FloatArray
     material: FloatArray
-    damped: IndexArray
-    damping: FloatArray
-    rigid: int
     stride: int
     width: int
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return int(self.stiffness.shape[1])
+        return int(self.shaft.shape[1])
 
     def deflection(self, node: int) -> int:
         """Unknown, from 0, of the deflection of a node, from 1; that of its slope is the next."""
@@ -79,33 +68,21 @@ def assemble(rotor: Rotor) -> Matrices:
     """Matrices of a rotor, assembled without a loop over elements."""
     layout, model = Layout(rotor), rotor.model
     bending = bending_terms(rotor)
-    shaft, M = layout.band(*bending), layout.band(*mass_terms(rotor))
-    G = layout.band(*gyroscopic_terms(rotor)) if model.gyroscopic else np.zeros_like(M)
-    beta = rotor.material_damping
-    B = layout.band(*((beta * factor, form) for factor, form in bending)) if beta.any() else np.zeros_like(M)
-    w = layout.width
+    K, M = layout.band(bending), layout.band(mass_terms(rotor))
+    G = layout.band(gyroscopic_terms(rotor)) if model.gyroscopic else np.zeros_like(M)
+    B, beta = np.zeros_like(M), rotor.material_damping
+    if beta.any():
+        B = layout.band([(beta * factor, form) for factor, form in bending])
     for disc in rotor.discs:
-        unknown = layout.deflection(disc.node)
-        M[w, unknown] += disc.mass
+        deflection = layout.stride * (disc.node - 1)
+        M[-1, deflection] += disc.mass
         if model.rotary_inertia:
-            M[w, unknown + 1] += disc.diametral_inertia
+            M[-1, deflection + 1] += disc.diametral_inertia
         if model.gyroscopic:
-            G[w, unknown + 1] += disc.polar_inertia
+            G[-1, deflection + 1] += disc.polar_inertia
     for support in rotor.supports:
-        shaft[w, layout.deflection(support.node) + 1] += support.tilting_stiffness
-    K = shaft.copy(order="K")
-    damping: dict[int, float] = {}
-    for support in rotor.supports:
-        if not support.plain:
-            continue
-        unknown = layout.deflection(support.node)
-        K[w, unknown] += support.stiffness
-        if support.damping > 0:
-            damping[unknown] = damping.get(unknown, 0.0) + support.damping
-    held = {s.node for s in rotor.supports if s.plain and s.stiffness > 0}
-    damped, coefficients = np.array(list(damping), dtype=np.intp), np.array(list(damping.values()))
-    rigid = free_motions(rotor, held)
-    return Matrices(shaft, K, M, G, B, damped, coefficients, rigid, layout.stride, w)
+        K[-1, layout.stride * (support.node - 1) + 1] += support.tilting_stiffness
+    return Matrices(K, M, G, B, layout.stride, layout.width)
 
 
 def free_motions(rotor: Rotor, held: set[int]) -> int:
@@ -173,24 +150,12 @@ def general(band: FloatArray) -> FloatArray:
 def shaft_energy(rotor: Rotor, X: FloatArray) -> FloatArray:
     """Twice the strain energy of the shaft and of tilting springs for each column of X, N·m, shape (m,).
 
-    It is summed from the end rotations of each element against its chord, which loses rounding of the
-    order (number of elements)² instead of the fourth power that xᵀ K x itself loses.
+    Summed from strains (`fem.matrices.strain`) it loses rounding of the order (number of elements)² instead
+    of the fourth power that xᵀ K x itself loses.
     """
+    S = strains(rotor, X)
+    energy = np.einsum("kem,kem->m", S, S)
     stride = 4 if rotor.model.shear else 2
-    L = rotor.length[:, None]
-    w, slope = X[0::stride], X[1::stride]
-    chord = np.diff(w, axis=0) / L
-    a, b = slope[:-1] - chord, slope[1:] - chord
-    stiffness = 4 * rotor.youngs_modulus * rotor.second_moment / rotor.length
-    if rotor.model.shear:
-        left, right = X[2::stride], X[3::stride]
-        a, b, step = a + left, b + right, right - left
-        # ∫(w'' − γ')² = 4 (a² + a b + b²) / L − 2 (b − a)(γ_b − γ_a) / L + (γ_b − γ_a)² / L
-        energy = stiffness @ (a * a + a * b + b * b + step * (step - 2 * (b - a)) / 4)
-        shear = rotor.shear_coefficient * rotor.shear_modulus * rotor.area * rotor.length / 3
-        energy = energy + shear @ (left * left + left * right + right * right)
-    else:
-        energy = stiffness @ (a * a + a * b + b * b)
     for support in rotor.supports:
         if support.tilting_stiffness:
             energy = energy + support.tilting_stiffness * X[stride * (support.node - 1) + 1] ** 2
@@ -213,23 +178,16 @@ def rounding_error(band: FloatArray, X: FloatArray, energy: FloatArray | None = 
 
 def ignored_inertia(rotor: Rotor) -> tuple[str, ...]:
     """One warning for each disc whose moments of inertia the model leaves out."""
-    polar, diametral = not rotor.model.gyroscopic, not rotor.model.rotary_inertia
-    warnings = []
+    model, warnings = rotor.model, []
+    polar = ("polar", "no gyroscopic effect", "polar_inertia", model.gyroscopic)
+    diametral = ("diametral", "no rotary inertia", "diametral_inertia", model.rotary_inertia)
+    left_out = [moment for moment in (diametral, polar) if not moment[-1]]
+    missing = " and ".join(effect for _, effect, _, _ in left_out)
     for disc in rotor.discs:
-        left_out = [
-            name
-            for name, value in (
-                ("polar", polar and disc.polar_inertia > 0),
-                ("diametral", diametral and disc.diametral_inertia > 0),
-            )
-            if value
-        ]
-        if not left_out:
+        kinds = [kind for kind, _, name, _ in left_out if getattr(disc, name) > 0]
+        if not kinds:
             continue
         name = f" {disc.name!r}" if disc.name else ""
-        what = "moments of inertia are" if polar and diametral else f"{left_out[0]} moment of inertia is"
-        missing = [text for text, off in (("rotary inertia", diametral), ("gyroscopic effect", polar)) if off]
-        warnings.append(
-            f"disc{name} at node {disc.node}: its {what} ignored, the model has no {' and no '.join(missing)}"
-        )
+        what = "moments of inertia are" if len(left_out) > 1 else f"{kinds[0]} moment of inertia is"
+        warnings.append(f"disc{name} at node {disc.node}: its {what} ignored, the model has {missing}")
     return tuple(warnings)

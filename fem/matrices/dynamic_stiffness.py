@@ -45,7 +45,7 @@ def supported(rotor: Rotor, speeds: FloatArray) -> Supported:
     total: dict[int, ComplexArray] = {}
     reference: dict[int, float] = {}
     for support in rotor.supports:
-        if support.plain:
+        if support.plain:  # many have no others, and this is where a response begins
             k = float(support.stiffness)
             D = np.zeros((speeds.size, 2, 2), dtype=complex)
             D[:, 0, 0] = D[:, 1, 1] = k + 1j * speeds * support.damping

@@ -22,10 +22,12 @@ all of them multiples of 1/420.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fem.model.rotor import Rotor
-from rotorid.base.arrays import FloatArray, IndexArray
+from rotorid.base.arrays import FloatArray
 
 # Hermite polynomials on 0 … 1 in (w₁, s₁, w₂, s₂): ∫w''², 30 ∫w'², 420 ∫w², ∫w'(1 − ξ) and ∫w'ξ times 12.
 _CURVATURE = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
@@ -71,7 +73,7 @@ class Layout:
         L = rotor.length
         self._lengths = np.stack((np.ones_like(L), L, L * L), axis=1)
 
-    def band(self, *terms: tuple[FloatArray, FloatArray]) -> FloatArray:
+    def band(self, terms: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
         """Upper band of Σ over terms (factor per element, form), shape (width + 1, size)."""
         n, s, square = len(self._lengths), self.stride, (self.width + 1) ** 2
         flat = np.zeros((n, square))  # columns of the element, band row by row
@@ -84,15 +86,6 @@ class Layout:
         band[1:, :2] += element[:, s:]
         # The transpose of a C array: what LAPACK wants without a copy.
         return band.reshape(-1, self.width + 1)[: self.size].T
-
-    def deflection(self, node: int) -> int:
-        """Unknown, from 0, of the deflection of a node, from 1; the next one is its slope."""
-        return self.stride * (node - 1)
-
-    @property
-    def deflections(self) -> IndexArray:
-        """Unknowns of all deflections, shape (N,)."""
-        return np.arange(0, self.size, self.stride)
 
 
 def bending_terms(rotor: Rotor) -> list[tuple[FloatArray, FloatArray]]:

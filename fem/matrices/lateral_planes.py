@@ -61,15 +61,12 @@ class Planes:
         ValueError
             Outside the table of a support.
         """
-        p, shape = self.planes, (speeds.size, len(self.rotor.supports), self.planes, self.planes)
-        K, C = np.zeros(shape, dtype=self.dtype), np.zeros(shape, dtype=self.dtype)
+        p = self.planes
+        K = np.zeros((speeds.size, len(self.rotor.supports), p, p), dtype=self.dtype)
+        C = np.zeros_like(K)
         for i, support in enumerate(self.rotor.supports):
-            k, c = support.at(speeds)
-            if p == 2:
-                K[:, i], C[:, i] = k, c
-            else:
-                K[:, i, 0, 0] = k[:, 0, 0] - 1j * k[:, 0, 1]
-                C[:, i, 0, 0] = c[:, 0, 0] - 1j * c[:, 0, 1]
+            for whole, matrix in zip((K, C), support.at(speeds), strict=True):
+                whole[:, i] = matrix if p == 2 else matrix[:, :1, :1] - 1j * matrix[:, :1, 1:]
         return K, C
 
     def mirrored(self, speeds: FloatArray) -> bool:
@@ -140,16 +137,16 @@ class Quadratic:
 
     def expand(self, vectors: AnyArray) -> AnyArray:
         """Shaft unknowns of reduced vectors (…, R), shape (…, planes, size)."""
-        d = self.basis.shape[1]
-        coefficients = vectors[..., : self.P.planes * d]
-        return np.asarray(coefficients.reshape(*vectors.shape[:-1], self.P.planes, d) @ self.basis.T)
+        return self._of_shaft(vectors, self.basis)
 
     def nodes(self, vectors: AnyArray) -> AnyArray:
         """Deflections of all nodes in reduced vectors (…, R), shape (…, planes, N)."""
-        d = self.basis.shape[1]
-        coefficients = vectors[..., : self.P.planes * d]
-        picked = self.basis[:: self.P.A.stride]
-        return np.asarray(coefficients.reshape(*vectors.shape[:-1], self.P.planes, d) @ picked.T)
+        return self._of_shaft(vectors, self.basis[:: self.P.A.stride])
+
+    def _of_shaft(self, vectors: AnyArray, basis: FloatArray) -> AnyArray:
+        planes, d = self.P.planes, basis.shape[1]
+        coefficients = vectors[..., : planes * d]
+        return np.asarray(coefficients.reshape(*vectors.shape[:-1], planes, d) @ basis.T)
 
 
 def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Planes:
@@ -176,50 +173,38 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
 
 def project(P: Planes, basis: FloatArray) -> Quadratic:
     """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
+    from scipy.linalg import block_diag
+
     d, p, f = basis.shape[1], P.planes, len(P.feet)
-    R = p * (d + f)
     strain = strains(P.rotor, basis)
     flat = strain.reshape(-1, d)
-    K = flat.T @ flat
+    damped = (np.sqrt(P.rotor.material_damping)[:, None] * strain).reshape(-1, d)
+    K, B = flat.T @ flat, damped.T @ damped
     for unknown, stiffness in P.tilting:
         K += stiffness * np.outer(basis[unknown], basis[unknown])
     M = basis.T @ multiply(P.A.mass, basis)
     G = basis.T @ multiply(P.A.gyroscopic, basis)
-    damped = (np.sqrt(P.rotor.material_damping)[:, None] * strain).reshape(-1, d)
-    B = damped.T @ damped
-    feet = [slice(p * d + plane * f, p * d + (plane + 1) * f) for plane in range(p)]
+    # Force in x from y, and with the opposite sign in y from x; or the same of z.
+    across = np.array([[0.0, 1.0], [-1.0, 0.0]]) if p == 2 else np.array([[-1j]])
 
-    def along(matrix: FloatArray, foot: FloatArray) -> FloatArray:
-        """The same in each plane."""
-        full = np.zeros((R, R))
-        for plane in range(p):
-            full[plane * d : (plane + 1) * d, plane * d : (plane + 1) * d] = (matrix + matrix.T) / 2
-            full[feet[plane], feet[plane]] = np.diag(foot[:, plane])
-        return full
+    def planes(sides: AnyArray, shaft: FloatArray, feet: FloatArray) -> AnyArray:
+        """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
+        return np.asarray(block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(feet.T.ravel())))
 
-    def across(matrix: FloatArray) -> AnyArray:
-        """Force in x from y, and with the opposite sign in y from x."""
-        full = np.zeros((R, R), dtype=P.dtype)
-        if p == 1:
-            full[:d, :d] = -1j * (matrix + matrix.T) / 2
-        else:
-            full[:d, d : 2 * d] = (matrix + matrix.T) / 2
-            full[d : 2 * d, :d] = -(matrix + matrix.T) / 2
-        return full
-
+    along, none = np.eye(p), np.zeros((f, p))
     # What a support feels: motion of its node against the ground or the foot, in each plane.
-    felt = np.zeros((len(P.rows), p, R))
+    felt = np.zeros((len(P.rows), p, p * (d + f)))
     for plane in range(p):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
         felt[P.feet, plane, p * d + plane * f + np.arange(f)] = -1.0
-    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, R * R)
+    ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
     return Quadratic(
         P=P,
         basis=basis,
-        M=along(M, P.foot_mass),
-        D0=along(B, P.foot_damping),
-        D1=across(G),
-        K0=along(K, P.foot_stiffness),
-        K1=across(B),
+        M=planes(along, M, P.foot_mass),
+        D0=planes(along, B, P.foot_damping),
+        D1=planes(across, G, none),
+        K0=planes(along, K, P.foot_stiffness),
+        K1=planes(across, B, none),
         ties=ties,
     )

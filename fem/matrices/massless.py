@@ -7,51 +7,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 
 ZERO = 1e-13  # share of the dynamic stiffness below which the damping of a massless coordinate is rounding
 _SINGULAR = 1e-12
 _FAR = 1e2  # ratio of neighbouring eigenvalues from which both ends are computed apart
 
 
-@dataclass(frozen=True, eq=False)
-class Sorted:
-    """q = right · η, where the first `massive` of η move mass and the others do not; rows leftᵀ.
+def massive_first(M: FloatArray) -> tuple[IndexArray, int]:
+    """The order that puts coordinates without mass last, and how many move mass.
 
-    Attributes
-    ----------
-    left, right
-        Shape (n, n).
-    mass
-        Of the first, shape (massive, massive), regular.
-    names
-        Of η: those of the coordinates as far as they are the same.
+    Raises
+    ------
+    ValueError
+        If combinations of the others move no mass.
     """
-
-    left: FloatArray
-    right: FloatArray
-    mass: FloatArray
-    names: tuple[str, ...]
-
-
-def sorted_by_mass(M: FloatArray, names: Sequence[str]) -> Sorted:
-    """Put coordinates without mass last; where only combinations move none, take combinations."""
     massive = M.any(axis=0) | M.any(axis=1)
     one, two = np.flatnonzero(massive), np.flatnonzero(~massive)
-    order = np.concatenate((one, two))
-    unit = np.eye(len(M))[:, order]
     block = M[np.ix_(one, one)]
-    ordered = [names[int(i)] for i in order]
     s = _equilibrating(np.abs(block))
-    W, sigma, Vt = np.linalg.svd(s[:, None] * block * s)
-    rank = int(np.count_nonzero(sigma > _SINGULAR))
-    if rank == one.size:
-        return Sorted(unit, unit, block, tuple(ordered))
-    left, right = unit.copy(), unit.copy()
-    for side, vectors in ((left, W), (right, Vt.T)):
-        side[one, : one.size] = s[:, None] * np.where(np.abs(vectors) > ZERO, vectors, 0.0)
-    ordered[: one.size] = [f"combination{i + 1}" for i in range(one.size)]
-    return Sorted(left, right, np.diag(sigma[:rank]), tuple(ordered))
+    if np.linalg.matrix_rank(s[:, None] * block * s, tol=_SINGULAR) < one.size:
+        raise ValueError(
+            "the mass matrix is singular without a zero row (as with shear but without rotary inertia): "
+            "there is no state space of it; give every combination of its coordinates mass"
+        )
+    return np.concatenate((one, two)), one.size
 
 
 def eigenvalues(A: FloatArray) -> ComplexArray:

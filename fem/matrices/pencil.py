@@ -9,7 +9,7 @@ T = [[1, 1], [−i, i]]: Hermitian, if D is real and symmetric. Pedestals add un
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from fem.matrices.bands import Matrices, multiply, shaft_energy
 from fem.model.rotor import Rotor, Support
+from fem.model.supports import Pedestal
 from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
 
 Whirl = Literal[-1, 0, 1]  # backward, without gyroscopic effect, forward
@@ -76,36 +77,11 @@ def whirling_mass(A: Matrices, whirl: Whirl) -> FloatArray:
 
 def one_plane(rotor: Rotor, A: Matrices, whirl: Whirl = 0, springs: dict[int, float] | None = None) -> Pencil:
     """Pencil of one plane, on given springs {node: N/m}; by default on the stiffness of plain supports."""
-    K = A.stiffness
     if springs is None:
-        springs = _at_nodes((s.node, s.stiffness) for s in rotor.supports if s.plain)
+        held = [_Spring(s.node, s.stiffness * np.eye(2)) for s in rotor.supports if s.plain and s.stiffness]
     else:
-        K = A.shaft.copy(order="K")
-        for node, k in springs.items():
-            K[A.width, A.deflection(node)] += k
-    held = {A.deflection(node): k for node, k in springs.items() if k}
-
-    def energy(X: AnyArray) -> FloatArray:
-        total = shaft_energy(rotor, X)
-        for unknown, k in held.items():
-            total = total + k * X[unknown] ** 2
-        return np.asarray(total)
-
-    rigid = _rigid(rotor, A, [(node, np.ones(1)) for node, k in springs.items() if k], 1)[0]
-    M = whirling_mass(A, whirl)
-    definite = not whirl or not rotor.model.gyroscopic
-    return Pencil(
-        rotor,
-        A,
-        K,
-        M,
-        energy,
-        rigid,
-        sum(springs.values()),
-        A.deflections[None, :],
-        A.deflections[None, :] + 1,
-        definite,
-    )
+        held = [_Spring(node, k * np.eye(2)) for node, k in springs.items() if k]
+    return _pencil(rotor, A, (whirl,), held)
 
 
 def static_stiffness(support: Support, speed: float) -> FloatArray:
@@ -124,26 +100,34 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
     One plane, forward, where the supports are rotationally symmetric, else both. Unknowns of pedestals
     stand beside those of their node.
     """
-    if all(support.plain for support in rotor.supports):
-        return one_plane(rotor, A, 1)
-    planes = 1 if rotor.symmetric else 2
-    forms = [(s, k) for s in rotor.supports if (k := static_stiffness(s, speed)).any()]
-    pedestals = [(s.node, s.pedestal.mass) for s, _ in forms if s.pedestal is not None]
-    if planes == 1 and not pedestals:
-        return one_plane(rotor, A, 1, _at_nodes((s.node, float(k[0, 0])) for s, k in forms))
+    whirls: tuple[Whirl, ...] = (1,) if rotor.symmetric else (1, -1)
+    springs = [_Spring(s.node, static_stiffness(s, speed), s.pedestal) for s in rotor.supports]
+    return _pencil(rotor, A, whirls, [spring for spring in springs if spring.k.any()])
 
-    skew = any(k[0, 1] or k[1, 0] for _, k in forms)
+
+@dataclass(frozen=True, eq=False)
+class _Spring:
+    """What holds a node: symmetric stiffness in (x, y), N/m, shape (2, 2), to the ground or to a pedestal."""
+
+    node: int
+    k: FloatArray
+    pedestal: Pedestal | None = None
+
+
+def _pencil(rotor: Rotor, A: Matrices, whirls: Sequence[Whirl], springs: list[_Spring]) -> Pencil:
+    planes = len(whirls)
+    pedestals = [(s.node, s.pedestal.mass) for s in springs if s.pedestal is not None]
+    skew = any(s.k[0, 1] or s.k[1, 0] for s in springs)
     dtype = complex if skew and planes == 2 else float
     shaft, stands = _places(A, [node for node, _ in pedestals], planes)
     size = shaft.size + stands.size
     width = int((shaft[0, A.width :] - shaft[0, : -A.width]).max()) + planes - 1
-    K, M = (np.zeros((width + 1, size), dtype=dtype) for _ in range(2))
-    whirls: tuple[Whirl, ...] = (1, -1)
-    for places, whirl in zip(shaft, whirls[:planes], strict=True):
+    K, M = (np.zeros((width + 1, size), dtype=dtype, order="F") for _ in range(2))
+    for places, whirl in zip(shaft, whirls, strict=True):
         _add_band(K, A.shaft, places)
         _add_band(M, whirling_mass(A, whirl), places)
-    springs = list(_springs(forms, shaft[:, A.deflections], stands, dtype))
-    for unknowns, form in springs:
+    forms = list(_forms(springs, shaft[:, A.deflections], stands, dtype))
+    for unknowns, form in forms:
         _add_form(K, form, unknowns)
     M[width, stands] += np.array([mass for _, mass in pedestals])
 
@@ -154,25 +138,26 @@ def whole_rotor(rotor: Rotor, A: Matrices, speed: float = 0.0) -> Pencil:
             total = total + shaft_energy(rotor, Y.real)
             if dtype is complex:
                 total = total + shaft_energy(rotor, Y.imag)
-        for unknowns, form in springs:
+        for unknowns, form in forms:
             Y = X[unknowns]
-            total = total + np.einsum("im,ij,jm->m", Y.conj(), form, Y).real
+            total = total + (Y.conj() * (form @ Y)).real.sum(axis=0)
         return np.asarray(total)
 
-    motions = _whirling_rigid(rotor, A, forms, dtype, planes)
+    motions = _whirling_rigid(rotor, A, springs, dtype, planes)
     rigid = np.zeros((size, motions.shape[2]), dtype=dtype)
     rigid[shaft] = motions
-    total = sum(float(np.trace(k)) / 2 for _, k in forms)
-    waves, tilts = shaft[:, A.deflections], shaft[:, A.deflections + 1]
-    return Pencil(rotor, A, K, M, energy, rigid, total, waves, tilts, not rotor.model.gyroscopic)
-
-
-def _at_nodes(springs: Iterable[tuple[int, float]]) -> dict[int, float]:
-    """Springs {node: N/m}, those of one node added."""
-    sums: dict[int, float] = {}
-    for node, k in springs:
-        sums[node] = sums.get(node, 0.0) + k
-    return sums
+    return Pencil(
+        rotor=rotor,
+        matrices=A,
+        stiffness=K,
+        mass=M,
+        energy=energy,
+        rigid=rigid,
+        springs=sum(float(np.trace(s.k)) / 2 for s in springs),
+        waves=shaft[:, A.deflections],
+        tilts=shaft[:, A.deflections + 1],
+        definite=not any(whirls) or not rotor.model.gyroscopic,
+    )
 
 
 def _places(A: Matrices, pedestals: list[int], planes: int) -> tuple[IndexArray, IndexArray]:
@@ -188,6 +173,9 @@ def _places(A: Matrices, pedestals: list[int], planes: int) -> tuple[IndexArray,
 
 def _add_band(band: AnyArray, source: FloatArray, places: IndexArray) -> None:
     """Add the band of one plane where its unknowns stand."""
+    if band.shape == source.shape:  # there are no others
+        band += source
+        return
     width, own, size = len(band) - 1, len(source) - 1, len(places)
     for above in range(own + 1):
         rows, columns = places[: size - above], places[above:]
@@ -202,8 +190,8 @@ def _add_form(band: AnyArray, form: AnyArray, unknowns: IndexArray) -> None:
                 band[len(band) - 1 + i - j, j] += form[a, b]
 
 
-def _springs(
-    forms: list[tuple[Support, FloatArray]], nodes: IndexArray, stands: IndexArray, dtype: type
+def _forms(
+    springs: list[_Spring], nodes: IndexArray, stands: IndexArray, dtype: type
 ) -> Iterator[tuple[IndexArray, AnyArray]]:
     """Unknowns and Hermitian form, on (F, b) or on F alone, of each bearing and pedestal."""
     planes, seats = len(nodes), iter(stands.T)
@@ -212,8 +200,8 @@ def _springs(
         form = np.asarray(FROM_XY @ k @ TO_XY)[:planes, :planes]
         return form.real if dtype is float else form
 
-    for s, k in forms:
-        node, form = nodes[:, s.node - 1], turned(k)
+    for s in springs:
+        node, form = nodes[:, s.node - 1], turned(s.k)
         if s.pedestal is None:
             yield node, form
             continue
@@ -222,15 +210,13 @@ def _springs(
         yield own, turned(np.diag(s.pedestal.xy("stiffness")))
 
 
-def _whirling_rigid(
-    rotor: Rotor, A: Matrices, forms: list[tuple[Support, FloatArray]], dtype: type, planes: int
-) -> AnyArray:
+def _whirling_rigid(rotor: Rotor, A: Matrices, springs: list[_Spring], dtype: type, planes: int) -> AnyArray:
     """Rigid motions of the shaft that strain no support: F, or F and b, shape (planes, size, r)."""
     if planes == 1:
-        return _rigid(rotor, A, [(s.node, np.ones(1)) for s, _ in forms], 1)[0][None]
+        return _rigid(rotor, A, [(s.node, np.ones(1)) for s in springs], 1)[0][None]
     constraints = []
-    for s, k in forms:
-        values, directions = np.linalg.eigh(k)
+    for s in springs:
+        values, directions = np.linalg.eigh(s.k)
         stiff = np.abs(values) > 1e-12 * np.abs(values).max()
         constraints += [(s.node, direction) for direction in directions.T[stiff]]
     x, y = _rigid(rotor, A, constraints, 2)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fem.model.disc import STEEL_DENSITY, Disc
 from fem.model.supports import Pedestal, Support
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
@@ -95,7 +95,7 @@ class Rotor:
     model: Model = Model()
 
     def __post_init__(self) -> None:
-        for name, value in zip(_PER_ELEMENT, _broadcast(self), strict=True):
+        for name, value in zip(PER_ELEMENT, _broadcast(self), strict=True):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "discs", _attached(self.discs, Disc, "disc", self.n_nodes))
         object.__setattr__(self, "supports", _attached(self.supports, Support, "support", self.n_nodes))
@@ -108,7 +108,7 @@ class Rotor:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Rotor):
             return NotImplemented
-        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in _PER_ELEMENT) and (
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in PER_ELEMENT) and (
             (self.discs, self.supports, dict(self.stations), self.model)
             == (other.discs, other.supports, dict(other.stations), other.model)
         )
@@ -214,7 +214,7 @@ class Rotor:
 
 
 _T = TypeVar("_T", Disc, Support)
-_PER_ELEMENT = (
+PER_ELEMENT = (
     "length",
     "outer_diameter",
     "inner_diameter",
@@ -229,7 +229,7 @@ _MAY_BE_ZERO = ("inner_diameter", "density", "material_damping")
 def _broadcast(rotor: Rotor) -> list[FloatArray]:
     """Checked, read-only arrays of equal length from what was given for each element."""
     arrays = []
-    for name in _PER_ELEMENT:
+    for name in PER_ELEMENT:
         try:
             array = np.atleast_1d(np.asarray(getattr(rotor, name), dtype=float))
         except (TypeError, ValueError):
@@ -238,7 +238,7 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
             raise ValueError(f"{name} must be one number per element, not an array of shape {array.shape}")
         arrays.append(array)
     n = max(len(array) for array in arrays)
-    for name, array in zip(_PER_ELEMENT, arrays, strict=True):
+    for name, array in zip(PER_ELEMENT, arrays, strict=True):
         if len(array) not in (1, n) or not len(array):
             raise ValueError(f"{name} has {len(array)} values for {n} elements; give one value, or {n}")
         if name == "poisson_ratio":
@@ -252,8 +252,7 @@ def _broadcast(rotor: Rotor) -> list[FloatArray]:
             raise ValueError(f"element {i + 1}: {name} must be finite and {limit}, not {array[i]}")
     # Copies: the caller's arrays stay his, ours stay read-only.
     arrays = [np.broadcast_to(array, (n,)).copy() for array in arrays]
-    for array in arrays:
-        array.flags.writeable = False
+    read_only(*arrays)
     outer, inner = arrays[1], arrays[2]
     if (inner >= outer).any():
         i = int(np.argmax(inner >= outer))

@@ -54,23 +54,22 @@ def as_sensor(sensor: SensorLike, rotor: Rotor) -> Sensor:
     ValueError
         If there is no such node, or it is none of these.
     """
-    if isinstance(sensor, Sensor):
-        found = sensor
-    elif isinstance(sensor, tuple):
-        if len(sensor) != 2:
-            raise ValueError(f"a sensor is a node or a pair (node, angle in degrees), not {sensor!r}")
-        found = Sensor(*sensor)
-    else:
-        found = Sensor(sensor)
+    if isinstance(sensor, tuple) and len(sensor) != 2:
+        raise ValueError(f"a sensor is a node or a pair (node, angle in degrees), not {sensor!r}")
+    found = _sensor(sensor)
     rotor.node(found.node)
     return found
 
 
 def label(sensor: SensorLike) -> str | int:
     """How a table names it: as given, or "5 at 45°"."""
-    if isinstance(sensor, tuple):
-        sensor = Sensor(*sensor)
-    return str(sensor) if isinstance(sensor, Sensor) else sensor
+    return str(_sensor(sensor)) if isinstance(sensor, (tuple, Sensor)) else sensor
+
+
+def _sensor(sensor: SensorLike) -> Sensor:
+    if isinstance(sensor, Sensor):
+        return sensor
+    return Sensor(*sensor) if isinstance(sensor, tuple) else Sensor(sensor)
 
 
 def as_sensors(sensors: Sequence[SensorLike], rotor: Rotor) -> list[Sensor]:

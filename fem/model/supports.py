@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -129,10 +130,10 @@ class Support:
     @property
     def symmetric(self) -> bool:
         """Whether no direction differs: kxx = kyy, kxy = −kyx, the same for damping and pedestal."""
-        if self.pedestal is not None and not self.pedestal.symmetric:
-            return False
-        entries = (*self._entries("stiffness"), *self._entries("damping"))
-        return all(not isinstance(e, tuple) or (e[0][0] == e[1][1] and e[0][1] == -e[1][0]) for e in entries)
+        tables = self._tables
+        alike = np.array_equal(tables[..., 0, 0], tables[..., 1, 1])
+        turned = np.array_equal(tables[..., 0, 1], -tables[..., 1, 0])
+        return alike and turned and (self.pedestal is None or self.pedestal.symmetric)
 
     @property
     def plain(self) -> bool:
@@ -147,14 +148,14 @@ class Support:
     @property
     def coupled(self) -> bool:
         """Whether any stiffness or damping couples x and y."""
-        entries = (*self._entries("stiffness"), *self._entries("damping"))
-        return any(isinstance(e, tuple) and (e[0][1] != 0 or e[1][0] != 0) for e in entries)
+        return bool(self._tables[..., (0, 1), (1, 0)].any())
 
     @property
     def damped(self) -> bool:
         """Whether it has any damping, that of the pedestal included."""
-        own = any(np.any(entry) for entry in self._entries("damping"))
-        return own or (self.pedestal is not None and max(self.pedestal.xy("damping")) > 0)
+        return bool(self._tables[1].any()) or (
+            self.pedestal is not None and max(self.pedestal.xy("damping")) > 0
+        )
 
     def at(self, omega: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Stiffness and damping matrices at speeds in rad/s, each of shape (…, 2, 2), without the pedestal.
@@ -166,7 +167,7 @@ class Support:
         """
         omega = np.asarray(omega, dtype=float)
         if self.constant:
-            k, c = _full(self.stiffness), _full(self.damping)
+            k, c = self._tables[:, 0]
             shape = (*omega.shape, 2, 2)
             return np.broadcast_to(k, shape), np.broadcast_to(c, shape)
         first, last = self.speeds[0], self.speeds[-1]
@@ -178,12 +179,10 @@ class Support:
                 f"{first:.6g} to {last:.6g} rad/s, not {float(outside):.6g} rad/s; it is not extrapolated, "
                 "extend the table or stay inside"
             )
-        out = []
-        for name in ("stiffness", "damping"):
-            table = np.array([_full(entry) for entry in self._entries(name)])
-            flat = [np.interp(omega, self.speeds, table[:, i, j]) for i in (0, 1) for j in (0, 1)]
-            out.append(np.stack(flat, axis=-1).reshape(*omega.shape, 2, 2))
-        return out[0], out[1]
+        columns = self._tables.swapaxes(0, 1).reshape(len(self.speeds), 8).T
+        flat = np.stack([np.interp(omega, self.speeds, column) for column in columns], axis=-1)
+        both = flat.reshape(*omega.shape, 2, 2, 2)
+        return both[..., 0, :, :], both[..., 1, :, :]
 
     def dynamic_stiffness(self, omega: ArrayLike, speed: ArrayLike | None = None) -> ComplexArray:
         """Force per deflection of the rotor's node at frequencies ω, pedestal included, shape (…, 2, 2).
@@ -205,9 +204,11 @@ class Support:
             )
         return np.asarray(bearing - bearing @ np.linalg.solve(bearing + stand, bearing))
 
-    def _entries(self, name: str) -> tuple[Coefficient, ...]:
-        value = getattr(self, name)
-        return value if self.speeds else (value,)
+    @cached_property
+    def _tables(self) -> FloatArray:
+        """Stiffness and damping at the speeds of the table, or one entry, shape (2, n, 2, 2)."""
+        both = ((v if self.speeds else (v,)) for v in (self.stiffness, self.damping))
+        return np.array([[_full(entry) for entry in entries] for entries in both])
 
 
 def _full(entry: Coefficient) -> FloatArray:

@@ -13,14 +13,17 @@ from fem.plots.drawing import draw_rotor
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.style import (
-    COLORS,
+    BOX,
+    DARK,
     MARKERS,
-    STYLES,
     legend_above,
     legend_beside,
+    look,
     new_axes,
+    note,
     plain,
     rpm_above,
+    shade_operating,
     shade_unstable,
 )
 from rotorid.base.units import RPM
@@ -119,52 +122,30 @@ def draw_bode(
     shade_unstable(below, _ranges(windows), "")
     steady = ~within(tuple(windows), omega)
     for k, reading in enumerate(Z.T):
-        style = _style(k, len(labels))
         seen = steady & (np.abs(reading) > 0)
         phase = np.degrees(np.unwrap(np.angle(reading[seen])))
         if phase.size:
             # The middle of the curve between -360 and 0: a lag, as engineers read it.
             phase -= 360 * np.ceil(np.median(phase) / 360)
         shown = seen | ~steady
-        below.plot(
-            omega[shown], _with_gaps(phase, seen)[shown], style, color=COLORS[k % len(COLORS)], linewidth=1.6
-        )
+        below.plot(omega[shown], _with_gaps(phase, seen)[shown], linewidth=1.6, **look(k, len(labels)))
     plain(below)
+    below.margins(x=0.01)
     below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
     below.yaxis.set_major_locator(_right_angles(below))
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     rpm_above(above)
+    across = ("data", "axes fraction")
     if operating is not None:
-        for ax in axes:
-            ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
-        above.annotate(
-            "operating range",
-            (np.mean(operating), 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, -4),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            fontsize="small",
-            color="#4a5360",
-        )
+        middle = (sum(operating) / 2, 1.0)
+        note(above, "operating range", middle, (0, -4), xycoords=across, ha="center", va="top", color=DARK)
     for speed, text in peaks:
-        for ax in axes:
-            ax.axvline(speed, color="#4a5360", linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
-        above.annotate(
-            text,
-            (speed, 0.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(3, 5),
-            textcoords="offset points",
-            rotation=90,
-            va="bottom",
-            ha="left",
-            fontsize="small",
-            color="#2f3640",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
-        )
+        note(above, text, (speed, 0.0), (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
+    for ax in axes:
+        shade_operating(ax, operating)
+        for speed, _ in peaks:
+            ax.axvline(speed, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
     return axes
 
 
@@ -199,30 +180,30 @@ def draw_polar(
     omega, Z = omega[steady], Z[steady]
     marked: list[complex] = []
     for k, (reading, named) in enumerate(zip(Z.T, labels, strict=True)):
-        color = COLORS[k % len(COLORS)]
-        phase, size = np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
-        curve = _with_gaps(phase, steady), _with_gaps(size, steady)
-        ax.plot(*curve, STYLES[k % len(STYLES)], color=color, linewidth=1.6, label=named)
+        curve, phase, size = look(k), np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
+        ax.plot(_with_gaps(phase, steady), _with_gaps(size, steady), linewidth=1.6, label=named, **curve)
         for i in _along(reading, marks):
             if any(abs(reading[i] - other) < 0.05 * np.abs(Z).max() for other in marked):
                 continue
             marked.append(complex(reading[i]))
-            marker = MARKERS[k % len(MARKERS)]
-            ax.plot(phase[i], size[i], marker, color=color, markersize=5, markeredgecolor="white")
-            ax.annotate(
-                f"{omega[i] * RPM:.0f}",
-                (phase[i], size[i]),
-                xytext=(8 * np.cos(phase[i]), 8 * np.sin(phase[i])),
-                textcoords="offset points",
+            place, color = (phase[i], size[i]), curve["color"]
+            ax.plot(*place, MARKERS[k % len(MARKERS)], color=color, markersize=5, markeredgecolor="white")
+            outwards = (8 * np.cos(phase[i]), 8 * np.sin(phase[i]))
+            speed = f"{omega[i] * RPM:.0f}"
+            note(
+                ax,
+                speed,
+                place,
+                outwards,
                 ha="center",
                 va="center",
                 fontsize="x-small",
                 color=color,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5},
+                bbox=BOX,
             )
     ax.grid(color="#d0d5dc", linewidth=0.8)
     ax.set_xlabel("amplitude, µm peak, over phase lead in degrees; marks: speed in rpm", labelpad=10)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.06), ncols=3, frameon=False, fontsize="small")
+    legend_above(ax, height=1.06)
     return ax
 
 
@@ -255,11 +236,6 @@ def _right_angles(ax: Axes) -> MultipleLocator:
     return MultipleLocator(next(step for step in (15, 30, 45, 90, 180, 360, 1e9) if (high - low) / step <= 8))
 
 
-def _style(k: int, n: int) -> str:
-    """Few curves differ by their style too, so that a black-and-white print tells them apart."""
-    return STYLES[(k if n <= len(STYLES) else k // len(COLORS)) % len(STYLES)]
-
-
 def _over_speed(
     ax: Axes | None,
     speeds: FloatArray,
@@ -271,19 +247,11 @@ def _over_speed(
     ax = new_axes() if ax is None else ax
     curves = np.where(within(tuple(windows), speeds)[:, None], np.nan, curves)
     shade_unstable(ax, _ranges(windows))
-    n = len(COLORS)
     order = np.argsort(speeds, kind="stable")
     marker = "o" if speeds.size < 12 else None
     for k, (curve, named) in enumerate(zip(curves.T, labels, strict=True)):
-        style = _style(k, len(labels))
         ax.plot(
-            speeds[order],
-            curve[order],
-            style,
-            color=COLORS[k % n],
-            marker=marker,
-            linewidth=1.6,
-            label=named,
+            speeds[order], curve[order], marker=marker, linewidth=1.6, label=named, **look(k, len(labels))
         )
     positive = curves[curves > 0]
     if positive.size and positive.max() > 30 * positive.min():

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.style import (
+    BOX,
     COLORS,
     QUIET,
     VERMILION,
-    hertz_beside,
+    WARNING,
     new_axes,
+    note,
     plain,
     rpm_above,
+    scale_beside,
+    shade_operating,
     shade_unstable,
 )
 from rotorid.base.units import RPM
@@ -24,44 +29,21 @@ from rotorid.base.units import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
+
+    from fem.campbell import Campbell
 
 HIGHEST = 3.0  # log decrements above count as "well damped" and are not drawn to scale
 _HEADROOM = 1.1  # above the highest curve, for the legend
-_Look = tuple[Literal["-", "--", ":"], str, Literal["full", "none"]]
-_LOOKS: dict[str, _Look] = {
-    "forward": ("-", "^", "full"),
-    "backward": ("--", "v", "none"),
-    "mixed": (":", "D", "none"),
+_LOOKS: dict[str, dict[str, Any]] = {
+    "forward": {"linestyle": "-", "marker": "^", "fillstyle": "full"},
+    "backward": {"linestyle": "--", "marker": "v", "fillstyle": "none"},
+    "mixed": {"linestyle": ":", "marker": "D", "fillstyle": "none"},
 }
-
-
-class CampbellLike(Protocol):
-    """What a Campbell diagram shows."""
-
-    @property
-    def speeds(self) -> FloatArray:
-        """rad/s, shape (S,)."""
-        ...
-
-    @property
-    def frequencies(self) -> FloatArray:
-        """rad/s, shape (S, n)."""
-        ...
-
-    @property
-    def log_decrements(self) -> FloatArray:
-        """Shape (S, n)."""
-        ...
-
-    @property
-    def direction(self) -> FloatArray:
-        """Above 0 forward, below 0 backward, 0 neither, shape (S, n)."""
-        ...
+_CRITICAL: dict[str, Any] = {"marker": "o", "color": "black", "markerfacecolor": "#F0E442", "markersize": 9}
 
 
 def campbell_figure(
-    campbell: CampbellLike,
+    campbell: Campbell,
     criticals: Sequence[tuple[float, float]] = (),
     *,
     operating: tuple[float, float] | None = None,
@@ -81,7 +63,7 @@ def campbell_figure(
 
 
 def draw_campbell(
-    campbell: CampbellLike,
+    campbell: Campbell,
     ax: Axes | None = None,
     *,
     criticals: Sequence[tuple[float, float]] = (),
@@ -115,23 +97,22 @@ def draw_campbell(
     ax.set(xlim=_range(campbell), ylim=(0, _HEADROOM * top))
     seen = [(speed, delta) for speed, delta in criticals if speed <= end]
     middle = _free(ax.get_xlim()[0], end, [speed for speed, _ in seen])
-    ax.annotate("1×", (middle, middle), xytext=(-4, 5), textcoords="offset points", ha="right", fontsize=11)
+    note(ax, "1×", (middle, middle), (-4, 5), ha="right", fontsize=11)
     if seen:
         places = np.array([speed for speed, _ in seen])
-        ax.plot(places, places, "o", color="black", markerfacecolor="#F0E442", markersize=9, zorder=6)
+        ax.plot(places, places, linestyle="", zorder=6, **_CRITICAL)
     _label_criticals(ax, seen)
-    if operating is not None:
-        ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+    shade_operating(ax, operating)
     shade_unstable(ax, unstable, "unstable", 0.98 / _HEADROOM)  # below the legend
     plain(ax)
     ax.set(xlabel="speed, rad/s", ylabel="whirl frequency, rad/s")
     rpm_above(ax)
-    hertz_beside(ax)
+    scale_beside(ax, 2 * np.pi, "frequency, Hz")
     _legend(ax, campbell, bool(seen))
     return ax
 
 
-def draw_log_decrements(campbell: CampbellLike, ax: Axes | None = None) -> Axes:
+def draw_log_decrements(campbell: Campbell, ax: Axes | None = None) -> Axes:
     """Draw logarithmic decrements over speed, with the limit of stability, as `draw_campbell` draws modes.
 
     Values above 3 are cut off.
@@ -146,19 +127,19 @@ def draw_log_decrements(campbell: CampbellLike, ax: Axes | None = None) -> Axes:
     ax.set(xlim=_range(campbell), ylim=(max(low, -HIGHEST), high))
     ax.axhline(0.0, color="black", linewidth=1.1)
     ax.axhspan(-1e3, 0.0, facecolor=VERMILION, alpha=0.10, hatch="///", edgecolor=VERMILION, linewidth=0)
-    ax.annotate("unstable", (0.01, 0.02), xycoords="axes fraction", fontsize="small", color="#8a3d00")
+    ax.annotate("unstable", (0.01, 0.02), xycoords="axes fraction", fontsize="small", color=WARNING)
     plain(ax)
     ax.set(xlabel="speed, rad/s", ylabel="logarithmic decrement")
     return ax
 
 
-def _range(campbell: CampbellLike) -> tuple[float, float]:
+def _range(campbell: Campbell) -> tuple[float, float]:
     first, last = float(campbell.speeds.min()), float(campbell.speeds.max())
     room = 0.06 * (last - first) or 0.05 * last or 1.0
     return (0.0 if first < 0.3 * last else first - room / 2), last + room
 
 
-def _highest(campbell: CampbellLike) -> float:
+def _highest(campbell: Campbell) -> float:
     w = campbell.frequencies
     return 1.06 * float(max(w[np.isfinite(w)].max(initial=0.0), 1e-9))
 
@@ -171,13 +152,14 @@ def _free(low: float, end: float, taken: Sequence[float]) -> float:
     return float(places[wide[0] if wide.size else np.argmax(room)])
 
 
-def _shown(campbell: CampbellLike) -> list[int]:
+def _shown(campbell: Campbell) -> list[int]:
     """Modes that have a frequency somewhere."""
     return np.flatnonzero(np.isfinite(campbell.frequencies).any(axis=0)).tolist()
 
 
-def _curves(ax: Axes, campbell: CampbellLike, values: FloatArray) -> None:
+def _curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
     S = campbell.speeds.size
+    step = max(S // 8, 1)
     ends = []
     for k in _shown(campbell):
         color = COLORS[k % len(COLORS)]
@@ -185,20 +167,16 @@ def _curves(ax: Axes, campbell: CampbellLike, values: FloatArray) -> None:
         for start, stop in _runs(way):
             # Each stretch reaches to the next one, so that the curve has no gaps.
             part = slice(start, min(stop + 1, S))
-            style, marker, fill = _LOOKS[_name(way[start])]
             ax.plot(
                 campbell.speeds[part],
                 values[part, k],
-                style,
                 color=color,
                 linewidth=1.8,
-                marker=marker,
-                fillstyle=fill,
                 markersize=6,
-                markevery=(3 * k % max(S // 8, 1), max(S // 8, 1)),
+                markevery=(3 * k % step, step),
+                **_LOOKS[DIRECTION_NAMES[way[start]]],
             )
-        good = np.flatnonzero(np.isfinite(values[:, k]))
-        if good.size and good[-1] == S - 1:
+        if np.isfinite(values[-1, k]):
             ends.append((float(values[-1, k]), str(k + 1), color))
     _label_ends(ax, float(campbell.speeds.max()), ends)
 
@@ -209,10 +187,6 @@ def _runs(way: FloatArray) -> list[tuple[int, int]]:
     return list(pairwise(breaks))
 
 
-def _name(way: float) -> str:
-    return "forward" if way > 0 else "backward" if way < 0 else "mixed"
-
-
 def _label_ends(ax: Axes, x: float, ends: list[tuple[float, str, str]]) -> None:
     """Mode numbers right of the curves; close neighbours stand side by side."""
     heights = [value for value, _, _ in ends]
@@ -221,17 +195,8 @@ def _label_ends(ax: Axes, x: float, ends: list[tuple[float, str, str]]) -> None:
     for value, text, color in sorted(ends):
         column = column + 1 if value - last < near else 0
         last = value if column == 0 else last
-        ax.annotate(
-            text,
-            (x, value),
-            xytext=(5 + 11 * column, 0),
-            textcoords="offset points",
-            va="center",
-            color=color,
-            fontsize="small",
-            fontweight="bold",
-            annotation_clip=True,
-        )
+        shift = (5 + 11 * column, 0)
+        note(ax, text, (x, value), shift, va="center", color=color, fontweight="bold", annotation_clip=True)
 
 
 def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None:
@@ -241,52 +206,25 @@ def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None
     for speed, delta in sorted(criticals):
         crowd = crowd + 1 if speed - last < room else 0
         last = speed
-        right = crowd % 2 == 0
-        ax.annotate(
-            f"{speed * RPM:.0f} rpm, δ = {delta:.2f}",
-            (speed, speed),
-            xytext=(9, -5 - 13 * (crowd // 2)) if right else (-9, 5 + 13 * (crowd // 2)),
-            textcoords="offset points",
-            va="top" if right else "bottom",
-            ha="left" if right else "right",
-            fontsize="small",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},
-            zorder=7,
-        )
+        text, at, down = f"{speed * RPM:.0f} rpm, δ = {delta:.2f}", (speed, speed), 5 + 13 * (crowd // 2)
+        if crowd % 2 == 0:
+            note(ax, text, at, (9, -down), va="top", ha="left", bbox=BOX, zorder=7)
+        else:
+            note(ax, text, at, (-9, down), va="bottom", ha="right", bbox=BOX, zorder=7)
 
 
-def _legend(ax: Axes, campbell: CampbellLike, marked: bool) -> None:
+def _legend(ax: Axes, campbell: Campbell, marked: bool) -> None:
     from matplotlib.lines import Line2D
 
-    shown = np.sign(campbell.direction[:, _shown(campbell)])
-    names = [name for name in _LOOKS if any(_name(way) == name for way in np.unique(shown))]
-    handles: list[Line2D] = [
-        Line2D(
-            [],
-            [],
-            color=QUIET,
-            linestyle=style,
-            marker=marker,
-            fillstyle=fill,
-            markersize=6,
-            label=f"{name} whirl",
-        )
-        for name, (style, marker, fill) in _LOOKS.items()
+    ways = np.unique(np.sign(campbell.direction[:, _shown(campbell)]))
+    names = {DIRECTION_NAMES[way] for way in ways.tolist()}
+    handles = [
+        Line2D([], [], color=QUIET, markersize=6, label=f"{name} whirl", **_LOOKS[name])
+        for name in _LOOKS
         if name in names
     ]
     if marked:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color="black",
-                linestyle="",
-                marker="o",
-                markerfacecolor="#F0E442",
-                markersize=9,
-                label="damped critical speed",
-            )
-        )
+        handles.append(Line2D([], [], linestyle="", label="damped critical speed", **_CRITICAL))
     # One row in the room above the curves.
     ax.legend(
         handles=handles,

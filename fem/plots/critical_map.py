@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.style import COLORS, MARKERS, STYLES, legend_above, new_axes, plain, times
+from rotorid.base.style import DARK, MARKERS, legend_above, look, new_axes, plain, scale_beside
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -43,16 +43,14 @@ def draw_speed_map(
     k, omega = np.asarray(stiffness, float), np.asarray(speeds, float)
     for mode, curve in enumerate(omega.T):
         seen = curve > 0
-        color = COLORS[mode % len(COLORS)]
-        ax.plot(k[seen], curve[seen] * RPM, STYLES[mode % len(STYLES)], color=color, linewidth=2,
-                label=f"critical speed {mode + 1}")  # fmt: skip
+        ax.plot(k[seen], curve[seen] * RPM, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
     ax.set(xscale="log", yscale="log")
     low, high = ax.get_ylim()
     for i, (label, own, at) in enumerate(supports):
         own, at = np.atleast_1d(np.asarray(own, float)), np.atleast_1d(np.asarray(at, float))
         x, y = (own, at * RPM) if at.size else (np.repeat(own[:1], 2), np.array([low, high]))
         marker = MARKERS[i % len(MARKERS)] if at.size else ""
-        ax.plot(x, y, color="#4a5360", linestyle=(0, (1, 1.5)), linewidth=1.3, marker=marker, markersize=5,
+        ax.plot(x, y, color=DARK, linestyle=(0, (1, 1.5)), linewidth=1.3, marker=marker, markersize=5,
                 markerfacecolor="white", label=label)  # fmt: skip
     ax.set_ylim(low, high)
     if operating is not None:
@@ -61,9 +59,7 @@ def draw_speed_map(
     ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm")
     plain(ax)
     ax.grid(which="minor", color="#f0f2f5", linewidth=0.5)
-    right = ax.secondary_yaxis("right", functions=(times(1 / RPM), times(RPM)))
-    right.set_ylabel("rad/s", fontsize="small")
-    right.tick_params(labelsize="small")
+    scale_beside(ax, RPM, "rad/s")
     _plain_numbers(ax)
     legend_above(ax)
     return ax

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,13 +12,14 @@ from fem.model.rotor import Disc, Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.model.supports import KINDS
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, legend_above, new_axes
+from rotorid.base.style import COLORS, DARK, QUIET, legend_above, new_axes, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.path import Path
 
-SHAFT, EDGE, HOLE, MASS, DISC, SUPPORT = "#d9dde3", "#6b7480", "#ffffff", "#4a5360", "#aab3bf", "#2f3640"
+SHAFT, HOLE, DISC, SUPPORT = "#d9dde3", "#ffffff", "#aab3bf", "#2f3640"
+EDGE, MASS = QUIET, DARK
 PLANE, SENSOR = COLORS[1], COLORS[0]
 
 
@@ -106,47 +107,20 @@ def _discs(rotor: Rotor, discs: Sequence[Disc], ax: Axes, scale: float) -> None:
     shape = np.array([_solid(disc) for disc in discs])
     x = rotor.positions[[disc.node - 1 for disc in discs]]
     radius, width = scale * shape[:, 0], np.maximum(shape[:, 1], thinnest)
-    ax.bar(
-        x,
-        2 * radius,
-        width,
-        -radius,
-        color=DISC,
-        edgecolor=MASS,
-        linewidth=0.9,
-        zorder=0.8,
-        label=f"{'discs' if len(discs) > 1 else 'disc'}, {_masses_text(discs)}",
-    )
+    text = f"{'discs' if len(discs) > 1 else 'disc'}, {_masses_text(discs)}"
+    ax.bar(x, 2 * radius, width, -radius, color=DISC, edgecolor=MASS, linewidth=0.9, zorder=0.8, label=text)
 
 
 def _shaft(rotor: Rotor, ax: Axes, scale: float) -> None:
     """Rectangles of the elements; a bore is a lighter band with dashed edges."""
-    x, outer, inner = rotor.positions, scale * rotor.outer_diameter / 2, scale * rotor.inner_diameter / 2
-    ax.bar(
-        x[:-1],
-        2 * outer,
-        rotor.length,
-        -outer,
-        align="edge",
-        color=SHAFT,
-        edgecolor=EDGE,
-        linewidth=0.7,
-        zorder=1,
+    looks: tuple[dict[str, Any], ...] = (
+        {"color": SHAFT, "linewidth": 0.7, "zorder": 1},
+        {"color": HOLE, "linewidth": 0.6, "zorder": 1.5, "linestyle": (0, (4, 2))},
     )
-    hollow = inner > 0
-    if hollow.any():
-        ax.bar(
-            x[:-1][hollow],
-            2 * inner[hollow],
-            rotor.length[hollow],
-            -inner[hollow],
-            align="edge",
-            color=HOLE,
-            edgecolor=EDGE,
-            linewidth=0.6,
-            linestyle=(0, (4, 2)),
-            zorder=1.5,
-        )
+    for diameter, drawn in zip((rotor.outer_diameter, rotor.inner_diameter), looks, strict=True):
+        there = diameter > 0
+        left, length, d = rotor.positions[:-1][there], rotor.length[there], scale * diameter[there]
+        ax.bar(left, d, length, -d / 2, align="edge", edgecolor=EDGE, **drawn)
 
 
 def _masses(rotor: Rotor, ax: Axes) -> None:
@@ -184,34 +158,24 @@ def _supports(rotor: Rotor, supports: Sequence[Support], kind: str, ax: Axes, sc
         text = f"{'damped ' if damped and kind == 'bearing' else ''}{noun}{'s' if len(nodes) > 1 else ''}"
         if standing:
             text += " on pedestals" if len(nodes) > 1 else " on a pedestal"
-        face = COLORS[4] if damped else SUPPORT
         if kind == "seal":
-            for side, where in ((-1, -y), (1, y)):
-                ax.scatter(
-                    x,
-                    where,
-                    marker=_comb(side),
-                    s=170,
-                    facecolor=COLORS[5],
-                    edgecolor=SUPPORT,
-                    linewidth=0.8,
-                    zorder=4,
-                    label=text if side < 0 else None,
-                )
-            continue
-        marker = _on_pedestal() if standing else _triangle()
-        size = 760 if standing else 260
-        ax.scatter(
-            x,
-            -y,
-            marker=marker,
-            s=size,
-            facecolor=face,
-            edgecolor=SUPPORT,
-            linewidth=1.2,
-            zorder=4,
-            label=text,
-        )
+            size, face, width = 170, COLORS[5], 0.8
+            marks = [(-y, _comb(-1), text), (y, _comb(1), None)]
+        else:
+            size, face, width = 760 if standing else 260, COLORS[4] if damped else SUPPORT, 1.2
+            marks = [(-y, _on_pedestal() if standing else _triangle(), text)]
+        for height, marker, named in marks:
+            ax.scatter(
+                x,
+                height,
+                marker=marker,
+                s=size,
+                facecolor=face,
+                edgecolor=SUPPORT,
+                linewidth=width,
+                zorder=4,
+                label=named,
+            )
 
 
 def radii(rotor: Rotor) -> FloatArray:
@@ -259,16 +223,8 @@ def _marks(
         # Neighbours that would overlap go to a second line.
         row = 1 - row if place - last < 0.035 * span + 0.008 * span * len(str(name)) else 0
         last = place
-        ax.annotate(
-            str(name),
-            (place, end),
-            xytext=(0, (3 + 11 * row) * (1 if above else -1)),
-            textcoords="offset points",
-            ha="center",
-            va="bottom" if above else "top",
-            color=color,
-            fontsize="small",
-        )
+        shift = (0, (3 + 11 * row) * (1 if above else -1))
+        note(ax, str(name), (place, end), shift, ha="center", va="bottom" if above else "top", color=color)
 
 
 def _triangle() -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem.plots.drawing import EDGE, draw_rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, STYLES, legend_above, new_axes
+from rotorid.base.style import legend_above, look, new_axes
 from rotorid.base.units import RPM
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
     ax = new_axes() if ax is None else ax
     rotor = modes.rotor
     draw_rotor(rotor, ax, height=0.22)
-    x, curves = _smooth(modes)
+    x, curves = smooth_shapes(modes)
     for k, (omega, curve) in enumerate(zip(modes.frequencies, curves.T, strict=True)):
         speed = f"{omega:.5g} rad/s = {omega * RPM:.5g} rpm" if omega else "rigid body"
         if omega and modes.direction[k] != "forward":
@@ -30,11 +30,10 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
         ax.plot(
             x,
             curve / np.abs(curve).max(),
-            color=COLORS[k % len(COLORS)],
-            linestyle=STYLES[k % len(STYLES)],
             linewidth=2.2,
             zorder=5,
             label=f"{k + 1}: {speed}",
+            **look(k),
         )
     ax.axhline(0.0, color=EDGE, linewidth=0.8, zorder=3)
     ax.set(xlabel="position, m", ylabel="deflection, largest = 1", ylim=(-1.12, 1.12))
@@ -42,17 +41,16 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _smooth(modes: Modes, points: int = 12) -> tuple[FloatArray, FloatArray]:
-    """Shapes between the nodes, as the elements' own cubics have them."""
-    t = np.linspace(0.0, 1.0, points, endpoint=False)[None, :, None]
-    L = modes.rotor.length[:, None, None]
-    w, slope = modes.shapes[:, None, :], L * modes.slopes[:-1, None, :]
-    end_slope = L * modes.slopes[1:, None, :]
-    curve = (
-        w[:-1] * (1 - 3 * t**2 + 2 * t**3)
-        + w[1:] * (3 * t**2 - 2 * t**3)
-        + slope * (t - 2 * t**2 + t**3)
-        + end_slope * (t**3 - t**2)
-    )
-    x = (modes.positions[:-1, None] + modes.rotor.length[:, None] * t[0, :, 0]).ravel()
-    return np.append(x, modes.positions[-1]), np.vstack((curve.reshape(x.size, -1), modes.shapes[-1:]))
+def smooth_shapes(modes: Modes, points: int = 12) -> tuple[FloatArray, FloatArray]:
+    """Shapes between the nodes, as the elements' own cubics have them.
+
+    Returns
+    -------
+    Positions, m, `points` in each element and the last node, shape (n,); the shapes there, shape (n, modes).
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    parts = np.linspace(0.0, 1.0, points, endpoint=False)
+    within = modes.positions[:-1, None] + modes.rotor.length[:, None] * parts
+    x = np.append(within, modes.positions[-1])
+    return x, np.asarray(CubicHermiteSpline(modes.positions, modes.shapes, modes.slopes)(x))

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.style import COLORS, STYLES, new_axes, plain
+from fem.orbits import DIRECTION_NAMES, orbits
+from rotorid.base.style import COLORS, STYLES, legend_above, new_axes, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,27 +38,20 @@ def draw_orbits(
     ax = new_axes((6.5, 6)) if ax is None else ax
     turn = np.linspace(0.0, 2 * np.pi, 241)
     X, Y = np.atleast_1d(np.asarray(x, complex)), np.atleast_1d(np.asarray(y, complex))
-    for k, (a, b, label) in enumerate(zip(X, Y, labels, strict=True)):
+    ways = orbits(X, Y).direction
+    for k, (a, b, label, way) in enumerate(zip(X, Y, labels, ways.tolist(), strict=True)):
         color = COLORS[k % len(COLORS)]
         path = 1e6 * np.real(np.stack((a, b))[:, None] * np.exp(1j * turn))
-        area = float(np.imag(np.conj(a) * -b))  # π times this, with its sign
-        flat = abs(area) < 1e-9 * (abs(a) ** 2 + abs(b) ** 2)
-        direction = "straight" if flat else "forward" if area > 0 else "backward"
-        ax.plot(*path, STYLES[0] if area >= 0 or flat else STYLES[1], color=color, linewidth=1.7,
-                label=f"{label}, {direction}")  # fmt: skip
+        style, word = STYLES[1] if way < 0 else STYLES[0], "straight" if way == 0 else DIRECTION_NAMES[way]
+        ax.plot(*path, style, color=color, linewidth=1.7, label=f"{label}, {word}")
         ax.plot(*path[:, 0], "o", color=color, markersize=7, markeredgecolor="white", zorder=4)
-        ax.annotate(
-            "",
-            xy=tuple(path[:, 40]),
-            xytext=tuple(path[:, 34]),
-            arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "mutation_scale": 16},
-        )
+        arrow = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "mutation_scale": 16}
+        ax.annotate("", xy=tuple(path[:, 40]), xytext=tuple(path[:, 34]), arrowprops=arrow)
     ax.set_aspect("equal", adjustable="datalim")
     ax.set(xlabel="x, µm", ylabel="y, µm")
     ax.margins(0.08)
     plain(ax)
     ax.axhline(0, color="#9aa2ad", linewidth=0.7, zorder=0.5)
     ax.axvline(0, color="#9aa2ad", linewidth=0.7, zorder=0.5)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False, fontsize="small",
-              title=f"{title}\n{_TITLE}".strip(), title_fontsize="small")  # fmt: skip
+    legend_above(ax, 2, title=f"{title}\n{_TITLE}".strip(), title_fontsize="small")
     return ax

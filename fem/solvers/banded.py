@@ -13,7 +13,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, general, multiply
+from fem.matrices.bands import Matrices, free_motions, general, multiply
 from fem.matrices.dynamic_stiffness import Supported
 from fem.matrices.pencil import whirling_mass
 from fem.model.rotor import Rotor
@@ -128,7 +128,8 @@ def _check_limited(
     work = np.abs(np.einsum("i,is->s", probe, X[:, 0]))
     energy = np.zeros(speeds.size)
     # Rigid-body motions have λ = 0: only a rotor at rest stands there.
-    inertia = np.where(speeds == 0, rigid_scale(rotor), 0.0) if A.rigid else np.zeros(speeds.size)
+    free = free_motions(rotor, {node for node, k in zip(at.nodes, at.reference, strict=True) if k > 0})
+    inertia = np.where(speeds == 0, rigid_scale(rotor), 0.0) if free else np.zeros(speeds.size)
     for plane in range(X.shape[1]):
         for part in (X[:, plane].real, X[:, plane].imag):
             energy += np.einsum("is,is->s", part, multiply(A.shaft, part))
@@ -143,7 +144,7 @@ def _check_limited(
 def _sensitivity(A: Matrices, loads: FloatArray, X: ComplexArray) -> float:
     """What rounding the entries of K may change, relative to the deflection at the load."""
     size = np.abs(X)
-    change = np.finfo(float).eps * np.einsum("ij,ij->j", size, multiply(np.abs(A.stiffness), size))
+    change = np.finfo(float).eps * np.einsum("ij,ij->j", size, multiply(np.abs(A.shaft), size))
     at_load = np.abs(np.einsum("ij,ij->j", loads, X))
     floor = 1e-6 * size.max(axis=0) * np.abs(loads).max(axis=0)  # where a load meets an antiresonance
     return float(np.max(change / np.maximum(np.maximum(at_load, floor), np.finfo(float).tiny)))

@@ -10,18 +10,18 @@ it runs along, and its roots are those of the modes.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fem.matrices.lateral_planes import Quadratic
 from fem.solvers.quadratic import polish, solve
 from fem.solvers.reduced_whirl import Whirl, enriched
+from fem.solvers.roots import bracketed_root
 from fem.solvers.tracking import likeness, mass_weight, plain
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
-_CONVERGED = 1e-13
-_STEPS = 60
+_ROUGH = 1e-8  # of a bracket: to which a root is known before its last digits
 _VANISHES = 1e-6  # |f| at a root, of its size at the ends
 _JUMP = 1e-4  # the same of a rank: more is a mode that came or went
 _NOTHING = 1e-11  # of the largest |f|: rounding
@@ -54,14 +54,32 @@ class Crossings:
     values: ComplexArray
     shapes: ComplexArray
 
-    def only(self, which: BoolArray) -> Crossings:
+    def only(self, which: BoolArray | IndexArray) -> Crossings:
         """Some of them."""
         return Crossings(self.speeds[which], self.modes[which], self.values[which], self.shapes[which])
 
 
-def synchronous(whirl: Whirl, values: ComplexArray, vectors: ComplexArray) -> Crossings:
-    """Speeds that equal the whirl frequency of a mode."""
-    return crossings(whirl, values, vectors, off_synchronous)
+@dataclass(frozen=True, eq=False)
+class _Root:
+    """A speed, rad/s, the eigenvalue and its vector in the basis, shape (R,)."""
+
+    speed: float
+    value: complex
+    vector: ComplexArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Bracket:
+    """An interval of speed, rad/s, in which a function of one mode changes its sign.
+
+    `f` are its values at both ends, `modes` the columns of all modes at both ends, `mode` the column sought.
+    """
+
+    ends: tuple[float, float]
+    f: tuple[float, float]
+    mode: int
+    values: ComplexArray  # at both ends, shape (2,)
+    vectors: ComplexArray  # shape (2, R)
 
 
 def off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
@@ -71,40 +89,97 @@ def off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
 
 def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> Crossings:
     """Roots of a function of eigenvalue and speed on each mode, shapes (S, n) and (S, n, R)."""
-    speeds, Q = whirl.speeds, whirl.Q
-    f = function(values, speeds[:, None])
+    f = function(values, whirl.speeds[:, None])
     change = (f[:-1] * f[1:] < 0) | ((f[1:] == 0) & (f[:-1] != 0))
-    change[:1] |= f[:1][:, :] == 0 if len(change) else False
-    k, mode = np.nonzero(change)
-    part = f[k, mode] / (f[k, mode] - f[k + 1, mode])
-    near = np.where(part < 0.5, k, k + 1)
-    start = values[k, mode] + part * (values[k + 1, mode] - values[k, mode])
-    ends = np.stack((speeds[k], speeds[k + 1]))
-    found, lam, X = _roots(
-        Q, ends, np.stack((f[k, mode], f[k + 1, mode])), start, vectors[near, mode], function
+    change[:1] |= f[:1] == 0
+    found: list[tuple[_Bracket, _Root]] = []
+    for k in np.flatnonzero(change.any(axis=1)).tolist():
+        two = slice(k, k + 2)
+        ends = (float(whirl.speeds[k]), float(whirl.speeds[k + 1]))
+        brackets = [
+            _Bracket(
+                ends, (float(f[k, mode]), float(f[k + 1, mode])), mode, values[two, mode], vectors[two, mode]
+            )
+            for mode in np.flatnonzero(change[k]).tolist()
+        ]
+        roots = [_on_the_mode(whirl.Q, bracket, function) for bracket in brackets]
+        pairs = list(zip(brackets, roots, strict=True))
+        if not all(_verified(whirl, k, *pair, function) for pair in pairs):
+            pairs = _by_rank(whirl, k, brackets, function)
+        found += pairs
+    if not found:
+        none = np.empty(0)
+        shapes = whirl.Q.nodes(vectors[:0, 0])
+        return Crossings(none, none.astype(np.intp), none.astype(complex), shapes)
+    Q, vectors = enriched(
+        whirl,
+        np.array([root.speed for _, root in found]),
+        np.array([root.value for _, root in found]),
+        np.stack([root.vector for _, root in found]),
     )
-    if k.size:
-        size = np.maximum(np.abs(f[k, mode]), np.abs(f[k + 1, mode]))
-        sure = _verified(whirl, k, (values, vectors, mode), (found, lam, X), function, size)
-        if not sure.all():
-            keep = _by_rank(whirl, k, mode, (values, vectors), (found, lam, X), ~sure, function)
-            k, mode, ends, size = k[keep], mode[keep], ends[:, keep], size[keep]
-            found, lam, X = found[keep], lam[keep], X[keep]
-    if k.size:
-        # The same once more in a basis that holds the full model's vectors there.
-        Q, X = enriched(whirl, found, lam, X)
-        slack = 1e-6 * (ends[1] - ends[0])
-        tight = np.clip(np.stack((found - slack, found + slack)), ends[0], ends[1])
-        better, value, Y = _secant(Q, found, tight, lam, X, function)
-        mac = np.abs(np.einsum("br,br->b", X.conj(), Y)) / np.linalg.norm(X, axis=1)
-        good = (better >= ends[0] - slack) & (better <= ends[1] + slack) & (mac**2 > _SAME)
-        good &= np.abs(function(value, better)) <= _VANISHES * size
-        # At an end of a table there is nothing beyond.
-        better = np.clip(better, ends[0], ends[1])
-        found, lam = np.where(good, better, found), np.where(good, value, lam)
-        X = np.where(good[:, None], Y, X)
-    order = np.argsort(found, kind="stable")
-    return Crossings(found[order], mode[order], lam[order], Q.nodes(X[order]))
+    exact = [
+        _last_digits(Q, bracket, replace(root, vector=vector), function)
+        for (bracket, root), vector in zip(found, vectors, strict=True)
+    ]
+    order = np.argsort([root.speed for root in exact], kind="stable")
+    return Crossings(
+        np.array([root.speed for root in exact])[order],
+        np.array([bracket.mode for bracket, _ in found], dtype=np.intp)[order],
+        np.array([root.value for root in exact])[order],
+        Q.nodes(np.stack([root.vector for root in exact])[order]),
+    )
+
+
+def _on_the_mode(Q: Quadratic, bracket: _Bracket, function: Function) -> _Root:
+    """The root next to the straight line between both ends."""
+    (a, b), (fa, fb) = bracket.ends, bracket.f
+    part = fa / (fa - fb) if fa != fb else 0.0
+    value = bracket.values[0] + part * (bracket.values[1] - bracket.values[0])
+    start = _Root(a, value, bracket.vectors[int(part >= 0.5)])
+    return _root(Q, start, bracket.ends, bracket.f, _ROUGH * (b - a), function)
+
+
+def _last_digits(Q: Quadratic, bracket: _Bracket, rough: _Root, function: Function) -> _Root:
+    """The same root in a better basis; as it was where the basis has another mode there."""
+    there, here = _value(Q, rough, rough.speed, function)
+    left = (here > 0) == (bracket.f[1] > 0)
+    ends = (bracket.ends[0], rough.speed) if left else (rough.speed, bracket.ends[1])
+    f = (bracket.f[0], here) if left else (here, bracket.f[1])
+    root = _root(Q, there, ends, f, 1e-14 * bracket.ends[1], function)
+    _, excess = _value(Q, root, root.speed, function)
+    mac = np.abs(np.vdot(rough.vector, root.vector)) / np.linalg.norm(rough.vector)
+    good = mac**2 > _SAME and abs(excess) <= _VANISHES * max(map(abs, bracket.f))
+    return root if good else rough
+
+
+def _root(
+    Q: Quadratic,
+    start: _Root,
+    ends: tuple[float, float],
+    f: tuple[float, float],
+    tolerance: float,
+    function: Function,
+) -> _Root:
+    """A bracketed root of a function whose values at both ends are known, on a mode like that of `start`."""
+    last = start
+
+    def excess(speed: float) -> float:
+        nonlocal last
+        last, value = _value(Q, last, speed, function)
+        return value
+
+    speed = bracketed_root(excess, ends, f, tolerance)
+    return _value(Q, last, speed, function)[0]
+
+
+def _value(Q: Quadratic, start: _Root, speed: float, function: Function) -> tuple[_Root, float]:
+    """The pair at a speed that inverse iteration finds from another one, and the function there."""
+    at = np.array([speed])
+    value, vector, _ = polish(
+        Q, at, np.zeros(1, dtype=np.intp), np.array([start.value]), start.vector[None], 2
+    )
+    excess = float(np.nan_to_num(function(value, at))[0])
+    return _Root(speed, complex(value[0]), vector[0]), excess
 
 
 def turns(
@@ -138,75 +213,47 @@ def turns(
     return np.unique(speeds[k][turn] + np.clip(part, 0.1, 0.9) * h[turn])
 
 
-def _verified(
-    whirl: Whirl,
-    k: IndexArray,
-    modes: tuple[ComplexArray, ComplexArray, IndexArray],
-    roots: tuple[FloatArray, ComplexArray, ComplexArray],
-    function: Function,
-    size: FloatArray,
-) -> BoolArray:
-    """Which roots in the intervals k surely are those of the modes they were sought for, shape (c,)."""
-    values, vectors, mode = modes
-    found, lam, X = roots
-    sure = np.isfinite(found) & np.isfinite(lam)
-    sure &= (found >= whirl.speeds[k]) & (found <= whirl.speeds[k + 1])
-    sure &= np.abs(function(lam, found)) <= _VANISHES * size
+def _verified(whirl: Whirl, k: int, bracket: _Bracket, root: _Root, function: Function) -> bool:
+    """Whether a root in interval k surely is that of the mode it was sought for."""
+    lam = np.array([root.value])
+    excess = function(lam, np.array([root.speed]))[0]
+    if not abs(excess) <= _VANISHES * max(map(abs, bracket.f)):
+        return False
     weight, apart = mass_weight(whirl), whirl.Q.P.planes == 1
-    for end in (k, k + 1):
-        others = whirl.found.values[end]
-        mac = likeness(lam[:, None], X[:, None], others, whirl.found.vectors[end], weight, apart)[:, 0]
-        mine = values[end, mode][:, None], vectors[end, mode][:, None]
-        own = likeness(lam[:, None], X[:, None], *mine, weight, apart)[:, 0, 0]
-        rivals = np.where(others == mine[0], 0.0, mac).max(axis=1)
-        sure &= plain(own, rivals)
-    return np.asarray(sure)
+    for end in (0, 1):
+        others = whirl.found.values[k + end]
+        mac = likeness(lam, root.vector[None], others, whirl.found.vectors[k + end], weight, apart)[0]
+        mine = others == bracket.values[end]
+        if not plain(mac[mine].max(initial=0.0), np.where(mine, 0.0, mac).max()):
+            return False
+    return True
 
 
 def _by_rank(
-    whirl: Whirl,
-    k: IndexArray,
-    mode: IndexArray,
-    modes: tuple[ComplexArray, ComplexArray],
-    roots: tuple[FloatArray, ComplexArray, ComplexArray],
-    doubtful: BoolArray,
-    function: Function,
-) -> BoolArray:
-    """Put the roots of ranks in place of doubtful ones, and tell which roots there are, shape (c,).
+    whirl: Whirl, k: int, brackets: list[_Bracket], function: Function
+) -> list[tuple[_Bracket, _Root]]:
+    """Roots of ranks in interval k, each with the mode it is most like; there may be fewer than brackets.
 
     Two modes that were exchanged between two speeds seem to cross in opposite directions: there is no root.
     """
-    values, vectors = modes
-    found, lam, X = roots
-    keep = np.ones(k.size, dtype=bool)
+    from scipy.optimize import linear_sum_assignment
+
+    roots = _ranked(whirl, float(whirl.speeds[k]), float(whirl.speeds[k + 1]), function)
+    if not roots:
+        return []
     weight, apart = mass_weight(whirl), whirl.Q.P.planes == 1
-    for interval in np.unique(k[doubtful]):
-        mine = np.flatnonzero(k == interval)
-        keep[mine] = False
-        speeds, new, Y = _ranked(
-            whirl, float(whirl.speeds[interval]), float(whirl.speeds[interval + 1]), function
-        )
-        if not speeds.size:
-            continue
-        alike = np.zeros((mine.size, speeds.size))
-        for end in (interval, interval + 1):
-            alike += likeness(values[end, mode[mine]], vectors[end, mode[mine]], new, Y, weight, apart)
-        for _ in range(min(alike.shape)):
-            i, j = np.unravel_index(int(np.argmax(alike)), alike.shape)
-            if alike[i, j] <= 0:
-                break
-            keep[mine[i]] = True
-            found[mine[i]], lam[mine[i]], X[mine[i]] = speeds[j], new[j], Y[j]
-            alike[i], alike[:, j] = -1.0, -1.0
-    return keep
+    new, Y = np.array([root.value for root in roots]), np.stack([root.vector for root in roots])
+    alike = np.zeros((len(brackets), len(roots)))
+    for end in (0, 1):
+        values = np.array([bracket.values[end] for bracket in brackets])
+        vectors = np.stack([bracket.vectors[end] for bracket in brackets])
+        alike += likeness(values, vectors, new, Y, weight, apart)
+    pairs = zip(*linear_sum_assignment(alike, maximize=True), strict=True)
+    return [(brackets[i], roots[j]) for i, j in pairs if alike[i, j] > 0]
 
 
-def _ranked(
-    whirl: Whirl, a: float, b: float, function: Function
-) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-    """Roots of all modes in an interval, by the ranks of the function: speeds, eigenvalues and vectors."""
-    from scipy.optimize import brentq
-
+def _ranked(whirl: Whirl, a: float, b: float, function: Function) -> list[_Root]:
+    """Roots of all modes in an interval, by the ranks of the function."""
     Q, m = whirl.Q, whirl.found.values.shape[1]
 
     def at(speeds: FloatArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
@@ -226,71 +273,15 @@ def _ranked(
     least = _NOTHING * np.abs(f[known]).max(initial=0.0)
     change = ((f[:-1] < 0) != (f[1:] < 0)) & known[:-1] & known[1:]
     change &= np.maximum(np.abs(f[:-1]), np.abs(f[1:])) > least
-    out: list[tuple[float, complex, ComplexArray]] = []
+    out: list[_Root] = []
     for part, rank in zip(*np.nonzero(change), strict=True):
 
         def ranked(speed: float, rank: int = int(rank)) -> float:
             return float(min(at(np.array([speed]))[0][0, rank], 1e300))
 
-        low, high = float(speeds[part]), float(speeds[part + 1])
-        if f[part, rank] == 0 or f[part + 1, rank] == 0:
-            speed = low if f[part, rank] == 0 else high
-        elif (ranked(low) < 0) == (ranked(high) < 0):
-            continue
-        else:
-            speed = float(brentq(ranked, low, high, xtol=1e-13 * b, rtol=1e-14))
+        ends, values = speeds[part : part + 2].tolist(), f[part : part + 2, rank].tolist()
+        speed = bracketed_root(ranked, ends, values, 1e-13 * b)
         here, lam, X = at(np.array([speed]))
-        if abs(here[0, rank]) <= _JUMP * max(abs(f[part, rank]), abs(f[part + 1, rank])):
-            out.append((speed, complex(lam[0, rank]), X[0, rank]))
-    if not out:
-        return np.empty(0), np.empty(0, dtype=complex), np.empty((0, Q.size), dtype=complex)
-    return np.array([o[0] for o in out]), np.array([o[1] for o in out]), np.stack([o[2] for o in out])
-
-
-def _roots(
-    Q: Quadratic, ends: FloatArray, f: FloatArray, lam: ComplexArray, X: ComplexArray, function: Function
-) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-    """Bracketed roots, all at once, by regula falsi after Anderson and Björck."""
-    (a, b), (fa, fb) = ends.copy(), f.copy()
-    root = (a * fb - b * fa) / np.where(fa == fb, 1.0, fb - fa)
-    for _ in range(_STEPS):
-        new, Y, _ = polish(Q, root, np.arange(root.size), lam, X, 2)
-        value = function(new, root)
-        lam, X = new, Y
-        left = np.sign(value) == np.sign(fa)
-        held = np.where(left, fa, fb)
-        ratio = 1 - value / np.where(held == 0, 1.0, held)
-        ratio = np.where(ratio > 0, ratio, 0.5)
-        fa, fb = np.where(left, value, fa * ratio), np.where(left, fb * ratio, value)
-        a, b = np.where(left, root, a), np.where(left, b, root)
-        step = (a * fb - b * fa) / np.where(fa == fb, 1.0, fb - fa)
-        step = np.where(value == 0, root, np.clip(step, np.minimum(a, b), np.maximum(a, b)))
-        moved, root = np.abs(step - root), step
-        if (moved <= 1e-11 * np.maximum(ends[1], 1e-300)).all():
-            break
-    lam, X, _ = polish(Q, root, np.arange(root.size), lam, X, 2)
-    return root, lam, X
-
-
-def _secant(
-    Q: Quadratic,
-    root: FloatArray,
-    tight: FloatArray,
-    lam: ComplexArray,
-    X: ComplexArray,
-    function: Function,
-) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-    """Last digits of roots that are known well."""
-    at = np.arange(root.size)
-    lam, X, _ = polish(Q, root, at, lam, X, 2)
-    here = function(lam, root)
-    other = np.where(tight[1] - root > root - tight[0], tight[1], tight[0])
-    there = function(polish(Q, other, at, lam, X, 3)[0], other)
-    slope = (there - here) / np.where(other == root, 1.0, other - root)
-    for _ in range(3):
-        root = root - here / np.where(slope == 0, 1.0, slope)
-        lam, X, _ = polish(Q, np.maximum(root, 0.0), at, lam, X, 2)
-        here = function(lam, root)
-        if (np.abs(here) <= _CONVERGED * np.abs(slope) * root).all():
-            break
-    return root, lam, X
+        if abs(here[0, rank]) <= _JUMP * max(map(abs, values)):
+            out.append(_Root(speed, complex(lam[0, rank]), X[0, rank]))
+    return out

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fem.matrices.bands import multiply
 from fem.matrices.lateral_planes import Planes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
@@ -34,18 +35,19 @@ class WholeBand:
             band += value * speed * self.G
         if self.circulating is not None:
             band += speed * self.circulating
-        k, dk = self._supports(value, speed)
-        for matrix, row in zip(k, self.P.rows, strict=True):
-            self._add(band, int(row), matrix)
+        p = self.P.planes
+        for matrix, row in zip(self._supports(value, speed), self.P.rows, strict=True):
+            for a in range(p):
+                for b in range(p):
+                    band[2 * self.reach + a - b, p * row + b] += matrix[a, b]
         lu, pivots, info = zgbtrf(band, self.reach, self.reach)
         if info > 0:  # singular to the last bit: an eigenvalue
             lu[2 * self.reach, info - 1] = 1e-16 * np.abs(self.K).max()
-        derivative = 2 * value * self.M + self.B
-        if self.G is not None:
-            derivative = derivative + speed * self.G
-        for matrix, row in zip(dk, self.P.rows, strict=True):
-            self._add(derivative, int(row), matrix)
-        return Factored(self.reach, lu, pivots, derivative)
+        return Factored(self.reach, lu, pivots)
+
+    def inertia(self, X: AnyArray) -> ComplexArray:
+        """M x of shaft motions (planes, size), in the order of the band."""
+        return self.interleaved(multiply(self.P.A.mass, X.T).T)
 
     def interleaved(self, X: AnyArray) -> ComplexArray:
         """From (…, planes, size) to the order of the band, (…, planes · size)."""
@@ -56,21 +58,15 @@ class WholeBand:
         p = self.P.planes
         return np.asarray(np.swapaxes(X.reshape(*X.shape[:-1], self.size // p, p), -1, -2))
 
-    def _supports(self, value: complex, speed: float) -> tuple[ComplexArray, ComplexArray]:
-        """Dynamic stiffness of the supports with pedestals at λ, and its derivative by λ, (s, p, p)."""
+    def _supports(self, value: complex, speed: float) -> ComplexArray:
+        """Dynamic stiffness of the supports with pedestals at λ, shape (s, p, p)."""
         P = self.P
         K, C = P.supports(np.array([speed]))
-        c = C[0].astype(complex)
-        k = K[0] + value * c
+        k = K[0] + value * C[0]
         for j, i in enumerate(P.feet):
             stand = np.diag(P.foot_stiffness[j] + value * P.foot_damping[j] + value**2 * P.foot_mass[j])
-            moving = np.diag(P.foot_damping[j] + 2 * value * P.foot_mass[j])
-            right = np.linalg.solve(k[i] + stand, k[i])  # motion of the foot
-            left = np.linalg.solve((k[i] + stand).T, k[i].T).T
-            one = np.eye(P.planes)
-            dk = (one - left) @ c[i] @ (one - right) + left @ moving @ right
-            k[i], c[i] = k[i] - k[i] @ right, dk
-        return k, c
+            k[i] = k[i] - k[i] @ np.linalg.solve(k[i] + stand, k[i])
+        return np.asarray(k)
 
     def _along(self, band: FloatArray) -> ComplexArray:
         full = self._empty()
@@ -103,18 +99,12 @@ class WholeBand:
                 values[: n - off] = entries[off:]
             full[2 * self.reach + p * off + a - b, b::p] += factor * values
 
-    def _add(self, full: ComplexArray, row: int, matrix: AnyArray) -> None:
-        p = self.P.planes
-        for a in range(p):
-            for b in range(p):
-                full[2 * self.reach + a - b, p * row + b] += matrix[a, b]
-
 
 class Factored:
-    """Solutions with one factored matrix and products with its derivative by λ."""
+    """Solutions with one factored matrix."""
 
-    def __init__(self, reach: int, lu: ComplexArray, pivots: AnyArray, derivative: ComplexArray) -> None:
-        self._reach, self._lu, self._pivots, self._derivative = reach, lu, pivots, derivative
+    def __init__(self, reach: int, lu: ComplexArray, pivots: AnyArray) -> None:
+        self._reach, self._lu, self._pivots = reach, lu, pivots
 
     def solve(self, b: ComplexArray, *, transposed: bool = False) -> ComplexArray:
         """P⁻¹ b, or P⁻ᵀ b, for b of shape (size,) or (size, m)."""
@@ -122,10 +112,3 @@ class Factored:
 
         x, _ = zgbtrs(self._lu, self._reach, self._reach, b, self._pivots, trans=int(transposed))
         return np.asarray(x)
-
-    def derivative(self, x: ComplexArray, *, transposed: bool = False) -> ComplexArray:
-        """P' x or P'ᵀ x, for x of shape (size,)."""
-        from scipy.linalg.blas import zgbmv
-
-        n, reach = self._derivative.shape[1], self._reach
-        return np.asarray(zgbmv(n, n, reach, reach, 1.0, self._derivative[reach:], x, trans=int(transposed)))

@@ -9,7 +9,7 @@ coupled. A bound on what the series leaves out decides how long it must be. The 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,25 +103,28 @@ class Receptance:
         at = supported(self.rotor, speeds)
         if self.forward is None:
             return Amplitudes(*solve_banded(self.rotor, self.A, at, self.rows, self.loads, speeds))
-        a, change = self.rows.size, _change(at, self.reference)[:, self.moving]
+        change = _change(at, self.reference)[:, self.moving]
         near = np.zeros(speeds.size, dtype=bool)
         for spectrum in self.spectra:
             near |= _near(spectrum, speeds)
-        b = None
-        if self.backward is None:
-            if at.planes == 2:
-                b = np.zeros((speeds.size, a, self.loads.shape[1]), dtype=complex)
-            F, lost = _one_plane(self.forward, a, self.moving.size, change[..., 0, 0], speeds, near)
-        else:
+        directions = [self.forward.at(speeds * speeds, near)]
+        D = np.moveaxis(change, 0, -1)
+        if self.backward is not None:
+            # K (1 + 2 i ω β) − ω² (M + G): the same pencil at a complex frequency.
+            stiffer = 1.0 + 2j * self.beta * speeds if self.beta else np.ones(speeds.size)
+            directions.append(self.backward.at(speeds * speeds / stiffer, near) / stiffer)
             springs = np.array(list(self.reference.values()))[self.moving]
-            F, b, lost = _two_planes(self.forward, self.backward, a, change, self.beta, springs, speeds, near)
+            D = D.copy()
+            D[:, 1, 1] -= springs[:, None] * (stiffer - 1.0)
+        (F, *behind), lost = _amplitudes(directions, D, self.rows.size, self.loads.shape[1])
+        b = behind[0] if behind else np.zeros_like(F) if at.planes == 2 else None
         near |= lost
         if not near.any():
             return Amplitudes(F, b, None)
         few = Supported(at.nodes, at.stiffness[near], at.reference, at.planes)
-        F[near], behind, doubt = solve_banded(self.rotor, self.A, few, self.rows, self.loads, speeds[near])
-        if b is not None and behind is not None:
-            b[near] = behind
+        F[near], across, doubt = solve_banded(self.rotor, self.A, few, self.rows, self.loads, speeds[near])
+        if b is not None and across is not None:
+            b[near] = across
         return Amplitudes(F, b, doubt)
 
 
@@ -305,62 +308,36 @@ def _series(
     return None
 
 
-def _one_plane(
-    series: _Series, a: int, s: int, change: ComplexArray, speeds: FloatArray, skip: BoolArray
-) -> tuple[ComplexArray, BoolArray]:
-    """Forward amplitudes, shape (S, a, b), and speeds where digits are lost: Sherman–Morrison per support."""
-    b = series.shape[1] - s
-    H: AnyArray = series.at(speeds * speeds, skip)
-    lost = np.zeros(speeds.size, dtype=bool)
-    for k in reversed(range(s)):  # the last row and column are not needed again
-        D = change[:, k]
-        DH = D * H[a + k, b + k]
-        pivot = 1.0 + DH
-        lost |= np.abs(pivot) < PIVOT * np.maximum(1.0, np.abs(DH))
-        pivot[lost] = 1.0
-        step = H[: a + k, b + k, None] * (H[a + k, : b + k] * (D / pivot))
-        H = np.subtract(H[: a + k, : b + k], step, out=step)
-    return np.moveaxis(H, 2, 0).astype(complex, copy=False), lost
-
-
-def _two_planes(
-    forward: _Series,
-    backward: _Series,
-    a: int,
-    change: ComplexArray,
-    beta: float,
-    springs: FloatArray,
-    speeds: FloatArray,
-    skip: BoolArray,
-) -> tuple[ComplexArray, ComplexArray, BoolArray]:
-    """Forward and backward amplitudes, shape (S, a, b), and speeds where digits are lost.
+def _amplitudes(
+    directions: Sequence[AnyArray], change: AnyArray, a: int, b: int
+) -> tuple[list[ComplexArray], BoolArray]:
+    """Amplitudes in each direction, shape (S, a, b), and speeds where digits are lost.
 
     The amplitudes q at the supports obey (1 + H D) q = H f with D coupling forward and backward; the
     forces D q then act on each of the two.
+
+    Parameters
+    ----------
+    directions
+        H of forward whirl between rows and loads, the supports last in both, shape (a + s, b + s, S); and of
+        backward whirl, where no load acts, (a + s, s, S).
+    change
+        D, shape (s, planes, planes, S).
+    a, b
+        Rows and loads without the supports.
     """
-    s = change.shape[1]
-    b = forward.shape[1] - s
-    H = forward.at(speeds * speeds, skip)
-    D = np.moveaxis(change, 0, -1)  # (s, 2, 2, S)
-    if beta:
-        # K (1 + 2 i ω β) − ω² (M + G): the same pencil at a complex frequency.
-        stiffer = 1.0 + 2j * beta * speeds
-        J = backward.at(speeds * speeds / stiffer, skip) / stiffer
-        D = D.copy()
-        D[:, 1, 1] -= springs[:, None] * (stiffer - 1.0)
-    else:
-        J = backward.at(speeds * speeds, skip)
+    s, planes = len(change), len(directions)
+    H, n = directions[0], s * planes
     # Unknowns: forward at all supports, then backward at all.
-    E = np.zeros((2 * s, 2 * s + b, speeds.size), dtype=complex)
-    for q in (0, 1):
-        E[:s, q * s : (q + 1) * s] = H[a:, b:] * D[None, :, 0, q]
-        E[s:, q * s : (q + 1) * s] = J[a:] * D[None, :, 1, q]
-    size = np.abs(E[:, : 2 * s]).max(axis=1)
-    E[:s, 2 * s :] = H[a:, :b]
-    index = np.arange(2 * s)
-    E[index, index] += 1.0
-    lost = np.zeros(speeds.size, dtype=bool)
-    for k in index:
+    E = np.zeros((n, n + b, H.shape[2]), dtype=complex)
+    for p, J in enumerate(directions):
+        for q in range(planes):
+            E[p * s : (p + 1) * s, q * s : (q + 1) * s] = J[a:, J.shape[1] - s :] * change[:, p, q]
+    size = np.abs(E[:, :n]).max(axis=1, initial=0.0)
+    E[:s, n:] = H[a:, :b]
+    E[np.arange(n), np.arange(n)] += 1.0
+    lost = np.zeros(H.shape[2], dtype=bool)
+    for k in range(n):
         pivot = E[k, k].copy()
         lost |= np.abs(pivot) < PIVOT * np.maximum(1.0, size[k])
         pivot[lost] = 1.0
@@ -368,12 +345,12 @@ def _two_planes(
         factors = E[:, k].copy()
         factors[k] = 0.0
         E[:, k + 1 :] -= factors[:, None] * E[k, k + 1 :]
-    q_forward, q_backward = E[:s, 2 * s :], E[s:, 2 * s :]
-    p_forward = D[:, None, 0, 0] * q_forward + D[:, None, 0, 1] * q_backward
-    p_backward = D[:, None, 1, 0] * q_forward + D[:, None, 1, 1] * q_backward
-    F = H[:a, :b].astype(complex)
-    B = np.zeros_like(F)
-    for k in range(s):
-        F -= H[:a, b + k, None] * p_forward[k]
-        B -= J[:a, k, None] * p_backward[k]
-    return np.moveaxis(F, 2, 0), np.moveaxis(B, 2, 0), lost
+    moved = E[:, n:].reshape(planes, s, b, lost.size)
+    out = []
+    for p, J in enumerate(directions):
+        F = H[:a, :b].astype(complex) if p == 0 else np.zeros((a, b, H.shape[2]), dtype=complex)
+        for k in range(s):
+            force = sum(change[k, p, q] * moved[q, k] for q in range(planes))
+            F -= J[:a, J.shape[1] - s + k, None] * force
+        out.append(np.moveaxis(F, 2, 0))
+    return out, lost

@@ -245,14 +245,12 @@ def _true_vectors(
     for i, (value, speed) in enumerate(zip(values, speeds, strict=True)):
         factored = band.factor(complex(value), float(speed))
         # One step is enough: the value is known to more digits than the vector needs.
-        right = band.interleaved(Q.expand(X[i]))
-        right = factored.solve(factored.derivative(right / np.linalg.norm(right)))
+        right = factored.solve(band.inertia(Q.expand(X[i])))
         columns = [band.planes(right).T]
         if not mirrored:
             reduced = value * value * Q.M + value * D[i] + stiffness[i]
             start = np.linalg.svd(reduced.T)[2][-1].conj()
-            left = band.interleaved(Q.expand(start))
-            left = factored.solve(factored.derivative(left, transposed=True), transposed=True)
+            left = factored.solve(band.inertia(Q.expand(start)), transposed=True)
             columns.append(band.planes(left).T)
         out.append(np.hstack(columns))
     return out

@@ -8,7 +8,7 @@ import numpy as np
 
 from fem.solvers.quadratic import NONE, Solutions, solve
 from fem.solvers.reduced_whirl import Whirl
-from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 _ALIKE = 0.8  # MAC of a mode with itself a step further
 _OTHER = 0.5  # largest MAC with another mode, relative to it
@@ -30,56 +30,78 @@ class Followed:
         Eigenvalue of each mode at each speed, NaN where it was not found, shape (S, c).
     vectors
         Its vector, shape (S, c, R).
-    lost
-        Whether a mode may have gone on above those that were computed, shape (c,).
     doubtful
         (index of an interval's start, mode) where shapes did not tell the mode apart from others at any step.
     """
 
     values: ComplexArray
     vectors: ComplexArray
-    lost: BoolArray
     doubtful: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _At:
+    """Modes at a speed, rad/s: eigenvalues, shape (m,), and vectors, shape (m, R)."""
+
+    speed: float
+    values: ComplexArray
+    vectors: ComplexArray
+
+
+class _Steps:
+    """Partners of modes from one speed to another, by way of speeds between where shapes leave a doubt."""
+
+    def __init__(self, whirl: Whirl, known: dict[float, Solutions]) -> None:
+        self.whirl, self.known, self.weight = whirl, known, mass_weight(whirl)
+        # In a complex coordinate the sign of Im λ is the direction: forward and backward whirl never mix.
+        self.apart = whirl.Q.P.planes == 1
+        self.trials = _TRIALS
+
+    def between(self, one: _At, other: _At, depth: int = 0) -> tuple[dict[int, int], set[int]]:
+        """Numbers of partners, and the modes in doubt."""
+        alike = likeness(one.values, one.vectors, other.values, other.vectors, self.weight, self.apart)
+        pairs, doubt = _pairs(alike)
+        if not doubt or depth > _HALVINGS or self.trials <= 0:
+            return pairs, doubt
+        self.trials -= 1
+        middle = self._solved((one.speed + other.speed) / 2, len(one.values))
+        first, unsure = self.between(one, middle, depth + 1)
+        second, later = self.between(middle, other, depth + 1)
+        through = {i: second[j] for i, j in first.items() if j in second}
+        return through, unsure | {i for i, j in first.items() if j in later}
+
+    def _solved(self, speed: float, m: int) -> _At:
+        if speed not in self.known:
+            self.known[speed] = solve(self.whirl.Q, np.array([speed]), m, self.whirl.scale)
+        found = self.known[speed]
+        return _At(speed, found.values[0], found.vectors[0])
 
 
 def follow(whirl: Whirl, known: dict[float, Solutions] | None = None) -> Followed:
     """Chain the eigenpairs of neighbouring speeds; `known` keeps solutions between them for the next time."""
-    known = {} if known is None else known
     values, X = whirl.found.values, whirl.found.vectors
     S, m = values.shape
-    weight = mass_weight(whirl)
+    steps = _Steps(whirl, {} if known is None else known)
     labels = np.full((S, m), -1)
     labels[0, np.isfinite(values[0])] = np.flatnonzero(np.isfinite(values[0]))
     count = m
-    lost: set[int] = set()
     doubtful = []
-    # In a complex coordinate the sign of Im λ is the direction: forward and backward whirl never mix.
-    apart = whirl.Q.P.planes == 1
-    alike = likeness(values[:-1], X[:-1], values[1:], X[1:], weight, apart)
-    partner = np.argmax(alike, axis=2)
-    obvious = _obvious(alike, partner)
+    at = [_At(float(speed), values[k], X[k]) for k, speed in enumerate(whirl.speeds)]
     for k in range(S - 1):
-        if obvious[k]:
-            labels[k + 1, partner[k]] = labels[k]
-            continue
-        pairs, doubt = _pairs(alike[k])
-        if doubt:
-            ends = (values[k], X[k]), (values[k + 1], X[k + 1])
-            pairs, doubt, _ = _bridge(whirl, weight, known, whirl.speeds[k : k + 2], *ends, 0, _TRIALS)
-            doubtful += [(k, int(labels[k, i])) for i in sorted(doubt)]
+        steps.trials = _TRIALS
+        pairs, doubt = steps.between(at[k], at[k + 1])
+        doubtful += [(k, int(labels[k, i])) for i in sorted(doubt)]
         for i, j in pairs.items():
             labels[k + 1, j] = labels[k, i]
         fresh = np.flatnonzero(np.isfinite(values[k + 1]) & (labels[k + 1] < 0))
         labels[k + 1, fresh] = count + np.arange(fresh.size)
         count += fresh.size
-        if np.isfinite(values[k + 1]).all():
-            lost |= {int(labels[k, i]) for i in np.flatnonzero(np.isfinite(values[k])) if i not in pairs}
     out = np.full((S, count), NONE)
     vectors = np.full((S, count, X.shape[2]), NONE)
-    at, rank = np.nonzero(labels >= 0)
-    out[at, labels[at, rank]] = values[at, rank]
-    vectors[at, labels[at, rank]] = X[at, rank]
-    return Followed(out, vectors, np.isin(np.arange(count), list(lost)), tuple(doubtful))
+    row, rank = np.nonzero(labels >= 0)
+    out[row, labels[row, rank]] = values[row, rank]
+    vectors[row, labels[row, rank]] = X[row, rank]
+    return Followed(out, vectors, tuple(doubtful))
 
 
 def mass_weight(whirl: Whirl) -> FloatArray:
@@ -123,61 +145,14 @@ def likeness(
     return np.asarray(np.where(there, mac, 0.0))
 
 
-def _obvious(mac: FloatArray, partner: IndexArray) -> BoolArray:
-    """At which steps every mode has a partner beyond doubt, shape (S − 1,)."""
-    best = np.take_along_axis(mac, partner[:, :, None], axis=2)[:, :, 0]
-    others = mac.copy()
-    np.put_along_axis(others, partner[:, :, None], 0.0, axis=2)
-    across = np.take_along_axis(others.max(axis=1), partner, axis=1)
-    rivals = np.maximum(others.max(axis=2), across)
-    one_each = (np.sort(partner, axis=1) == np.arange(mac.shape[1])).all(axis=1)
-    return np.asarray(one_each & plain(best, rivals).all(axis=1))
-
-
 def _pairs(mac: FloatArray) -> tuple[dict[int, int], set[int]]:
-    """Partners by falling MAC, and the modes whose partner is in doubt."""
-    left = mac.copy()
-    pairs: dict[int, int] = {}
-    doubt: set[int] = set()
-    for _ in range(len(mac)):
-        i, j = (int(index) for index in np.unravel_index(int(np.argmax(left)), left.shape))
-        best = left[i, j]
-        if best <= 0:
-            break
-        rivals = max(np.delete(mac[i], j).max(initial=0.0), np.delete(mac[:, j], i).max(initial=0.0))
-        if not (best >= _ALIKE and (rivals <= _OTHER * best or 1 - best <= _NEARER * (1 - rivals))):
-            doubt.add(i)
-        # What is hardly alike is another mode that came while this one went.
-        if best >= _HARDLY:
-            pairs[i] = j
-        left[i], left[:, j] = 0.0, 0.0
-    return pairs, doubt
+    """Partners of largest MAC, and the modes whose partner is in doubt."""
+    from scipy.optimize import linear_sum_assignment
 
-
-def _bridge(
-    whirl: Whirl,
-    weight: FloatArray,
-    known: dict[float, Solutions],
-    speeds: FloatArray,
-    start: tuple[ComplexArray, ComplexArray],
-    end: tuple[ComplexArray, ComplexArray],
-    depth: int,
-    trials: int,
-) -> tuple[dict[int, int], set[int], int]:
-    """Partners over an interval by way of its middle, the modes in doubt, and trials left."""
-    middle = float(speeds.mean())
-    if middle not in known:
-        known[middle] = solve(whirl.Q, np.array([middle]), len(start[0]), whirl.scale)
-    found = known[middle]
-    trials -= 1
-    half = found.values[0], found.vectors[0]
-    apart = whirl.Q.P.planes == 1
-    steps = []
-    for a, b, ends in ((start, half, (speeds[0], middle)), (half, end, (middle, speeds[1]))):
-        step, doubt = _pairs(likeness(a[0], a[1], b[0], b[1], weight, apart))
-        if doubt and depth < _HALVINGS and trials > 0:
-            step, doubt, trials = _bridge(whirl, weight, known, np.array(ends), a, b, depth + 1, trials)
-        steps.append((step, doubt))
-    (first, unsure), (second, later) = steps
-    unsure = unsure | {i for i, j in first.items() if j in later}
-    return {i: second[j] for i, j in first.items() if j in second}, unsure, trials
+    i, j = linear_sum_assignment(mac, maximize=True)
+    best, others = mac[i, j], mac.copy()
+    others[i, j] = 0.0
+    doubtful = (best > 0) & ~plain(best, np.maximum(others[i].max(axis=1), others[:, j].max(axis=0)))
+    # What is hardly alike is another mode that came while this one went.
+    pairs = {int(one): int(other) for one, other, mac in zip(i, j, best, strict=True) if mac >= _HARDLY}
+    return pairs, set(i[doubtful].tolist())

@@ -1,4 +1,4 @@
-"""Types of arrays, for annotations."""
+"""Types of arrays, for annotations, and arrays that nobody may change."""
 
 from typing import Any
 
@@ -11,3 +11,9 @@ AnyArray = NDArray[Any]  # real or complex, as the problem is
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 IndexArray = NDArray[np.intp]
+
+
+def read_only(*arrays: AnyArray) -> None:
+    """Let nobody write into arrays of a result."""
+    for array in arrays:
+        array.flags.writeable = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,11 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 BLUE, VERMILION = COLORS[:2]
 STYLES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-GRID, QUIET = "#e4e7eb", "#6b7480"
+GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
+BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+"""Behind words that stand on curves."""
+WARNING = "#8a3d00"
+_ACROSS = ("data", "axes fraction")
 
 
 def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
@@ -39,16 +43,39 @@ def on_figure(draw: Callable[[Axes], object], width: float = 9.0, height: float 
     return figure
 
 
-def legend_above(ax: Axes, columns: int = 3, marker_scale: float = 1.0) -> None:
-    """A legend that hides nothing, above the axes."""
+def look(k: int, of: int = 1) -> dict[str, Any]:
+    """Colour and style of curve k of so many: a few differ by their style too, in black and white."""
+    style = k if of <= len(STYLES) else k // len(COLORS)
+    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[style % len(STYLES)]}
+
+
+def note(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    shift: tuple[float, float] = (0.0, 0.0),
+    **options: Any,  # noqa: ANN401  of matplotlib
+) -> None:
+    """Small words at a place of the data, moved by so many points; options as for `annotate`."""
+    ax.annotate(text, at, xytext=shift, textcoords="offset points", **{"fontsize": "small", **options})
+
+
+def legend_above(
+    ax: Axes,
+    columns: int = 3,
+    marker_scale: float = 1.0,
+    height: float = 1.0,
+    **options: Any,  # noqa: ANN401  of matplotlib
+) -> None:
+    """A legend that hides nothing, above the axes; below them where its height is negative."""
     ax.legend(
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
+        loc="upper center" if height < 0 else "lower center",
+        bbox_to_anchor=(0.5, height),
         ncols=columns,
         frameon=False,
         fontsize="small",
         markerscale=marker_scale,
-        labelspacing=0.6,
+        **options,
     )
 
 
@@ -72,16 +99,14 @@ def shade_unstable(
         ax.axvspan(
             first, last, facecolor=VERMILION, alpha=0.12, hatch="///", edgecolor=VERMILION, linewidth=0.6
         )
-        ax.annotate(
-            word,
-            ((first + last) / 2, top),
-            xycoords=("data", "axes fraction"),
-            rotation=90,
-            ha="center",
-            va="top",
-            fontsize="small",
-            color="#8a3d00",
-        )
+        middle = ((first + last) / 2, top)
+        note(ax, word, middle, xycoords=_ACROSS, rotation=90, ha="center", va="top", color=WARNING)
+
+
+def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
+    """Shade the range of operating speeds, if there is one."""
+    if operating is not None:
+        ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
 
 
 def rpm_above(ax: Axes) -> None:
@@ -91,10 +116,10 @@ def rpm_above(ax: Axes) -> None:
     top.tick_params(labelsize="small")
 
 
-def hertz_beside(ax: Axes) -> None:
-    """A second scale, Hz, right of one in rad/s."""
-    right = ax.secondary_yaxis("right", functions=(times(1 / (2 * np.pi)), times(2 * np.pi)))
-    right.set_ylabel("frequency, Hz", fontsize="small")
+def scale_beside(ax: Axes, unit: float, label: str) -> None:
+    """A second scale right of the first: of values in this unit."""
+    right = ax.secondary_yaxis("right", functions=(times(1 / unit), times(unit)))
+    right.set_ylabel(label, fontsize="small")
     right.tick_params(labelsize="small")
 
 

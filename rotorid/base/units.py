@@ -29,7 +29,8 @@ def speed_text(speed: float) -> str:
 
 
 def phase_deg(z: ArrayLike) -> FloatArray:
-    """Phases of complex numbers, degrees from 0 to 360."""
+    """Phases of complex numbers, 0 ≤ phase < 360 degrees."""
     import numpy as np
 
-    return np.asarray(np.mod(np.degrees(np.angle(np.asarray(z))), 360.0))
+    phase = np.mod(np.degrees(np.angle(np.asarray(z))), 360.0)
+    return np.where(phase >= 360.0, 0.0, phase)  # −1e-20 modulo 360 is rounded to 360

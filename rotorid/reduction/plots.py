@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -46,6 +45,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
         Where; default new axes.
     """
     from fem.plots import draw_rotor, new_axes
+    from fem.plots.mode_shapes import smooth_shapes
     from rotorid.base.style import MARKERS, STYLES
 
     axes = new_axes((10, 5.6)) if ax is None else ax
@@ -55,7 +55,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     index = np.array([int(node) for node in reduction.nodes]) - 1
     scale = np.abs(full.shapes).max(axis=0)
     draw_rotor(rotor, axes, height=0.22)
-    x, curves = _smooth(full)
+    x, curves = smooth_shapes(full)
     shown = min(n, MOST_MODES)
     lowest = 1.12
     for k in range(shown):
@@ -86,15 +86,6 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     some = "" if shown == n else f", first {shown} of {n} modes"
     axes.set_title(f"{n}-mass model (points) and rotor (lines){some}", pad=10 + 12 * lines)
     return axes
-
-
-def _smooth(modes: fem.Modes) -> tuple[FloatArray, FloatArray]:
-    """Shapes between the nodes: the elements' own cubics."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    between = [np.linspace(a, b, 8, endpoint=False) for a, b in itertools.pairwise(modes.positions)]
-    x = np.append(np.concatenate(between), modes.positions[-1])
-    return x, np.asarray(CubicHermiteSpline(modes.positions, modes.shapes, modes.slopes)(x))
 
 
 def _words(reduction: Reduction, k: int) -> str:

@@ -1,7 +1,16 @@
 """The one kernel: every estimation problem of this project is `K θ = Y`, solved here and nowhere else."""
 
 from rotorid.regression.estimate import WORD_TOLERANCE, Combination, Estimate, coverage_factor, echelon
-from rotorid.regression.linear import RCOND, gain, least_squares, solution, stack, stretch, unstretch
+from rotorid.regression.linear import (
+    RCOND,
+    gain,
+    least_squares,
+    solution,
+    solution_and_rank,
+    stack,
+    stretch,
+    unstretch,
+)
 
 __all__ = [
     "RCOND",
@@ -13,6 +22,7 @@ __all__ = [
     "gain",
     "least_squares",
     "solution",
+    "solution_and_rank",
     "stack",
     "stretch",
     "unstretch",

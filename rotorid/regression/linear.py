@@ -29,6 +29,7 @@ __all__ = [
     "gain",
     "least_squares",
     "solution",
+    "solution_and_rank",
     "stack",
     "stretch",
     "unstretch",
@@ -44,12 +45,17 @@ def stretch(a: ArrayLike) -> FloatArray:
     Parameters
     ----------
     a
-        Complex vector (m,) or matrix (m, n).
+        Complex vector (m,), matrix (m, n), or matrices (…, m, n).
 
     Returns
     -------
-    (2m,) with Re, Im interleaved, or (2m, 2n) with blocks [[Re, −Im], [Im, Re]], so that
+    (2m,) with Re, Im interleaved, or (…, 2m, 2n) with blocks [[Re, −Im], [Im, Re]], so that
     `stretch(A @ x) == stretch(A) @ stretch(x)`. Source: [S] (12)–(15).
+
+    Raises
+    ------
+    ValueError
+        For a single number.
 
     Examples
     --------
@@ -60,29 +66,29 @@ def stretch(a: ArrayLike) -> FloatArray:
            [ 2.,  1.]])
     """
     z = np.asarray(a, dtype=complex)
+    if z.ndim == 0:
+        raise ValueError("stretch takes a vector or matrices, not a number")
     if z.ndim == 1:
         return np.ascontiguousarray(z).view(np.float64)
-    if z.ndim != 2:
-        raise ValueError(f"stretch takes a vector or a matrix, not an array of {z.ndim} dimensions")
-    m, n = z.shape
-    out = np.empty((m, 2, n, 2))
-    out[:, 0, :, 0] = out[:, 1, :, 1] = z.real
-    out[:, 0, :, 1] = -z.imag
-    out[:, 1, :, 0] = z.imag
-    return out.reshape(2 * m, 2 * n)
+    *more, m, n = z.shape
+    out = np.empty((*more, m, 2, n, 2))
+    out[..., 0, :, 0] = out[..., 1, :, 1] = z.real
+    out[..., 0, :, 1] = -z.imag
+    out[..., 1, :, 0] = z.imag
+    return out.reshape(*more, 2 * m, 2 * n)
 
 
 def unstretch(v: ArrayLike) -> ComplexArray:
-    """Turn a stretched vector back into a complex one.
+    """Turn stretched vectors back into complex ones.
 
     Parameters
     ----------
     v
-        Re, Im pairs, shape (2n,).
+        Re, Im pairs, shape (…, 2n).
 
     Returns
     -------
-    Shape (n,).
+    Shape (…, n).
 
     Raises
     ------
@@ -90,8 +96,8 @@ def unstretch(v: ArrayLike) -> ComplexArray:
         For another shape.
     """
     pairs = np.ascontiguousarray(v, dtype=np.float64)
-    if pairs.ndim != 1 or len(pairs) % 2:
-        raise ValueError(f"a stretched vector has Re, Im pairs in one dimension; got shape {pairs.shape}")
+    if not pairs.shape or pairs.shape[-1] % 2:
+        raise ValueError(f"a stretched vector has Re, Im pairs; got shape {pairs.shape}")
     return pairs.view(np.complex128)
 
 
@@ -229,6 +235,8 @@ def least_squares(  # noqa: PLR0915
 def gain(A: ArrayLike, *, rcond: float = 1e-14) -> Any:  # noqa: ANN401
     """Matrix G with the least-squares solution x = G y of A x = y, for many matrices at once.
 
+    Of several solutions it gives the one of the smallest scaled length; a column of zeros gives x = 0.
+
     Parameters
     ----------
     A
@@ -267,11 +275,16 @@ def solution(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> Any:  # noq
     >>> solution([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]], [1.0, 3.0, 5.0]).round(12).tolist()
     [1.0, 2.0]
     """
+    return solution_and_rank(A, y, rcond=rcond)[0]
+
+
+def solution_and_rank(A: ArrayLike, y: ArrayLike, *, rcond: float = RCOND) -> tuple[Any, int]:
+    """As `solution`, and the rank of A: below n the equations leave combinations of x open."""
     K = np.asarray(A)
     size = np.linalg.norm(K, axis=0)
     scale = np.where(size > 0, size, 1.0)
-    found = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)[0]
-    return (found.T / scale).T
+    found, _, rank, _ = np.linalg.lstsq(K / scale, np.asarray(y), rcond=rcond)
+    return (found.T / scale).T, int(rank)
 
 
 def _real_problem(

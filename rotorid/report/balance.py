@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from balancing.correction.correction_result import method_words
+from balancing.correction.correction_words import method_words
 from rotorid.base.text import sentence
 from rotorid.report import conventions
 from rotorid.report.balance_data import sheet_data
@@ -80,7 +80,7 @@ def balance_report(
         "vibration": conventions.vibration_words(labels.vibration_unit),
         "weight": conventions.weight_words(labels.weight_unit),
         "seen": conventions.seen_from(labels),
-        "method": method_words(result),
+        "method": method_words(result.method, weighted=result.row_weights is not None),
         "errors": _SOURCES.get(result.error_source, result.error_source),
         "coefficients": _coefficients(influence, job, provenance),
         "turn": _turn(result),
@@ -150,9 +150,7 @@ def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any])
 
 def _turn(result: Correction) -> str:
     """What the angle of a weight does to the phase of its vibration."""
-    labels = result.labels
-    same = labels.phase_sign == labels.angle_sign
-    return "is added to" if same else "is taken from"
+    return "is added to" if result.labels.counted_alike else "is taken from"
 
 
 def _discs(

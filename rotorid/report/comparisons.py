@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import listing
 from rotorid.base.units import RPM
-from rotorid.report.grids import Grid, Numbers, Part
+from rotorid.report.grids import Cells, Grid, Numbers, Part, below, numbered, words
 from rotorid.report.page import NOTHING
 from rotorid.report.pictures import (
     methods_picture,
@@ -23,62 +23,64 @@ UNDAMPED = 1e-8
 """Logarithmic decrements below this are rounding."""
 TOP = 10
 """Choices of nodes that are printed."""
+STABILITY = (
+    ("threshold, rpm", "threshold_rpm", 6),
+    ("threshold, rad/s", "threshold_rad_s", 6),
+    ("whirl frequency there, rad/s", "frequency_rad_s", 6),
+    ("whirl by running speed", "whirl_ratio", 4),
+    ("smallest logarithmic decrement", "smallest_log_decrement", 3),
+)
+"""Rows on the stability of a model: words, key of the document, significant digits."""
 
 
 def trade_off_part(document: Mapping[str, Any], show: Numbers) -> Part:
     """Other masses at the same nodes: frequencies against shapes."""
-    count = len(document["nodes"])
-    rows = [
-        row
+    from markupsafe import Markup
+
+    key = "trade_off.alternatives"
+    names = [
+        Markup("{}: {} kg").format(found["model"], show.listed(f"{key}.{r}.masses_kg.*", decimals=2))
         for r, found in enumerate(document["trade_off"]["alternatives"])
-        for row in _by_mode(show, f"trade_off.alternatives.{r}", found["model"], count, found["masses_kg"])
     ]
-    heads = ("masses from", "mode", "rad/s", "error, %", "MAC")
     note = (
         "Masses that have all frequencies of the rotor (matching sets) can still move unlike it: choose by "
         "the error and the MAC."
     )
-    return Part("Other masses at these nodes", tables=(Grid("", heads, tuple(rows), (0,), note),))
+    columns = _by_mode(document, show, key, "masses from", names)
+    return Part("Other masses at these nodes", tables=(Grid("", columns, note),))
 
 
 def methods_part(document: Mapping[str, Any], show: Numbers, methods: Methods | None) -> Part:
     """All methods of reduction at the same nodes."""
-    count, rows, said = len(document["nodes"]), [], []
-    for m, found in enumerate(document["methods"]["methods"]):
-        rows += _by_mode(show, f"methods.methods.{m}", found["method"], count, None)
-        said += [f"{found['method']}: {found['reason']}"] if found["reason"] else []
-    heads = ("method", "mode", "rad/s", "error, %", "MAC")
-    models = [found for found in document["methods"]["methods"] if found["mass_matrix_kg"] is not None]
-    full = listing([found["method"] for found in models if not found["diagonal"]], "and")
-    said.append(f"{full} have full mass matrices, which couple the nodes.")
+    found = document["methods"]["methods"]
+    said = [f"{each['method']}: {each['reason']}" for each in found if each["reason"]]
+    full = [each["method"] for each in found if each["mass_matrix_kg"] is not None and not each["diagonal"]]
+    said.append(f"{listing(full, 'and')} have full mass matrices, which couple the nodes.")
+    columns = _by_mode(document, show, "methods.methods", "method", [each["method"] for each in found])
     return Part(
         "Other methods at these nodes",
         tuple(said),
-        (Grid("Frequencies and shapes by method", heads, tuple(rows), (0,)),),
+        (Grid("Frequencies and shapes by method", columns),),
         () if methods is None else (methods_picture(methods),),
     )
 
 
 def _by_mode(
-    show: Numbers, key: str, name: str, count: int, masses: list[float] | None
-) -> list[tuple[str, ...]]:
-    """One row per mode; the name and the masses stand in the first."""
-    from markupsafe import Markup
-
-    first = name
-    if masses is not None:
-        list_of = Markup(", ").join(show(f"{key}.masses_kg.{i}", decimals=2) for i in range(len(masses)))
-        first = Markup("{}: {} kg").format(name, list_of)
-    return [
-        (
-            first if k == 0 else "",
-            str(k + 1),
-            show(f"{key}.natural_frequencies_rad_s.{k}", decimals=3),
-            show(f"{key}.relative_error.{k}", decimals=3, scale=100.0, sign=True),
-            show(f"{key}.mac.{k}", decimals=4),
+    document: Mapping[str, Any], show: Numbers, key: str, head: str, names: Sequence[str]
+) -> tuple[Cells, ...]:
+    """One row per model and mode; the name of the model stands in the first of each."""
+    modes = range(len(document["nodes"]))
+    columns = []
+    for r, name in enumerate(names):
+        stem = f"{key}.{r}"
+        frequencies = show.column("rad/s", f"{stem}.natural_frequencies_rad_s.*", rows=modes, decimals=3)
+        errors = show.column(
+            "error, %", f"{stem}.relative_error.*", rows=modes, decimals=3, scale=100.0, sign=True
         )
-        for k in range(count)
-    ]
+        mac = show.column("MAC", f"{stem}.mac.*", rows=modes, decimals=4)
+        first = Cells(head, (name, *("" for _ in modes[1:])), words=True)
+        columns.append((first, numbered("mode", len(modes)), frequencies, errors, mac))
+    return below(*columns)
 
 
 def placement_part(document: Mapping[str, Any], show: Numbers, placement: Placement | None) -> Part:
@@ -92,44 +94,43 @@ def placement_part(document: Mapping[str, Any], show: Numbers, placement: Placem
     trap = Markup(
         "{} choices match all checked frequencies but not the shapes: choose by both columns."
     ).format(show("placement.frequency_match_with_wrong_shapes", decimals=0))
-    named = [
-        (words, f"placement.{key}", found[key])
-        for words, key in (
+    named = {
+        f"placement.{key}": name
+        for name, key in (
             ("best by frequency", "best_by_frequency"),
             ("best by MAC", "best_by_mac"),
             ("compromise", "compromise"),
             ("the book's rule", "book_rule"),
         )
         if found[key] is not None
-    ]
-    ranked = [
-        (str(choice["rank"]), f"placement.choices.{r}", choice)
-        for r, choice in enumerate(found["choices"][:TOP])
-    ]
-    heads = ("nodes", "masses, kg", "largest error, %", "smallest MAC", "condition")
+    }
+    ranked = {f"placement.choices.{r}": each["rank"] for r, each in enumerate(found["choices"][:TOP])}
     tables = [
-        Grid(caption, (first, *heads), tuple(_choice(show, *row) for row in rows), (0, 1, 2))
-        for caption, first, rows in (
+        Grid(caption, _choices(show, head, choices))
+        for caption, head, choices in (
             ("Choices with a name", "choice", named),
             ("First in rank", "rank", ranked),
         )
-        if rows
+        if choices
     ]
     drawings = () if placement is None or not placement.ranked else (placement_picture(placement),)
     return Part("Other places of the masses", (said, trap), tuple(tables), drawings)
 
 
-def _choice(show: Numbers, words: str, key: str, choice: Mapping[str, Any]) -> tuple[str, ...]:
-    from markupsafe import Markup
-
-    masses = (show(f"{key}.masses_kg.{i}", decimals=2) for i in range(len(choice["masses_kg"])))
+def _choices(show: Numbers, head: str, choices: Mapping[str, object]) -> tuple[Cells, ...]:
+    """One row per choice of nodes, each given by its path and called by a name or number."""
     return (
-        words,
-        ", ".join(map(str, choice["nodes"])),
-        Markup(", ").join(masses),
-        show(f"{key}.largest_error", decimals=3, scale=100.0),
-        show(f"{key}.smallest_mac", decimals=4),
-        show(f"{key}.condition_number", 3),
+        words(head, choices.values()),
+        words("nodes", (", ".join(map(str, show.found(f"{key}.nodes"))) for key in choices)),
+        Cells(
+            "masses, kg", tuple(show.listed(f"{key}.masses_kg.*", decimals=2) for key in choices), words=True
+        ),
+        Cells(
+            "largest error, %",
+            tuple(show(f"{key}.largest_error", decimals=3, scale=100.0) for key in choices),
+        ),
+        Cells("smallest MAC", tuple(show(f"{key}.smallest_mac", decimals=4) for key in choices)),
+        Cells("condition", tuple(show(f"{key}.condition_number", 3) for key in choices)),
     )
 
 
@@ -180,18 +181,11 @@ def stability_part(document: Mapping[str, Any], show: Numbers, stability: Stabil
     decrements = [v for which in ("full", "small") for v in found[f"{which}_log_decrement"] if v is not None]
     if decrements and max(map(abs, decrements)) < UNDAMPED:
         return Part(heading, (span + " no damping acts on either model: no motion grows, and none decays.",))
-    rows: list[tuple[str, ...]] = [
-        ("status", *(_status(found[which]["status"]) for which in ("full", "small")))
-    ]
-    for words, key, digits in (
-        ("threshold, rpm", "threshold_rpm", 6),
-        ("threshold, rad/s", "threshold_rad_s", 6),
-        ("whirl frequency there, rad/s", "frequency_rad_s", 6),
-        ("whirl by running speed", "whirl_ratio", 4),
-        ("smallest logarithmic decrement", "smallest_log_decrement", 3),
-    ):
-        rows.append((words, *(show(f"stability.{which}.{key}", digits) for which in ("full", "small"))))
-    rows.append(("direction", *(found[which]["direction"] or NOTHING for which in ("full", "small"))))
+    columns = (
+        words("", ("status", *(name for name, _, _ in STABILITY), "direction")),
+        _one_model(show, "full rotor", "full"),
+        _one_model(show, "small model", "small"),
+    )
     said = []
     if found["relative_difference_of_threshold"] is not None:
         said.append(
@@ -199,10 +193,13 @@ def stability_part(document: Mapping[str, Any], show: Numbers, stability: Stabil
                 show("stability.relative_difference_of_threshold", 3, scale=100.0, sign=True)
             )
         )
-    heads = ("", "full rotor", "small model")
     drawings = () if stability is None else (stability_picture(stability),)
-    return Part(heading, tuple(said), (Grid(span, heads, tuple(rows), (0,)),), drawings)
+    return Part(heading, tuple(said), (Grid(span, columns),), drawings)
 
 
-def _status(word: str) -> str:
-    return {"threshold": "unstable above"}.get(word, word)
+def _one_model(show: Numbers, head: str, which: str) -> Cells:
+    """What is known of the stability of one model."""
+    found = show.found(f"stability.{which}")
+    status = {"threshold": "unstable above"}.get(found["status"], found["status"])
+    numbers = (show(f"stability.{which}.{key}", digits) for _, key, digits in STABILITY)
+    return Cells(head, (status, *numbers, found["direction"] or NOTHING))

@@ -135,10 +135,9 @@ def _rotation(labels: Labels) -> str:
 
 def _angles(labels: Labels) -> str:
     if labels.clock:
-        side = "with" if labels.angle_sign > 0 else "against"
         end = "" if labels.view is None else f" seen from the {labels.view}"
-        return f"degrees from the mark, {labels.angle_words}{end}, which is {side} the rotation."
-    if labels.angle_sign > 0:
+        return f"degrees from the mark, {labels.angle_words}{end}, which is {labels.side} the rotation."
+    if labels.side == "with":
         return (
             "degrees from the mark, with the rotation: go from the mark the way in which the surface moves."
         )
@@ -175,7 +174,7 @@ def _weight(labels: Labels) -> str:
 
 def _stated(labels: Labels, angle: float) -> str:
     """An angle with the rotation as the job counts it."""
-    return f"{np.mod(labels.angle_sign * angle, 360.0):g}°"
+    return f"{np.mod(labels.with_rotation(angle), 360.0):g}°"
 
 
 def rotor_figure(
@@ -200,7 +199,7 @@ def rotor_figure(
     ax.axis("off")
     drawn = labels.drawn_sign
     mark = drawn * np.radians(key_phasor or 0.0)
-    count = drawn * labels.angle_sign
+    count = labels.angles_on_paper
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     _turning(ax, 0.27, np.radians(100), drawn * np.radians(250))
     ax.text(0, 0, "rotation", ha="center", va="center", fontsize=7)

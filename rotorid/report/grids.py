@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rotorid.report.page import NOTHING, Shown, fixed, significant
@@ -18,6 +18,49 @@ NARROW = 6
 
 
 @dataclass(frozen=True)
+class Cells:
+    """A column of a table.
+
+    Attributes
+    ----------
+    head
+        Over it, with the unit.
+    cells
+        One a row: texts, or numbers of the document as `Numbers` prints them.
+    words
+        Whether it holds words; numbers stand at the right.
+    """
+
+    head: str
+    cells: tuple[str, ...]
+    words: bool = False
+
+
+def words(head: str, cells: Iterable[object]) -> Cells:
+    """A column of words."""
+    return Cells(head, tuple(map(str, cells)), words=True)
+
+
+def figures(head: str, values: Iterable[object]) -> Cells:
+    """A column of numbers that are not from the document, with up to six digits, without trailing zeros."""
+    shown = (f"{v:.6g}".replace("-", "−") if isinstance(v, float) else str(v) for v in values)
+    return Cells(head, tuple(shown))
+
+
+def numbered(head: str, count: int) -> Cells:
+    """A column of the numbers from 1."""
+    return figures(head, range(1, count + 1))
+
+
+def below(*tables: Sequence[Cells]) -> tuple[Cells, ...]:
+    """Columns of tables with the same heads, one table below the other."""
+    return tuple(
+        replace(column[0], cells=tuple(cell for part in column for cell in part.cells))
+        for column in zip(*tables, strict=True)
+    )
+
+
+@dataclass(frozen=True)
 class Grid:
     """A table.
 
@@ -25,26 +68,35 @@ class Grid:
     ----------
     caption
         What it shows, in a few words.
-    heads
-        Of the columns, with their units.
-    rows
-        Cells: texts, or numbers of the document as `Numbers` prints them.
-    texts
-        Which columns hold words; the others hold numbers, which stand at the right.
+    columns
+        One at least, all of one length.
     note
         What the reader must know about it; may be empty.
     """
 
     caption: str
-    heads: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    texts: tuple[int, ...] = ()
+    columns: tuple[Cells, ...]
     note: str = ""
+
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Of the columns."""
+        return tuple(column.head for column in self.columns)
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Cells row by row."""
+        return tuple(zip(*(column.cells for column in self.columns), strict=True))
+
+    @property
+    def texts(self) -> tuple[int, ...]:
+        """Which columns hold words, from 0."""
+        return tuple(i for i, column in enumerate(self.columns) if column.words)
 
     @property
     def wide(self) -> bool:
         """Whether it has more columns than a telephone shows side by side."""
-        return len(self.heads) > NARROW
+        return len(self.columns) > NARROW
 
     @property
     def whole(self) -> bool:
@@ -85,6 +137,7 @@ class Numbers:
 
     def __init__(self, document: Mapping[str, Any]) -> None:
         self._shown = Shown(document)
+        self.found = self._shown.found
 
     def __call__(
         self,
@@ -127,6 +180,39 @@ class Numbers:
         factor = Markup("") if scale == 1.0 else Markup(' data-scale="{}"').format(repr(scale))
         return Markup('<span data-key="{}"{}>{}</span>').format(key, factor, text.replace("-", "−"))
 
+    def column(
+        self,
+        head: str,
+        path: str,
+        digits: int = 6,
+        *,
+        rows: Iterable[int] | None = None,
+        **options: Any,  # noqa: ANN401  as for one number
+    ) -> Cells:
+        """Print one number a row.
+
+        Parameters
+        ----------
+        head
+            Over the column.
+        path
+            Such as "critical_speeds_rad_s.*": `*` is the number of the row, from 0.
+        rows
+            Which of them; None: all that the document has.
+        digits, options
+            As for one number.
+        """
+        before, _, after = path.partition("*")
+        if rows is None:
+            rows = range(len(self.found(before.rstrip("."))))
+        return Cells(head, tuple(self(f"{before}{row}{after}", digits, **options) for row in rows))
+
+    def listed(self, path: str, *, decimals: int) -> Markup:
+        """Print the numbers of a list, path as for a column, in one cell."""
+        from markupsafe import Markup
+
+        return Markup(", ").join(self.column("", path, decimals=decimals).cells)
+
 
 def every_warning(document: Mapping[str, Any]) -> list[str]:
     """All warnings of a document and its parts, in the order of the document, each once."""
@@ -150,11 +236,6 @@ def evenly(n: int, most: int) -> list[int]:
     if n <= most:
         return list(range(n))
     return [round(i * (n - 1) / (most - 1)) for i in range(most)]
-
-
-def texts(values: Iterable[object]) -> tuple[str, ...]:
-    """Cells from anything: numbers with up to six digits, without trailing zeros."""
-    return tuple(f"{v:.6g}".replace("-", "−") if isinstance(v, float) else str(v) for v in values)
 
 
 def few(names: Sequence[object]) -> str:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.model.rotor import Rotor
-from rotorid.base.units import RPM
-from rotorid.report.grids import Grid, texts
+from rotorid.base.units import RPM, phase_deg
+from rotorid.report.grids import Cells, Grid, figures, numbered, words
 from rotorid.report.pictures import Drawing, rotor_picture
 
 if TYPE_CHECKING:
@@ -84,19 +84,16 @@ def place(rotor: Rotor, node: int) -> str:
 
 def unbalance_table(rotor: Rotor, unbalance: Mapping[int, complex]) -> Grid:
     """What is mounted: kg·m printed in g·mm, angles in degrees with the rotation."""
-    rows = [
-        texts(
-            (
-                place(rotor, node),
-                float(rotor.positions[node - 1]),
-                1e6 * float(abs(u)),
-                float(np.degrees(np.angle(u)) % 360),
-            )
-        )
-        for node, u in sorted(unbalance.items())
-    ]
-    heads = ("node", "position, m", "unbalance, g·mm", "angle, ° with the rotation")
-    return Grid("What is mounted", heads, tuple(rows), (0,))
+    mounted = sorted(unbalance.items())
+    return Grid(
+        "What is mounted",
+        (
+            words("node", (place(rotor, node) for node, _ in mounted)),
+            figures("position, m", (float(rotor.positions[node - 1]) for node, _ in mounted)),
+            figures("unbalance, g·mm", (1e6 * float(abs(u)) for _, u in mounted)),
+            figures("angle, ° with the rotation", (float(phase_deg(u)) for _, u in mounted)),
+        ),
+    )
 
 
 def _facts(rotor: Rotor, *, conservative: bool, at_rest: bool) -> tuple[tuple[str, str], ...]:
@@ -142,7 +139,6 @@ def _material(rotor: Rotor) -> list[tuple[str, np.ndarray, str]]:
 def _sections(rotor: Rotor) -> Grid:
     """One row per element."""
     columns = {
-        "element": np.arange(1, rotor.n_elements + 1),
         "from, m": rotor.positions[:-1],
         "length, mm": 1e3 * rotor.length,
         "outer diameter, mm": 1e3 * rotor.outer_diameter,
@@ -150,32 +146,35 @@ def _sections(rotor: Rotor) -> Grid:
     if rotor.inner_diameter.any():
         columns["bore, mm"] = 1e3 * rotor.inner_diameter
     columns |= {name: values for name, values, one in _material(rotor) if not one}
-    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-    return Grid("Shaft, one row per element", tuple(columns), tuple(texts(row) for row in rows))
+    printed = (figures(head, values.tolist()) for head, values in columns.items())
+    return Grid("Shaft, one row per element", (numbered("element", rotor.n_elements), *printed))
 
 
 def _discs(rotor: Rotor) -> Grid:
     """Discs and concentrated masses; inertias and names only where there are any."""
-    turning = any(disc.polar_inertia or disc.diametral_inertia for disc in rotor.discs)
-    named = any(disc.name for disc in rotor.discs)
-    heads = ["node", *(["name"] if named else []), "mass, kg"]
-    heads += ["polar inertia, kg·m²", "diametral inertia, kg·m²"] if turning else []
-    rows = []
-    for disc in sorted(rotor.discs, key=lambda disc: disc.node):
-        inertias = (float(disc.polar_inertia), float(disc.diametral_inertia)) if turning else ()
-        rows.append(texts((disc.node, *([disc.name] if named else []), float(disc.mass), *inertias)))
-    return Grid("Discs and masses", tuple(heads), tuple(rows), (1,) if named else ())
+    discs = sorted(rotor.discs, key=lambda disc: disc.node)
+    columns = [figures("node", (disc.node for disc in discs))]
+    if any(disc.name for disc in discs):
+        columns.append(words("name", (disc.name for disc in discs)))
+    columns.append(figures("mass, kg", (disc.mass for disc in discs)))
+    if any(disc.polar_inertia or disc.diametral_inertia for disc in discs):
+        columns.append(figures("polar inertia, kg·m²", (disc.polar_inertia for disc in discs)))
+        columns.append(figures("diametral inertia, kg·m²", (disc.diametral_inertia for disc in discs)))
+    return Grid("Discs and masses", tuple(columns))
 
 
 def _supports(rotor: Rotor) -> Grid:
-    rows = []
-    for support in rotor.supports:
-        said = f"{support.kind} {support.name}".strip()
-        rows.append(
-            (place(rotor, support.node), said, _words(support, 0), _words(support, 1), _beside(support))
-        )
-    heads = ("node", "support", "stiffness, N/m", "damping, N·s/m", "besides")
-    return Grid("Supports", heads, tuple(rows), tuple(range(5)))
+    supports = rotor.supports
+    return Grid(
+        "Supports",
+        (
+            words("node", (place(rotor, support.node) for support in supports)),
+            words("support", (f"{support.kind} {support.name}".strip() for support in supports)),
+            words("stiffness, N/m", (_words(support, 0) for support in supports)),
+            words("damping, N·s/m", (_words(support, 1) for support in supports)),
+            words("besides", (_beside(support) for support in supports)),
+        ),
+    )
 
 
 def _words(support: Support, which: int) -> str:
@@ -205,18 +204,15 @@ def _beside(support: Support) -> str:
 
 def _coefficients(rotor: Rotor) -> list[Grid]:
     """Tables of tabulated coefficients; supports that share them share the tables."""
-    tables: dict[tuple[str, tuple[tuple[str, ...], ...]], list[str]] = {}
+    tables: dict[tuple[str, tuple[Cells, ...]], list[str]] = {}
+    kinds = (("Stiffness, MN/m", "k", 1e6), ("Damping, kN·s/m", "c", 1e3))
     for number, support in enumerate(rotor.supports, start=1):
         if not support.speeds:
             continue
-        for letter, unit, matrices in zip("kc", (1e6, 1e3), support.at(support.speeds), strict=True):
-            rows = tuple(
-                texts([omega * RPM, *(matrix.ravel() / unit).tolist()])
-                for omega, matrix in zip(support.speeds, matrices, strict=True)
-            )
-            tables.setdefault((letter, rows), []).append(f"{support.kind} {support.name or number}")
-    words = {"k": "Stiffness, MN/m", "c": "Damping, kN·s/m"}
-    return [
-        Grid(f"{words[k]}: {', '.join(named)}", ("rpm", f"{k}xx", f"{k}xy", f"{k}yx", f"{k}yy"), rows)
-        for (k, rows), named in tables.items()
-    ]
+        for (caption, letter, unit), matrices in zip(kinds, support.at(support.speeds), strict=True):
+            columns = [figures("rpm", (omega * RPM for omega in support.speeds))]
+            for name, entries in zip(("xx", "xy", "yx", "yy"), matrices.reshape(-1, 4).T, strict=True):
+                columns.append(figures(letter + name, (entries / unit).tolist()))
+            named = tables.setdefault((caption, tuple(columns)), [])
+            named.append(f"{support.kind} {support.name or number}")
+    return [Grid(f"{caption}: {', '.join(named)}", columns) for (caption, columns), named in tables.items()]

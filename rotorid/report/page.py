@@ -157,17 +157,28 @@ class Shown:
         KeyError
             If the document has nothing there, or something that is neither a number nor null.
         """
+        found = self.found(key)
+        if found is None:
+            return None
+        if isinstance(found, bool) or not isinstance(found, int | float):
+            raise KeyError(f"the document has no number at {key}")
+        return float(found)
+
+    def found(self, key: str) -> Any:  # noqa: ANN401
+        """Return what the document holds at a path.
+
+        Raises
+        ------
+        KeyError
+            If it has nothing there.
+        """
         found: Any = self._document
         for part in key.split("."):
             try:
                 found = found[int(part)] if isinstance(found, list | tuple) else found[part]
             except (IndexError, KeyError, TypeError, ValueError):
                 raise KeyError(f"the document has nothing at {key}") from None
-        if found is None:
-            return None
-        if isinstance(found, bool) or not isinstance(found, int | float):
-            raise KeyError(f"the document has no number at {key}")
-        return float(found)
+        return found
 
 
 def significant(value: float, digits: int = 3) -> str:

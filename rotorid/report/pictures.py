@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rotorid.base.style import legend_above
 from rotorid.plots import plot
 from rotorid.report.page import inline_svg
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -99,9 +99,7 @@ def bode_picture(
 
         above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
         draw_readings(response, places, peaks, (above, below), operating=operating, factors=False)
-        handles, named = above.get_legend_handles_labels()
-        columns = 3 if len(named) > 4 else 2
-        _legend(above, handles, named, (0.5, 1.16), columns)
+        legend_above(above, 3 if len(places) > 4 else 2, 0.75, 1.16)
 
     caption = "Amplitude and phase over speed; a positive phase leads. Dotted: peaks of the largest reading."
     return sketch(5.0, draw, caption)
@@ -132,8 +130,7 @@ def methods_picture(methods: Methods) -> Drawing:
             for text in axes.texts:
                 if not text.get_text().startswith("MAC"):  # numbers at the ends of narrow bars
                     text.set_rotation(90)
-        handles, named = above.get_legend_handles_labels()
-        _legend(above, handles, named, (0.5, 1.0), 4)
+        legend_above(above, 4, 0.75)
 
     return sketch(5.2, draw, "What each method loses: errors of the frequencies, and 1 − MAC of the shapes.")
 
@@ -177,20 +174,5 @@ def _curves_only(axes: Axes, columns: int, below: bool = False) -> None:
     pairs = [
         pair for pair in zip(*axes.get_legend_handles_labels(), strict=True) if isinstance(pair[0], Line2D)
     ]
-    where = (0.5, -0.14) if below else (0.5, 1.0)
-    _legend(axes, [h for h, _ in pairs], [label for _, label in pairs], where, columns)
-
-
-def _legend(
-    axes: Axes, handles: Sequence[Artist], labels: Sequence[str], where: tuple[float, float], columns: int
-) -> None:
-    axes.legend(
-        handles,
-        labels,
-        loc="upper center" if where[1] < 0 else "lower center",
-        bbox_to_anchor=where,
-        ncols=columns,
-        frameon=False,
-        fontsize="small",
-        markerscale=0.75,
-    )
+    handles, labels = zip(*pairs, strict=True)
+    legend_above(axes, columns, 0.75, -0.14 if below else 1.0, handles=handles, labels=labels)

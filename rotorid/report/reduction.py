@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
@@ -14,7 +14,7 @@ from rotorid.report.comparisons import (
     stability_part,
     trade_off_part,
 )
-from rotorid.report.grids import Grid, Numbers, Part, every_warning, few
+from rotorid.report.grids import Cells, Grid, Numbers, Part, below, every_warning, few, numbered, words
 from rotorid.report.inputs import rotor_sheet
 from rotorid.report.page import NOTHING, render_report
 from rotorid.report.pictures import reduction_picture
@@ -101,32 +101,23 @@ def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[t
 
 
 def _masses(document: Mapping[str, Any], show: Numbers, result: Reduction) -> Part:
-    known = document["positions_m"] is not None
-    sure = document["masses_std_kg"] is not None
-    heads = ["node", *(["position, m"] if known else []), "mass, kg", *(["±, kg"] if sure else [])]
-    rows = tuple(
-        (
-            str(node),
-            *([show(f"positions_m.{i}", decimals=4)] if known else []),
-            show(f"masses_kg.{i}", decimals=3),
-            *([show(f"masses_std_kg.{i}", 2)] if sure else []),
-        )
-        for i, node in enumerate(document["nodes"])
+    masses, note = [words("node", document["nodes"])], ""
+    if document["positions_m"] is not None:
+        masses.append(show.column("position, m", "positions_m.*", decimals=4))
+    masses.append(show.column("mass, kg", "masses_kg.*", decimals=3))
+    if document["masses_std_kg"] is not None:
+        masses.append(show.column("±, kg", "masses_std_kg.*", 2))
+        note = "±: one standard deviation from the residuals of the regression: error of the model."
+    count = len(document["natural_frequencies_rad_s"])
+    modes = (
+        numbered("mode", count),
+        show.column("model, rad/s", "natural_frequencies_rad_s.*", decimals=4),
+        show.column("rotor, rad/s", "rotor_frequencies_rad_s.*", rows=range(count), decimals=4),
+        show.column("error, %", "relative_error.*", decimals=3, scale=100.0, sign=True),
+        show.column("MAC", "mac.*", decimals=5),
     )
-    note = (
-        "±: one standard deviation from the residuals of the regression: error of the model." if sure else ""
-    )
-    modes = tuple(
-        (
-            str(k + 1),
-            show(f"natural_frequencies_rad_s.{k}", decimals=4),
-            show(f"rotor_frequencies_rad_s.{k}", decimals=4),
-            show(f"relative_error.{k}", decimals=3, scale=100.0, sign=True),
-            show(f"mac.{k}", decimals=5),
-        )
-        for k in range(len(document["natural_frequencies_rad_s"]))
-    )
-    words = (
+    meaning = "MAC: 1 where the shapes at the masses are the same, 0 where nothing of them is."
+    drawn = (
         "the model (points) and the rotor (lines)"
         if document["source"] == "rotor"
         else "the model (full) and as measured (hollow)"
@@ -135,15 +126,10 @@ def _masses(document: Mapping[str, Any], show: Numbers, result: Reduction) -> Pa
         "Masses and modes",
         (_condition(show),),
         (
-            Grid("Equivalent masses", tuple(heads), rows, (0,), note),
-            Grid(
-                "Natural frequencies and shapes",
-                ("mode", "model, rad/s", "rotor, rad/s", "error, %", "MAC"),
-                modes,
-                note="MAC: 1 where the shapes at the masses are the same, 0 where nothing of them is.",
-            ),
+            Grid("Equivalent masses", tuple(masses), note),
+            Grid("Natural frequencies and shapes", modes, meaning),
         ),
-        (reduction_picture(result, words),),
+        (reduction_picture(result, drawn),),
     )
 
 
@@ -158,53 +144,49 @@ def _uncertain(document: Mapping[str, Any], show: Numbers) -> list[Part]:
     found = document.get("uncertainty")
     if found is None:
         return []
-    drawn = found["drawn"] is not None
-    rows = []
-    for key, square, digits in (
-        ("masses", "masses_kg2", 3),
-        ("natural_frequencies", "natural_frequencies_rad2_s2", 4),
+    columns = []
+    for kind, unit, square, digits in (
+        ("masses", "kg", "kg2", 3),
+        ("natural_frequencies", "rad_s", "rad2_s2", 4),
     ):
-        unit = "kg" if key == "masses" else "rad_s"
-        for i, name in enumerate(_names(document)[key]):
-            shares = {name: part[square][i] or 0.0 for name, part in found["contributions"].items()}
-            whole = sum(shares.values())
-            largest = sorted(shares, key=lambda name: -shares[name])[:3] if whole > 0 else []
-            stem = f"uncertainty.{key}"
-            rows.append(
-                (
-                    name,
-                    show(f"{stem}_{unit}.{i}", decimals=digits),
-                    show(f"{stem}_std_{unit}.{i}", 3),
-                    *([show(f"uncertainty.drawn.{key}_std_{unit}.{i}", 3)] if drawn else []),
-                    ", ".join(f"{name} {100 * shares[name] / whole:.0f} %" for name in largest) or NOTHING,
-                )
-            )
-    heads = ("quantity", "value", "±", *(["± of drawn inputs"] if drawn else []), "from")
-    texts = (0, len(heads) - 1)
+        stem = f"uncertainty.{kind}"
+        part = [
+            words("quantity", _names(document)[kind]),
+            show.column("value", f"{stem}_{unit}.*", decimals=digits),
+            show.column("±", f"{stem}_std_{unit}.*", 3),
+        ]
+        if found["drawn"] is not None:
+            part.append(show.column("± of drawn inputs", f"uncertainty.drawn.{kind}_std_{unit}.*", 3))
+        shares = {name: each[f"{kind}_{square}"] for name, each in found["contributions"].items()}
+        part.append(words("from", (_largest_shares(shares, i) for i in range(len(part[0].cells)))))
+        columns.append(part)
     note = "±: one standard deviation; from: the inputs that make up most of the variance."
-    return [
-        Part("What errors of the inputs do", tables=(Grid("Uncertainty", heads, tuple(rows), texts, note),))
-    ]
+    return [Part("What errors of the inputs do", tables=(Grid("Uncertainty", below(*columns), note),))]
+
+
+def _largest_shares(contributions: Mapping[str, Sequence[float | None]], i: int) -> str:
+    """The inputs that make up most of the variance of quantity i, in words."""
+    shares = {name: values[i] or 0.0 for name, values in contributions.items()}
+    whole = sum(shares.values())
+    if whole <= 0:
+        return NOTHING
+    largest = sorted(shares, key=lambda name: -shares[name])[:3]
+    return ", ".join(f"{name} {100 * shares[name] / whole:.0f} %" for name in largest)
 
 
 def _what_if(document: Mapping[str, Any], show: Numbers) -> list[Part]:
     if "what_if" not in document:
         return []
-    rows = tuple(
+    masses, frequencies = (
         (
-            name,
-            show(f"what_if.exact.{key}.{i}", 4, sign=True),
-            show(f"what_if.first_order.{key}.{i}", 4, sign=True),
+            words("quantity", _names(document)[kind]),
+            show.column("change", f"what_if.exact.{key}.*", 4, sign=True),
+            show.column("predicted to first order", f"what_if.first_order.{key}.*", 4, sign=True),
         )
         for kind, key in (("masses", "masses_kg"), ("natural_frequencies", "frequencies_rad_s"))
-        for i, name in enumerate(_names(document)[kind])
     )
-    heads = ("quantity", "change", "predicted to first order")
-    return [
-        Part(
-            "What the asked change of inputs does", tables=(Grid("Change, kg and rad/s", heads, rows, (0,)),)
-        )
-    ]
+    table = Grid("Change, kg and rad/s", below(masses, frequencies))
+    return [Part("What the asked change of inputs does", tables=(table,))]
 
 
 def _names(document: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -230,42 +212,40 @@ def _small(document: Mapping[str, Any]) -> Part:
 
 def _compliance(document: Mapping[str, Any], show: Numbers) -> Part:
     """What the masses were computed from: compliance at the masses, springs that it does not hold."""
-    nodes = document["nodes"]
-    rows = tuple(
-        (f"at {node}", *(show(f"compliance_m_per_N.{i}.{j}", 6, scale=1e9) for j in range(len(nodes))))
-        for i, node in enumerate(nodes)
-    )
-    heads = ("deflection, nm/N", *(f"force at {node}" for node in nodes))
-    tables = [Grid("Compliance", heads, rows, (0,))]
+    tables = [Grid("Compliance", _deflections(document, show, "compliance_m_per_N"))]
     if any(document["seal_stiffness_N_per_m"]):
-        springs = tuple((str(node), show(f"seal_stiffness_N_per_m.{i}", 6)) for i, node in enumerate(nodes))
-        tables.append(Grid("Springs of seals to the ground", ("node", "stiffness, N/m"), springs, (0,)))
-    used = tuple(
-        (
-            str(k + 1),
-            show(f"rotor_frequencies_rad_s.{k}", 9),
-            show(f"rotor_frequencies_rad_s.{k}", 7, scale=RPM),
+        springs = (
+            words("node", document["nodes"]),
+            show.column("stiffness, N/m", "seal_stiffness_N_per_m.*"),
         )
-        for k in range(document["modes"])
+        tables.append(Grid("Springs of seals to the ground", springs))
+    used = range(document["modes"])
+    columns = (
+        numbered("mode", len(used)),
+        show.column("rad/s", "rotor_frequencies_rad_s.*", 9, rows=used),
+        show.column("rpm", "rotor_frequencies_rad_s.*", 7, rows=used, scale=RPM),
     )
-    tables.append(Grid("Modes of the regression", ("mode", "rad/s", "rpm"), used))
+    tables.append(Grid("Modes of the regression", columns))
     tables += _apart(document, show)
     return Part("Compliance at the masses, and modes used", tables=tuple(tables))
+
+
+def _deflections(document: Mapping[str, Any], show: Numbers, key: str) -> tuple[Cells, ...]:
+    """Deflections at the masses under unit forces there."""
+    nodes = document["nodes"]
+    return (
+        words("deflection, nm/N", (f"at {node}" for node in nodes)),
+        *(show.column(f"force at {node}", f"{key}.*.{j}", scale=1e9) for j, node in enumerate(nodes)),
+    )
 
 
 def _apart(document: Mapping[str, Any], show: Numbers) -> list[Grid]:
     """The shaft's own compliance and the shares of its two bearings, formula (47)."""
     if "separated" not in document:
         return []
-    nodes, supports = document["nodes"], document["separated"]["supports"]
-    rows = tuple(
-        (
-            f"at {node}",
-            *(show(f"separated.delta_m_per_N.{i}.{j}", 6, scale=1e9) for j in range(len(nodes))),
-            *(show(f"separated.fractions.{i}.{s}", decimals=4) for s in range(len(supports))),
-        )
-        for i, node in enumerate(nodes)
+    shares = (
+        show.column(f"share of {support}", f"separated.fractions.*.{s}", decimals=4)
+        for s, support in enumerate(document["separated"]["supports"])
     )
-    heads = ("deflection, nm/N", *(f"force at {node}" for node in nodes))
-    heads += tuple(f"share of {support}" for support in supports)
-    return [Grid("Of the shaft alone, on rigid bearings; shares of the bearings' nodes", heads, rows, (0,))]
+    columns = (*_deflections(document, show, "separated.delta_m_per_N"), *shares)
+    return [Grid("Of the shaft alone, on rigid bearings; shares of the bearings' nodes", columns)]

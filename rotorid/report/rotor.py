@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from fem.model.rotor import Rotor
 from rotorid.base.units import RPM, rpm_text
-from rotorid.report.grids import Grid, Numbers, Part, evenly, every_warning
+from rotorid.report.grids import Cells, Grid, Numbers, Part, evenly, every_warning, figures, numbered, words
 from rotorid.report.inputs import place, rotor_sheet, unbalance_table
-from rotorid.report.page import render_report
+from rotorid.report.page import NOTHING, render_report
 from rotorid.report.pictures import bode_picture, map_picture, modes_picture
 
 if TYPE_CHECKING:
@@ -163,57 +163,53 @@ def _inside(document: Mapping[str, Any]) -> list[str]:
 
 
 def _criticals(document: Mapping[str, Any], show: Numbers) -> Grid:
-    heads = ["mode", "rpm", "rad/s", "Hz", "whirl"]
-    operating, mesh = document.get("operating"), document.get("mesh_check")
-    heads += ["from operating range, %"] if operating else []
-    heads += ["error of the mesh, %"] if mesh else []
-    rows = []
-    for k, way in enumerate(document["direction"]):
-        row = [
-            str(k + 1),
-            show(f"critical_speeds_rpm.{k}", decimals=2),
-            show(f"critical_speeds_rad_s.{k}", decimals=4),
-            show(f"critical_speeds_rad_s.{k}", decimals=4, scale=1 / math.tau),
-            way if document["critical_speeds_rad_s"][k] else "rigid body",
-        ]
-        if operating:
-            inside = operating["critical_speeds"][k]["inside"]
-            distance = show(f"operating.critical_speeds.{k}.separation_percent", decimals=1)
-            row.append("INSIDE" if inside else distance)
-        if mesh:
-            row.append(show(f"mesh_check.relative_error.{k}", 2, scale=100.0))
-        rows.append(tuple(row))
-    note = "The distance is in percent of the nearest end of the operating range." if operating else ""
-    note = f"{note} {document.get('critical_speeds_cut') or ''}".strip()
-    return Grid("Where the frequency of free whirl equals the speed of rotation", tuple(heads), tuple(rows),
-                (4,), note)  # fmt: skip
+    speeds, operating = document["critical_speeds_rad_s"], document.get("operating")
+    whirl = zip(document["direction"], speeds, strict=True)
+    columns = [
+        numbered("mode", len(speeds)),
+        show.column("rpm", "critical_speeds_rpm.*", decimals=2),
+        show.column("rad/s", "critical_speeds_rad_s.*", decimals=4),
+        show.column("Hz", "critical_speeds_rad_s.*", decimals=4, scale=1 / math.tau),
+        words("whirl", (way if speed else "rigid body" for way, speed in whirl)),
+    ]
+    notes = []
+    if operating:
+        path = "operating.critical_speeds.*.separation_percent"
+        distance = show.column("from operating range, %", path, decimals=1)
+        rows = zip(operating["critical_speeds"], distance.cells, strict=True)
+        shown = tuple("INSIDE" if row["inside"] else cell for row, cell in rows)
+        columns.append(Cells(distance.head, shown))
+        notes.append("The distance is in percent of the nearest end of the operating range.")
+    if document.get("mesh_check"):
+        columns.append(show.column("error of the mesh, %", "mesh_check.relative_error.*", 2, scale=100.0))
+    if document.get("critical_speeds_cut"):
+        notes.append(document["critical_speeds_cut"])
+    caption = "Where the frequency of free whirl equals the speed of rotation"
+    return Grid(caption, tuple(columns), " ".join(notes))
 
 
 def _map(document: Mapping[str, Any], show: Numbers, chart: SpeedMap | None, operating: Band) -> list[Part]:
     if chart is None:
         return []
-    limits = tuple(
-        (
-            str(k + 1),
-            show(f"map.free_rad_s.{k}", decimals=1, scale=RPM),
-            show(f"map.pinned_rad_s.{k}", decimals=1, scale=RPM),
-        )
-        for k in range(len(document["map"]["free_rad_s"]))
+    found = document["map"]
+    free, pinned = (
+        show.column(f"{which}, rpm", f"map.{which}_rad_s.*", decimals=1, scale=RPM)
+        for which in ("free", "pinned")
     )
-    met = tuple(
-        (
-            item["support"],
-            item["direction"],
-            str(item["mode"]),
-            show(f"map.intersections.{i}.speed_rad_s", decimals=1, scale=RPM),
-            show(f"map.intersections.{i}.stiffness_N_per_m", 4, scale=1e-6),
-        )
-        for i, item in enumerate(document["map"]["intersections"])
-    )
-    heads = ("support", "direction", "critical speed", "rpm", "stiffness, MN/m")
+    modes = numbered("mode", len(found["free_rad_s"]))
+    met = found["intersections"]
     tables = [
-        Grid("Limits of soft and of stiff supports", ("mode", "free, rpm", "pinned, rpm"), limits),
-        Grid("With the stiffness that the supports have", heads, met, (0, 1)),
+        Grid("Limits of soft and of stiff supports", (modes, free, pinned)),
+        Grid(
+            "With the stiffness that the supports have",
+            (
+                words("support", (item["support"] for item in met)),
+                words("direction", (item["direction"] for item in met)),
+                figures("critical speed", (item["mode"] for item in met)),
+                show.column("rpm", "map.intersections.*.speed_rad_s", decimals=1, scale=RPM),
+                show.column("stiffness, MN/m", "map.intersections.*.stiffness_N_per_m", 4, scale=1e-6),
+            ),
+        ),
     ]
     said = "Undamped, every support of the same stiffness in x and y."
     kept = tuple(table for table in tables if table.rows)
@@ -222,20 +218,15 @@ def _map(document: Mapping[str, Any], show: Numbers, chart: SpeedMap | None, ope
 
 def _shapes(document: Mapping[str, Any], show: Numbers) -> tuple[Grid, ...]:
     """Deflections at the nodes, some modes abreast."""
-    count, tables = len(document["mode_shapes"]), []
-    for first in range(0, count, MODES_ABREAST):
-        some = range(first, min(first + MODES_ABREAST, count))
-        rows = tuple(
-            (
-                str(i + 1),
-                show(f"positions_m.{i}", decimals=4),
-                *(show(f"mode_shapes.{k}.{i}", decimals=4) for k in some),
-            )
-            for i in range(len(document["positions_m"]))
-        )
-        heads = ("node", "position, m", *(f"mode {k + 1}" for k in some))
-        tables.append(Grid("Deflection at the nodes, 1 at node 1 (or the largest 1)", heads, rows))
-    return tuple(tables)
+    count = len(document["mode_shapes"])
+    nodes = numbered("node", len(document["positions_m"]))
+    positions = show.column("position, m", "positions_m.*", decimals=4)
+    modes = [show.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4) for k in range(count)]
+    caption = "Deflection at the nodes, 1 at node 1 (or the largest 1)"
+    return tuple(
+        Grid(caption, (nodes, positions, *modes[first : first + MODES_ABREAST]))
+        for first in range(0, count, MODES_ABREAST)
+    )
 
 
 def _margins(document: Mapping[str, Any]) -> list[str]:
@@ -249,60 +240,56 @@ def _margins(document: Mapping[str, Any]) -> list[str]:
 
 
 def _largest(document: Mapping[str, Any], show: Numbers) -> Grid:
-    rows = tuple(
+    sensors = [item["sensor"] for item in document["largest"]]
+    return Grid(
+        "Largest readings",
         (
-            item["sensor"] if isinstance(item["sensor"], str) else f"node {item['sensor']}",
-            show(f"largest.{k}.amplitude_m", 4, scale=MICRO),
-            show(f"largest.{k}.speed_rad_s", decimals=1, scale=RPM),
-            show(f"largest.{k}.speed_rad_s", 6),
-        )
-        for k, item in enumerate(document["largest"])
+            words("sensor", (name if isinstance(name, str) else f"node {name}" for name in sensors)),
+            show.column("amplitude, µm peak", "largest.*.amplitude_m", 4, scale=MICRO),
+            show.column("rpm", "largest.*.speed_rad_s", decimals=1, scale=RPM),
+            show.column("rad/s", "largest.*.speed_rad_s"),
+        ),
     )
-    return Grid("Largest readings", ("sensor", "amplitude, µm peak", "rpm", "rad/s"), rows, (0,))
 
 
 def _peaks(document: Mapping[str, Any], show: Numbers, operating: Band) -> tuple[Grid, ...]:
     """Peaks with amplification factors, and with margins where there is a range; nothing without peaks."""
-    words = {True: "enough", False: "NOT ENOUGH", None: "–"}
-    rows: list[tuple[str, ...]] = []
+    peaks = document["peaks"]
+    if not peaks:
+        return ()
+    columns = [
+        words("sensor", (peak["sensor"] for peak in peaks)),
+        show.column("rpm", "peaks.*.speed_rpm", decimals=1),
+        show.column("amplitude, µm peak", "peaks.*.amplitude", 4, scale=MICRO),
+        show.column("AF", "peaks.*.amplification_factor", decimals=2),
+    ]
+    if operating is not None:
+        verdicts = {True: "enough", False: "NOT ENOUGH", None: NOTHING}
+        columns += [
+            show.column("margin, %", "peaks.*.separation_margin_percent", decimals=1),
+            show.column("required, %", "peaks.*.required_margin_percent", decimals=1),
+            words("margin is", (verdicts[peak["enough"]] for peak in peaks)),
+        ]
     notes: dict[str, list[str]] = {}
-    for k, peak in enumerate(document["peaks"]):
-        key = f"peaks.{k}"
-        margin = (
-            show(f"{key}.separation_margin_percent", decimals=1),
-            show(f"{key}.required_margin_percent", decimals=1),
-            words[peak["enough"]],
-        )
-        rows.append(
-            (
-                peak["sensor"],
-                show(f"{key}.speed_rpm", decimals=1),
-                show(f"{key}.amplitude", 4, scale=MICRO),
-                show(f"{key}.amplification_factor", decimals=2),
-                *(() if operating is None else margin),
-            )
-        )
+    for peak in peaks:
         if peak["note"]:
             notes.setdefault(peak["note"], []).append(f"{peak['sensor']} {peak['speed_rpm']:.0f} rpm")
-    heads: tuple[str, ...] = ("sensor", "rpm", "amplitude, µm peak", "AF")
-    heads += () if operating is None else ("margin, %", "required, %", "margin is")
     said = [f"No AF, for {text}: {', '.join(where)}." for text, where in notes.items()]
     note = " ".join(["AF: amplification factor after API 684.", *said])
-    return (Grid("Peaks", heads, tuple(rows), (0, 6), note),) if rows else ()
+    return (Grid("Peaks", tuple(columns), note),)
 
 
 def _forces(document: Mapping[str, Any], show: Numbers, rotor: Rotor) -> list[Part]:
-    rows = tuple(
-        (
-            support.name or f"support {k + 1}",
-            place(rotor, support.node),
-            show(f"bearing_forces.largest_N.{k}", 4),
-            show(f"bearing_forces.largest_at_rad_s.{k}", decimals=1, scale=RPM),
-        )
-        for k, support in enumerate(rotor.supports)
+    supports = rotor.supports
+    if not supports:
+        return []
+    columns = (
+        words("support", (each.name or f"support {k}" for k, each in enumerate(supports, start=1))),
+        words("node", (place(rotor, each.node) for each in supports)),
+        show.column("largest force, N", "bearing_forces.largest_N.*", 4),
+        show.column("rpm", "bearing_forces.largest_at_rad_s.*", decimals=1, scale=RPM),
     )
-    heads = ("support", "node", "largest force, N", "rpm")
-    return [Part("Forces on the supports", tables=(Grid("", heads, rows, (0, 1)),))] if rows else []
+    return [Part("Forces on the supports", tables=(Grid("", columns),))]
 
 
 def _readings(document: Mapping[str, Any], show: Numbers) -> tuple[Grid, ...]:
@@ -312,15 +299,12 @@ def _readings(document: Mapping[str, Any], show: Numbers) -> tuple[Grid, ...]:
     note = (
         f"{len(picked)} of the {count} speeds asked for; --output writes all." if len(picked) < count else ""
     )
-    tables = []
-    for first in range(0, len(sensors), ABREAST):
-        some = range(first, min(first + ABREAST, len(sensors)))
-        heads = ["rpm", *(h for k in some for h in (f"{sensors[k]}: µm peak", "phase, °"))]
-        rows = []
-        for i in picked:
-            row = [show(f"speeds_rad_s.{i}", decimals=1, scale=RPM)]
-            for k in some:
-                row += [show(f"amplitude_m.{k}.{i}", 4, scale=MICRO), show(f"phase_deg.{k}.{i}", decimals=1)]
-            rows.append(tuple(row))
-        tables.append(Grid("Amplitude and phase (lead)", tuple(heads), tuple(rows), note=note))
-    return tuple(tables)
+    speeds = show.column("rpm", "speeds_rad_s.*", rows=picked, decimals=1, scale=RPM)
+    readings = []
+    for k, sensor in enumerate(sensors):
+        size = show.column(f"{sensor}: µm peak", f"amplitude_m.{k}.*", 4, rows=picked, scale=MICRO)
+        readings += [size, show.column("phase, °", f"phase_deg.{k}.*", rows=picked, decimals=1)]
+    return tuple(
+        Grid("Amplitude and phase (lead)", (speeds, *readings[first : first + 2 * ABREAST]), note)
+        for first in range(0, len(readings), 2 * ABREAST)
+    )

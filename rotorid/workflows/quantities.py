@@ -20,7 +20,7 @@ from rotorid.tables.reader.key import Quantity
 from rotorid.tables.reader.number import LARGEST_STATED, NotANumber, check_size, parse_number
 from rotorid.tables.reader.quantity import in_job_units
 from rotorid.tables.reader.units import Unit, UnitError, spelt
-from rotorid.tables.runs.conventions import ANGLES, as_angles, polar
+from rotorid.tables.runs.conventions import ANGLES, as_angles
 from rotorid.workflows.parameters import degrees, one_of, one_speed, pairs
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def vectors(given: Vector, angles: str, what: str = "VECTOR") -> tuple[Labels, l
                 "write all as one kind"
             )
         angle = np.radians(degrees(tail.removesuffix("°"), what))
-        found.append(complex(polar(np.array(unit.to_si(value)), np.array(angle), labels.angle_sign)))
+        found.append(complex(labels.weight_from(unit.to_si(value), angle)))
     assert labels is not None  # a split text has at least one part
     return labels, found
 

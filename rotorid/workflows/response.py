@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.text import counted
-from rotorid.base.units import RPM
+from rotorid.base.units import RPM, phase_deg
 from rotorid.workflows.given import file_of, rotor_source
 from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import (
@@ -131,8 +131,6 @@ class RotorResponse(Outcome):
         import numpy as np
         import pandas as pd
 
-        from fem.response import phase_degrees
-
         Z = self.response.readings(self.sensors)
         S, C = Z.shape
         return pd.DataFrame(
@@ -140,7 +138,7 @@ class RotorResponse(Outcome):
                 "speed_rad_s": np.repeat(self.response.speeds, C),
                 "sensor": self.labels * S,
                 "amplitude_m": np.abs(Z).ravel(),
-                "phase_deg": phase_degrees(Z).ravel(),
+                "phase_deg": phase_deg(Z).ravel(),
             }
         )
 

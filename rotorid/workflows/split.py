@@ -316,7 +316,7 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
     from balancing.mounting.holes import equal_holes, from_list
     from rotorid.workflows.quantities import weight, weights
 
-    sign, given = labels.angle_sign, options.holes
+    given = options.holes
     if given is None or isinstance(given, int) or (isinstance(given, str) and "," not in given):
         first = options.first_hole or 0.0
         count = str(given).strip()
@@ -325,9 +325,10 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
                 f"--holes {given!r}: give the number of equally spaced holes, 1 to 1000, or their angles, "
                 "such as 0,30,75"
             )
-        angles = equal_holes(int(count), sign * np.radians(degrees(first, "--first-hole")), sign)
+        counted = equal_holes(int(count), np.radians(degrees(first, "--first-hole")))
     else:
-        angles = sign * np.radians(_listed(given))
+        counted = np.radians(_listed(given))
+    angles = labels.with_rotation(counted)
     if options.pieces is not None and options.step is not None:
         raise ValueError("give either --pieces or a --step of free amounts, not both")
     mounted = np.zeros(len(angles))

@@ -181,7 +181,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     from balancing.data.conventions import Labels
     from balancing.trial_weight import trial_from_force
     from rotorid.tables.reader import units
-    from rotorid.tables.runs.conventions import Conventions, as_angles, as_phase
+    from rotorid.tables.runs.conventions import as_angles, as_phase
     from rotorid.workflows.quantities import mass, size, speed_with_unit
 
     missing = [name for name in ("speed", "radius") if getattr(options, name) is None]
@@ -189,8 +189,13 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         missing.insert(0, "rotor-mass (or --bearing-load)")
     if options.speed is None or options.radius is None or missing:
         raise ValueError(f"without a job, give --{' and --'.join(missing)}")
-    known = Conventions(as_phase(options.phase or "lead"), as_angles(options.angles or "with rotation"))
     shown = units.one_of(units.MASS)(options.unit)
+    labels = Labels(
+        weight_unit=shown.name,
+        weight_scale=shown.scale,
+        phase=as_phase(options.phase or "lead"),
+        angles=as_angles(options.angles or "with rotation"),
+    )
     speed, phase, most = speed_with_unit(options.speed, "--speed"), options.reading_phase, options.max_mass
     return trial_from_force(
         "1",
@@ -199,14 +204,12 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         bearing_load=load,
         fraction=options.fraction / 100,
         limit=inf if most is None else mass(most, "--max-mass", "30g"),
-        phase=None if phase is None else known.phase_sign * radians(degrees(phase, "--reading-phase")),
+        phase=None if phase is None else labels.leading(radians(degrees(phase, "--reading-phase"))),
         lag=_lag(options, speed),
-        sensor_angle=known.angle_sign * radians(degrees(options.sensor_angle, "--sensor-angle")),
-        key_phasor=known.angle_sign * radians(degrees(options.key_phasor, "--key-phasor")),
+        sensor_angle=labels.with_rotation(radians(degrees(options.sensor_angle, "--sensor-angle"))),
+        key_phasor=labels.with_rotation(radians(degrees(options.key_phasor, "--key-phasor"))),
         quantity=cast("Quantity", one_of(options.measures, "--measures", MEASURES)),
-        labels=Labels(
-            weight_unit=shown.name, weight_scale=shown.scale, phase=known.phase, angles=known.angles
-        ),
+        labels=labels,
     )
 
 

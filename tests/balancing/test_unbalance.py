@@ -318,7 +318,7 @@ def test_from_a_run_with_a_weight_mounted(rotor):
 BAD = [
     ({"W": [[1.0, np.nan]]}, ValueError, "must be finite; found NaN"),
     ({"Y": [np.inf]}, ValueError, "must be finite"),
-    ({"Y": [1.0, 2.0]}, ValueError, r"W must be \(N, Q\) and Y \(N,\)"),
+    ({"Y": [1.0, 2.0]}, ValueError, r"the vibration must have shape \(1,\)"),
     ({"W": [[0.0, 0.0]]}, UndeterminedError, "no station has an effect on any reading"),
     ({"method": "best"}, ValueError, "minimum-norm"),
     ({"ridge": 0.1}, ValueError, "an option of the method"),

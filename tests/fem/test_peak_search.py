@@ -19,7 +19,7 @@ def test_peaks_do_not_depend_on_the_steps(step):
     finer, peaks = fem.resolve_peaks(response, sensors, operating=(100.0, 200.0))
     many = fem.unbalance_response(rotor(), {4: 1e-3, 2: 3e-4j}, np.arange(20.0, 900.0, 0.05))
     for sensor, found in zip(sensors, peaks, strict=True):
-        dense = fem.find_peaks(many.speeds, many.at(sensor), operating=(100.0, 200.0)).peaks
+        dense = fem.response_peaks(many, sensor, operating=(100.0, 200.0)).peaks
         assert len(found.peaks) == len(dense) > 0
         for one, other in zip(found.peaks, dense, strict=True):
             assert one.speed == pytest.approx(other.speed, rel=1e-6)

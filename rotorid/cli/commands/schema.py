@@ -6,11 +6,13 @@ from typing import Annotated
 
 import typer
 
+from rotorid.cli.common import JsonOption
 from rotorid.cli.output import json_text
 
 
 def schema(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job.")],
+    json: JsonOption = True,
 ) -> None:
     """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.
 

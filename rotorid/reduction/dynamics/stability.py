@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fem
-from fem.campbell import runs_away
+from fem.following import runs_away
 from fem.matrices.lateral_planes import both_planes
 from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl

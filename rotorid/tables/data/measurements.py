@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from balancing.data.conventions import polar
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -17,7 +18,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
-from rotorid.tables.runs.conventions import FULL_TURN, polar
+from rotorid.tables.runs.conventions import FULL_TURN
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import Experiments
@@ -181,7 +182,7 @@ def _amplitude(table: Table, name: str, *, unclear: bool) -> ComplexArray | None
         table.must_be(size, (first >= 0) | blank, expected)
         allowed = (np.abs(second) <= FULL_TURN) | no_second
         table.must_be(phase, allowed, "a phase from -360 to 360 degrees")
-        return polar(first, np.where(blank, 0.0, second), 1)
+        return polar(first, np.where(blank, 0.0, second))
     value = np.empty(len(table), dtype=complex)
     value.real, value.imag = first, second
     value[blank] = complex(np.nan, np.nan)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.mounting.holes import Holes
@@ -36,7 +37,7 @@ class Overrides:
     run_error_percent: float | None = None
 
     def __post_init__(self) -> None:
-        Conventions(as_phase(self.phase or "lead"))
+        Labels(phase=as_phase(self.phase or "lead"))
         if self.angles is not None:
             check_angles(self.angles)
         sizes = self.amplitude_error_percent or 0.0, self.phase_error_deg or 0.0

@@ -117,7 +117,9 @@ def _make(
         section.complain(wrong, other_kind(wrong, labels.weight_unit))
         return None
     turn = 180.0 if plane["remove"] else 0.0
-    angles = {name: math.radians((labels.angle_sign * angle + turn) % 360.0) for name, angle in holes.items()}
+    angles = {
+        name: math.radians((labels.with_rotation(angle) + turn) % 360.0) for name, angle in holes.items()
+    }
     taken = {name: plane["taken"].get(name, 0.0) / labels.weight_scale for name in holes}
     kept = [name for name, angle in angles.items() if taken[name] > 0 or not inside(angle, arcs)]
     key = "holes" if plane["holes"] is not None else "holes_deg"

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.data.limits import Arc, Limits
+from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.job.job_planes import Planes
-from rotorid.tables.job.keys import FORBIDDEN, Pair
+from rotorid.tables.job.keys import FORBIDDEN
 from rotorid.tables.reader import units
 from rotorid.tables.reader.key import Quantity, Said
 from rotorid.tables.reader.number import parse_number
@@ -53,7 +53,7 @@ def _limits(said: Said, planes: Planes) -> Limits | None:
                 amount[name] = value[0]
         forbidden = plane[FORBIDDEN.name]
         if forbidden:
-            arcs[name] = tuple(arc(pair, labels.angle_sign, remove=plane["remove"]) for pair in forbidden)
+            arcs[name] = tuple(labels.arc_from(*pair, opposite=plane["remove"]) for pair in forbidden)
     residual: dict[str, float | FloatArray] = {}
     for name, sensor in said["sensors"].items():
         if name in trials.sensors and sensor["limit"]:
@@ -99,18 +99,6 @@ def at_speeds(
             seen[near] = word
             out[near] = number
     return out
-
-
-def arc(pair: Pair, sign: int, *, remove: bool = False) -> Arc:
-    """A pair of degrees, from → to in the job's direction, as first angle and width in rad with the rotation.
-
-    Against the rotation an angle a of the job is −a here, and what begins there ends here. Where material is
-    removed the arc says where nothing can be taken away; the weight that would have to be added instead
-    stands opposite, and so does the arc of the correction (`remove`).
-    """
-    first, last = pair
-    start = (first if sign > 0 else -last) + (180.0 if remove else 0.0)
-    return math.radians(start % 360.0), math.radians((last - first) % 360.0)
 
 
 def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from balancing.data.conventions import Labels
 from fem.model.sensors import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -27,7 +28,7 @@ class Model:
     files: tuple[Path, ...] = ()
 
 
-def read_model(said: Said, folder: Path, angle_sign: int, problems: Problems) -> Model:
+def read_model(said: Said, folder: Path, labels: Labels, problems: Problems) -> Model:
     """Read the rotor of a job and find the nodes of its planes and sensors.
 
     Parameters
@@ -36,8 +37,8 @@ def read_model(said: Said, folder: Path, angle_sign: int, problems: Problems) ->
         All keys of the job; without a rotor no plane or sensor may have a node.
     folder
         From which the rotor table or file is named.
-    angle_sign
-        +1 where the job's angles count with the rotation, −1 against it: `angle_deg` of a sensor counts so.
+    labels
+        How the job counts angles: `angle_deg` of a sensor, too.
     problems
         Collects the complaints, those about the rotor's files too.
     """
@@ -58,7 +59,7 @@ def read_model(said: Said, folder: Path, angle_sign: int, problems: Problems) ->
         return Model()
     plane_nodes = {name: node for name, plane in planes.items() if (node := _node(plane, rotor)) is not None}
     places = {
-        name: Sensor(node, angle_sign * (sensor["angle_deg"] or 0.0) + 0.0)
+        name: Sensor(node, labels.with_rotation(sensor["angle_deg"] or 0.0))
         for name, sensor in sensors.items()
         if (node := _node(sensor, rotor)) is not None
     }

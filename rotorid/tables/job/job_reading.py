@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from balancing.data.conventions import Labels
 from rotorid.tables.job.assumed import with_assumed
 from rotorid.tables.job.check_runs import read_check
 from rotorid.tables.job.job_data import Job, Overrides
@@ -48,8 +49,8 @@ def job_of(
     named = {key: folder / said[key] for key in TABLES if isinstance(said[key], str)}
     tables: dict[str, Source] = {**named, **sheets}
     readings = read_readings(said, tables, overrides, problems)
-    sign = 1 if readings is None else readings.conventions.angle_sign
-    model = read_model(said, folder, sign, problems)
+    labels = Labels() if readings is None else readings.conventions.labels
+    model = read_model(said, folder, labels, problems)
     if readings is None:
         read_holes(said, None, (), None)
         problems.stop()
@@ -64,6 +65,7 @@ def job_of(
     first = [tables.get(key) for key in ("runs", "weights", "influence")]
     more = [tables.get(key) for key in ("check", "check_weights", "slow_roll")]
     read = [path, *first, *model.files, *more]
+    phasor = said["key_phasor"]["angle_deg"] if said["key_phasor"] else 0.0
     angles = {name: sensor["angle_deg"] for name, sensor in said["sensors"].items()}
     return with_assumed(
         Job(
@@ -80,12 +82,14 @@ def job_of(
             rotor=model.rotor,
             plane_nodes=model.plane_nodes,
             sensor_places=model.sensor_places,
-            sensor_angles={name: sign * angle + 0.0 for name, angle in angles.items() if angle is not None},
+            sensor_angles={
+                name: labels.with_rotation(angle) for name, angle in angles.items() if angle is not None
+            },
             radii=planes.radii,
             holes=holes,
             remove=planes.remove,
             trial_radii=planes.trial_radii,
             slow_roll=None if readings.slow_roll is None else readings.slow_roll.vectors,
-            key_phasor=sign * said["key_phasor"]["angle_deg"] + 0.0 if said["key_phasor"] else 0.0,
+            key_phasor=labels.with_rotation(phasor),
         )
     )

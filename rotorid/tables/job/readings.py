@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from balancing.coefficients.influence import Influence
-from balancing.data.conventions import Angles, Phase, Rotation, View
+from balancing.data.conventions import Angles, Labels, Phase, Rotation, View
 from balancing.data.trials import Trials
 from rotorid.base.text import listing
 from rotorid.tables.job.job_data import Overrides
@@ -80,15 +80,15 @@ def read_readings(
         name = source_name(tables["influence"])
         found = load_influence(tables["influence"], phase, angles, own)
     words = {} if found is None else found.said
-    conventions = Conventions(
-        phase or as_phase(words.get("phase", "lead")),
-        angles or as_angles(words.get("angles", "with rotation")),
-        said["speed_tolerance_percent"],
-        cast("Rotation | None", said["rotation"]),
-        cast("View | None", said["view"] if said["rotation"] else None),
-        clock,
-        tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None),
+    labels = Labels(
+        phase=phase or as_phase(words.get("phase", "lead")),
+        angles=angles or as_angles(words.get("angles", "with rotation")),
+        rotation=cast("Rotation | None", said["rotation"]),
+        view=cast("View | None", said["view"] if said["rotation"] else None),
+        clock=clock,
     )
+    unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
+    conventions = Conventions(labels, said["speed_tolerance_percent"], unstated)
     trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, own)
     influence = None
     if found is not None and trials is not None:
@@ -145,7 +145,7 @@ def overriding_errors(overrides: Overrides) -> dict[str, float]:
 
 def _notes(conventions: Conventions, found: Stored | None, stored: str) -> tuple[str, ...]:
     """What the user should know about conventions that the coefficients state, or state otherwise."""
-    phase, angles, unstated = conventions.phase, conventions.angles, conventions.unstated
+    phase, angles, unstated = conventions.labels.phase, conventions.labels.angles, conventions.unstated
     adopted = []
     if "phase" in unstated and phase != "lead":
         adopted.append(f"phase = {phase}")

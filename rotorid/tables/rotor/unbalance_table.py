@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from balancing.data.conventions import polar
 from fem.model.rotor import Rotor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs.conventions import FULL_TURN, polar
+from rotorid.tables.runs.conventions import FULL_TURN
 
 COLUMNS = (
     Column("plane", required=False),
@@ -78,6 +79,6 @@ def read_unbalance(path: str | Path, rotor: Rotor) -> dict[int, complex]:
     mass, radius = table.numbers("mass"), table.numbers("radius")
     size = table.numbers("unbalance") if "unbalance" in ways else mass * radius
     total: dict[int, complex] = {}
-    for node, value in zip(nodes, polar(size, angle, 1), strict=True):
+    for node, value in zip(nodes, polar(size, angle), strict=True):
         total[node] = total.get(node, 0j) + complex(value)
     return total

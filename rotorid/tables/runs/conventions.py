@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import isfinite, radians
 from typing import cast
 
 import numpy as np
 
+from balancing.data.conventions import ANGLES as ANGLES
+from balancing.data.conventions import PHASES as PHASES
 from balancing.data.conventions import Angles as Angles
-from balancing.data.conventions import Labels, Rotation, View, check_turning
+from balancing.data.conventions import Labels
 from balancing.data.conventions import Phase as Phase
 from balancing.data.trials import ReadingErrors, RunScatter
-from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 
-PHASES = ("lead", "lag")
-ANGLES = ("with rotation", "against rotation")
 ROTATIONS = ("clockwise", "counter-clockwise")
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
 """What a job may say; clockwise and counter-clockwise need its `rotation`, seen from the same end."""
@@ -34,58 +33,34 @@ class Conventions:
 
     Attributes
     ----------
-    phase
-        Whether a positive phase leads or lags.
-    angles
-        Whether angles on the rotor count with or against the rotation.
+    labels
+        How phases and angles count and how the rotor turns; the units are those of the tables, once read.
     speed_tolerance_percent
         Speeds of different runs that differ by less count as one.
-    rotation, view
-        How the rotor turns, and the end from which that is seen; None where the job does not say.
-    clock
-        Whether the job calls its angles clockwise or counter-clockwise.
     unstated
         Which of "phase" and "angles" neither the job nor the caller states.
 
     Raises
     ------
     ValueError
-        If a value is none of the allowed ones, or needs `rotation` and there is none.
+        For a tolerance that is not allowed.
     """
 
-    phase: Phase = "lead"
-    angles: Angles = "with rotation"
+    labels: Labels = field(default_factory=Labels)
     speed_tolerance_percent: float = DEFAULT_TOLERANCE
-    rotation: Rotation | None = None
-    view: View | None = None
-    clock: bool = False
     unstated: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.phase not in PHASES:
-            raise ValueError(f"phase must be 'lead' or 'lag', not {self.phase!r}")
-        if self.angles not in ANGLES:
-            raise ValueError(f"angles must be 'with rotation' or 'against rotation', not {self.angles!r}")
         if not 0 <= self.speed_tolerance_percent <= LARGEST_TOLERANCE:
             raise ValueError(
                 f"speed_tolerance_percent must be from 0 to {LARGEST_TOLERANCE:g}, "
                 f"not {self.speed_tolerance_percent!r}"
             )
-        check_turning(self.rotation, self.view, clock=self.clock)
 
     def on(self, labels: Labels) -> Labels:
         """Labels that also say how the rotor turns and from which end that is seen."""
-        return replace(labels, rotation=self.rotation, view=self.view, clock=self.clock)
-
-    @property
-    def phase_sign(self) -> int:
-        """+1 for lead, −1 for lag."""
-        return 1 if self.phase == "lead" else -1
-
-    @property
-    def angle_sign(self) -> int:
-        """+1 with the rotation, −1 against it."""
-        return 1 if self.angles == "with rotation" else -1
+        own = self.labels
+        return replace(labels, rotation=own.rotation, view=own.view, clock=own.clock)
 
 
 @dataclass(frozen=True)
@@ -173,13 +148,3 @@ def as_phase(word: str) -> Phase:
 def as_angles(word: str) -> Angles:
     """A checked word."""
     return cast("Angles", word)
-
-
-def polar(size: FloatArray, angle: FloatArray, sign: int) -> ComplexArray:
-    """Complex numbers from sizes and angles (rad); exact at quarter turns, which people write most."""
-    turns = angle / (np.pi / 2)
-    quarter = np.round(turns)
-    exact = np.abs(turns - quarter) < 1e-15 * np.maximum(np.abs(turns), 1.0)
-    unit = np.where(exact, 1j ** np.mod(np.where(exact, quarter, 0.0), 4), np.exp(1j * angle))
-    z = size * unit
-    return np.asarray(z if sign > 0 else np.conj(z), dtype=complex)

@@ -71,7 +71,7 @@ def _correlation(a: str, b: str, plane: object) -> str:
 
 
 def read_covariance(
-    table: Table, places: IndexArray, planes: Sequence[str], sign: int, problems: Problems
+    table: Table, places: IndexArray, planes: Sequence[str], labels: Labels, problems: Problems
 ) -> tuple[FloatArray, ComplexArray] | None:
     """Covariance in SI and phase lead, what is common of it; None without such columns or with problems.
 
@@ -83,8 +83,8 @@ def read_covariance(
         Index of the row of each coefficient, shape (S, C, P).
     planes
         Names, length P, `BASELINE` among them or not.
-    sign
-        −1 where the phases of the table lag.
+    labels
+        How the phases of the table count.
     problems
         Collects the complaints.
 
@@ -115,6 +115,7 @@ def read_covariance(
     _check_correlations(table, places, planes, R, problems)
     if len(problems) > before:
         return None
+    sign = labels.phase_sign
     std = np.stack([table.numbers(f"std_{part}")[places] for part in PARTS], axis=-1).reshape(S, C, 2 * P)
     common = _read_common(table, places, sign) * np.sqrt(np.mean(std.reshape(S, C, P, 2) ** 2, axis=-1))
     std = std * np.tile([1.0, float(sign)], P)

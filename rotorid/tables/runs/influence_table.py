@@ -20,7 +20,7 @@ from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.reader.writing import table_bytes, write_bytes
-from rotorid.tables.runs.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase, polar
+from rotorid.tables.runs.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 from rotorid.tables.runs.influence_comments import (
     PHASE_MEANING,
     check_notes,
@@ -171,12 +171,12 @@ def load_influence(
             table.as_whole("plane", expected)
     if len(problems) > before:
         return None
-    sign = -1 if (said.get("phase") or phase) == "lag" else 1
+    written = Labels(phase=as_phase(said.get("phase") or phase or "lead"))
     places = np.empty((len(speeds), len(sensors), len(planes)), dtype=np.intp)
     for key, i in seen.items():
         places[key] = i
     vibration, weight = _split(table.unit("influence").name)
-    known = read_covariance(table, places, planes, sign, problems)
+    known = read_covariance(table, places, planes, written, problems)
     errors = read_errors(table, vibration, problems)
     if len(problems) > before:
         return None
@@ -188,7 +188,8 @@ def load_influence(
         phase=phase or as_phase(said.get("phase", "lead")),
         angles=angles or as_angles(said.get("angles", "with rotation")),
     )
-    theta, covariance, common = _whole(polar(size, angle, sign)[places], known, planes, weight.scale)
+    values = written.vibration_from(size, angle)
+    theta, covariance, common = _whole(values[places], known, planes, weight.scale)
     influence = Influence(
         speeds=np.array(speeds),
         sensors=sensors,

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 
-from balancing.data.conventions import Labels
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs.conventions import FULL_TURN, Conventions, polar
+from rotorid.tables.runs.conventions import FULL_TURN, Conventions
 from rotorid.tables.runs.speeds import merge_speeds, same_speed, show_speed
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
@@ -70,7 +70,7 @@ def read_runs(
         _complain_about_gaps(table, runs, speeds, sensors, set(cells), conventions, problems)
     if len(problems):  # nobody will look at the readings, and with gaps they may be immensely many
         return runs, None
-    values = polar(amplitude, phase, conventions.phase_sign)
+    values = conventions.labels.vibration_from(amplitude, phase)
     order = _repeat_order(table)
     most = max((len(rows) for rows in cells.values()), default=1)
     written = np.array([table.steps("amplitude"), table.steps("phase")])
@@ -80,13 +80,12 @@ def read_runs(
         for k, row in enumerate(sorted(rows, key=lambda i: order[i])):
             readings[(k, *place)] = values[row]
             steps[(slice(None), k, *place)] = written[:, row]
-    labels = Labels(
+    labels = replace(
+        conventions.labels,
         vibration_unit=table.unit("amplitude").name,
         vibration_scale=table.unit("amplitude").scale,
         weight_unit="g",
         weight_scale=1e3,
-        phase=conventions.phase,
-        angles=conventions.angles,
         speed_unit=table.unit("speed").name,
     )
     nothing = np.zeros((len(runs), 0), dtype=complex)

@@ -28,7 +28,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Source, source_name
 from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.runs.conventions import Conventions, polar
+from rotorid.tables.runs.conventions import Conventions
 from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.tables.runs.trials import make_trials
 
@@ -131,7 +131,7 @@ def _from_vectors(said: Mapping[str, Said], trials: Trials, conventions: Convent
                 vector.section.complain(amplitude.key, _other_unit(own.name))
                 continue
             size, angle = np.array([unit.to_si(amplitude.value)]), np.array([np.radians(phase)])
-            vectors[trials.sensors.index(name)] = polar(size, angle, conventions.phase_sign)[0]
+            vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]
     return _Found(vectors, None, tuple(said))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from balancing.data.conventions import Labels
 from balancing.data.trials import ReadingErrors, Trials, off_axis
 from rotorid.tables.reader.columns import Source
 from rotorid.tables.reader.problems import Problems
@@ -51,8 +52,8 @@ def read_trials(
         If an argument is none of the allowed values.
     """
     problems = Problems()
-    said = ("lead" if phase is None else phase, "with rotation" if angles is None else angles)
-    conventions = Conventions(*said, speed_tolerance_percent)
+    labels = Labels(phase=phase or "lead", angles=angles or "with rotation")
+    conventions = Conventions(labels, speed_tolerance_percent)
     trials = make_trials(runs, weights, conventions, errors, problems)
     problems.stop()
     assert trials is not None

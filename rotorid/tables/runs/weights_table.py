@@ -13,7 +13,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, one_of
-from rotorid.tables.runs.conventions import FULL_TURN, Conventions, polar
+from rotorid.tables.runs.conventions import FULL_TURN, Conventions
 
 COLUMNS = (
     Column("run"),
@@ -68,7 +68,7 @@ def read_weights(
     table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
     run, plane = table.texts("run"), table.texts("plane")
     planes = tuple(dict.fromkeys(name for name in plane if name))
-    values = polar(size, angle, conventions.angle_sign)
+    values = conventions.labels.weight_from(size, angle)
     run_at = {name: r for r, name in enumerate(runs or ())}
     plane_at = {name: p for p, name in enumerate(planes)}
     total = np.zeros((len(runs or ()), len(planes)), dtype=complex)

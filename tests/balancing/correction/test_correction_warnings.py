@@ -9,7 +9,7 @@ from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, polar
 from cases import each_of
 
 from balancing import Influence, ReadingErrors, Trials, UndeterminedError, correct, estimate_influence
-from balancing.coefficients.resolution import resolution
+from balancing.coefficients.identifiability import resolution
 
 ERRORS = ReadingErrors(0.01, 0.01)
 

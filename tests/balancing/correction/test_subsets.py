@@ -6,11 +6,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from helpers.cones import minmax_cone
 
 from balancing import Labels, ReadingErrors, UndeterminedError
 from balancing.correction.subsets import best_subsets
 from balancing.data.errors import reading_covariance
-from balancing.solvers.cone import minmax_cone
 from balancing.solvers.error_propagation import prediction_covariance
 
 NAMES = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
@@ -160,7 +160,7 @@ def test_tables_speak_the_units_of_the_job():
         (2, 4, 3, {}, "3 planes need at least 3 readings"),
         (9, 3, 2, {"criterion": "mean"}, "not by 'mean'"),
         (9, 3, 2, {"show": 0}, "at least one choice"),
-        (9, 3, 2, {"row_weights": [1, 2]}, "one weight per reading"),
+        (9, 3, 2, {"row_weights": [1, 2]}, "row weights must be"),
     ],
 )
 def test_what_is_refused(N, P, k, more, words):

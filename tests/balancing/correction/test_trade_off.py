@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 from balancing_data import complex_normal
+from helpers.cones import minmax_cone, weight_budget_cone
 
 from balancing import Labels, UndeterminedError
 from balancing.correction.trade_off import knee, trade_off
-from balancing.solvers.cone import minmax_cone, weight_budget_cone
 from rotorid.plots import plot
 
 LABELS = Labels(vibration_unit="um_pp", vibration_scale=2e6, weight_unit="g", weight_scale=1e3)
@@ -205,7 +205,7 @@ def test_the_picture_in_given_axes_without_units_or_knee():
         ([[1, 0], [0, 1]], {"criterion": "mean"}, "not of 'mean'"),
         ([[1, np.inf], [0, 1]], {}, "NaN or infinity"),
         ([[1], [0]], {}, "1 different names"),
-        ([[1, 0], [0, 1]], {"row_weights": [1, np.nan]}, "one weight per reading"),
+        ([[1, 0], [0, 1]], {"row_weights": [1, np.nan]}, "row weights must be"),
     ],
 )
 def test_what_is_refused(W, more, words):

@@ -1,15 +1,18 @@
 """Joint discrete problem: the same as trying everything, never worse than rounding, limits, bad input."""
 
+import time
 from itertools import product
 
 import numpy as np
 import pytest
+from helpers.cones import minmax_cone
 
 from balancing.data.limits import Limits
+from balancing.mounting.attainable import nearest
 from balancing.mounting.discrete import solve_discrete
-from balancing.mounting.discrete_sets import PieceSums
 from balancing.mounting.holes import equal_holes, from_list
-from balancing.solvers.cone import InfeasibleError, minmax_cone
+from balancing.mounting.piece_sums import PieceSums
+from balancing.solvers.cone import InfeasibleError
 
 METHODS = ("least-squares", "minmax")
 
@@ -39,7 +42,7 @@ def case(seed):
     planes = []
     for _ in range(P):
         H, K = int(rng.integers(2, 6 if P < 3 else 4)), int(rng.integers(1, 3))
-        angles = equal_holes(H, rng.uniform(0, 6), int(rng.choice([-1, 1])))
+        angles = int(rng.choice([-1, 1])) * equal_holes(H, rng.uniform(0, 6))
         if rng.random() < 0.4:
             angles = rng.uniform(0, 2 * np.pi, H)
         taken = np.zeros(H)
@@ -172,16 +175,17 @@ def test_more_vectors_than_can_be_listed_give_a_gap_that_holds():
     holes = from_list(rng.uniform(0, 2 * np.pi, 11), [0.1, 0.23])
     whole = PieceSums(holes, holes.free, np.inf)
     part = PieceSums(holes, holes.free, np.inf, longest=200)
-    assert whole.complete
-    assert not part.complete
-    assert len(part.A) < len(whole.A)
-    targets = np.array([0.3 + 0.4j, 3.0])
-    for z in targets:
-        all_near = np.abs(whole.near(z, -1.0, 6.0, 10**8)[0] - z).min()
-        some, keys = part.near(z, -1.0, 6.0, 10**8)
-        assert abs(some[0] - z) >= all_near - 1e-12
+    for z in (0.3 + 0.4j, 3.0):
+        for one in (whole, part):
+            one.aim(z)
+        assert whole.complete
+        assert not part.complete
+        (best,), _ = nearest(whole, z)
+        some, keys = nearest(part, z)
+        assert abs(some[0] - z) >= abs(best - z) - 1e-12
+        assert abs(some[0] - z) < abs(best - z) + 0.05
+        assert part.bound(z) <= abs(best - z)
         assert part.mount(keys[0]).vector == pytest.approx(some[0], abs=1e-12)
-        assert part.lowest(z) == pytest.approx(whole.lowest(z))
     lots = from_list(rng.uniform(0, 2 * np.pi, 20), [0.013, 0.02, 0.05], per_hole=2)
     W = rng.standard_normal((4, 1)) + 1j * rng.standard_normal((4, 1))
     Y = rng.standard_normal(4) + 1j * rng.standard_normal(4)
@@ -203,6 +207,21 @@ def test_forbidden_arcs_and_largest_weights():
     every = everything(holes)
     best = np.abs(every[np.abs(every) <= 0.45] - 0.5).min()
     assert abs(vector - 0.5) == pytest.approx(best, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_plane_limited_far_below_what_the_readings_ask_for(method):
+    angles = np.random.default_rng(7).uniform(0, 2 * np.pi, 16)
+    W, Y = np.array([[1.0], [0.5j]]), np.array([-3.0, 1.0j])
+    few = from_list(angles[:9], [0.3, 0.2], max_weight=0.5)
+    found = solve_discrete(W, Y, [few], method=method)
+    assert found.proven
+    best = objectives(method, W, Y, np.ones(2), everything(few)[:, None]).min()
+    assert found.objective == pytest.approx(best, rel=1e-9)
+    many = from_list(angles, [0.1, 0.2], max_weight=0.3)
+    start = time.perf_counter()
+    assert abs(solve_discrete(W, Y, [many], method=method).weights[0]) <= 0.3 * (1 + 1e-9)
+    assert time.perf_counter() - start < 20
 
 
 @pytest.mark.parametrize("method", METHODS)

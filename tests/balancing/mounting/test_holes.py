@@ -7,9 +7,8 @@ from cases import each_of
 from balancing.mounting.holes import Holes, equal_holes, from_list, mounting
 
 
-def test_equal_holes_go_with_or_against_the_rotation():
+def test_equal_holes_stand_within_one_turn():
     assert np.degrees(equal_holes(4, np.radians(10))) == pytest.approx([10, 100, 190, 280])
-    assert np.degrees(equal_holes(4, np.radians(10), -1)) == pytest.approx([10, 280, 190, 100])
     angles = equal_holes(36, -1e-18)
     assert (angles >= 0).all()
     assert (angles < 2 * np.pi).all()
@@ -17,7 +16,7 @@ def test_equal_holes_go_with_or_against_the_rotation():
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [((0,), "number of holes"), ((4, 0.0, 2), "with .* or against"), ((4, np.nan), "finite")],
+    [((0,), "number of holes"), ((4, np.nan), "finite")],
 )
 def test_equal_holes_that_are_none(arguments, message):
     with pytest.raises(ValueError, match=message):

@@ -63,6 +63,16 @@ def test_equal_to_trying_everything(seed):
     assert not found.mounting.amounts[~holes.free].any()
 
 
+@pytest.mark.parametrize("reach", [0.5, 1.0, 5.0])
+def test_a_scarce_stock_out_of_reach_equals_trying_everything(reach):
+    angles = np.sort(np.random.default_rng(3).uniform(0, 2 * np.pi, 7))
+    holes = from_list(angles, [0.003, 0.005], per_hole=1, stock=[2, 1])
+    target = 0.011 * reach * np.exp(0.7j)
+    found = split(target, holes)
+    assert (round(abs(found.error), 11), found.pieces) == exhaustive(target, holes, None)
+    assert found.proven
+
+
 def test_regular_holes_beat_every_random_choice_and_agree_with_one_hole_more():
     rng = np.random.default_rng(1)
     target = 0.035 * np.exp(2j)
@@ -167,7 +177,7 @@ def test_what_is_mounted_counts_for_the_largest_weight():
 
 def test_words_follow_the_angles_of_the_job():
     against = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
-    holes = from_list(equal_holes(12, 0.0, -1), [0.01], per_hole=2)
+    holes = from_list(-equal_holes(12), [0.01], per_hole=2)
     found = split(0.02 * np.exp(-1j * np.radians(120)), holes)
     assert found.lines(against) == ["2 × 10 g in hole 5 (at 120°)"]
     document = found.to_dict(against)

@@ -147,8 +147,8 @@ def test_to_dict_is_json_and_names_the_groups():
         (np.zeros((0, 2)), "AB", None, "not empty"),
         ([[1, 2]], "AA", None, "different names"),
         ([[1, 2]], "A", None, "2 different names"),
-        ([[1, 2], [2, 1]], "AB", [1, -1], "one weight per reading"),
-        ([[1, 2], [2, 1]], "AB", [1], "one weight per reading"),
+        ([[1, 2], [2, 1]], "AB", [1, -1], "row weights must be"),
+        ([[1, 2], [2, 1]], "AB", [1], "row weights must be"),
         ([[1, 2], [2, 1]], "AB", [0, 0], "not all zero"),
     ],
 )

@@ -4,11 +4,12 @@ import minmax_problems
 import numpy as np
 import pytest
 from cases import each_of
+from helpers.cones import least_squares_cone, minmax_cone
 from hypothesis import given
 from hypothesis import strategies as st
 
 from balancing.data.limits import Limits
-from balancing.solvers.cone import InfeasibleError, least_squares_cone, minmax_cone, problem
+from balancing.solvers.cone import InfeasibleError, problem
 from balancing.solvers.sectors import allowed_sectors, solve_sectors, stands_in
 from balancing.solvers.solve import solve
 

@@ -73,9 +73,19 @@ def test_stretching_turns_complex_products_into_real_ones(m, n, random):
     np.testing.assert_array_equal(unstretch(stretch(x)), x)
 
 
+def test_many_matrices_and_vectors_stretch_as_one():
+    rng = np.random.default_rng(5)
+    A = rng.standard_normal((4, 3, 2)) + 1j * rng.standard_normal((4, 3, 2))
+    x = rng.standard_normal((4, 2)) + 1j * rng.standard_normal((4, 2))
+    vectors = np.stack([stretch(v) for v in x])
+    np.testing.assert_allclose(
+        unstretch((stretch(A) @ vectors[..., None])[..., 0]), (A @ x[..., None])[..., 0], rtol=1e-14
+    )
+
+
 def test_stretch_and_unstretch_refuse_other_shapes():
-    with pytest.raises(ValueError, match="vector or a matrix"):
-        stretch(np.zeros((2, 2, 2)))
+    with pytest.raises(ValueError, match="not a number"):
+        stretch(1 + 2j)
     with pytest.raises(ValueError, match="Re, Im pairs"):
         unstretch([1.0, 2.0, 3.0])
 

@@ -60,7 +60,7 @@ def test_the_response_is_marked_at_the_peaks_of_the_largest_reading(drawn):
     response = fem.unbalance_response(rotor, {12: 1e-3}, speeds)
     places = [2, 12]
     assert np.abs(response.at(12)).max() > np.abs(response.at(2)).max()
-    peaks = [fem.find_peaks(response.speeds, response.at(place)) for place in places]
+    peaks = [fem.response_peaks(response, place) for place in places]
     pictures.bode_picture(response, places, peaks, (200.0, 250.0))
     above, below = drawn[0].axes[:2]
     for line, place in zip(above.get_lines(), places, strict=False):

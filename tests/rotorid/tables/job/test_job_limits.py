@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
+from balancing import Labels
 from rotorid.tables import job_from_files, read_job
-from rotorid.tables.job.job_limits import arc
 from rotorid.workflows.quantities import limited
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
@@ -117,21 +117,23 @@ def test_a_workbook_says_the_same(job, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("pair", "sign", "first", "last"),
+    ("pair", "side", "first", "last"),
     [
-        ((20, 60), 1, 20, 60),
-        ((350, 10), 1, 350, 370),
-        ((-10, 10), 1, 350, 370),
-        ((10, -10), 1, 10, 350),
-        ((20, 60), -1, 300, 340),
-        ((350, 10), -1, 350, 370),
-        ((300, 30), -1, 330, 420),
+        ((20, 60), "with", 20, 60),
+        ((350, 10), "with", 350, 370),
+        ((-10, 10), "with", 350, 370),
+        ((10, -10), "with", 10, 350),
+        ((20, 60), "against", 300, 340),
+        ((350, 10), "against", 350, 370),
+        ((300, 30), "against", 330, 420),
     ],
 )
-def test_arcs(pair, sign, first, last):
-    start, width = arc(pair, sign)
+def test_arcs(pair, side, first, last):
+    labels = Labels(angles=f"{side} rotation")
+    start, width = labels.arc_from(*pair)
     assert np.degrees(start) == pytest.approx(first)
     assert np.degrees(width) == pytest.approx(last - first)
+    assert labels.arc(start, width) == pytest.approx([pair[0] % 360, pair[1] % 360])
 
 
 @pytest.mark.parametrize("angles", ["with rotation", "against rotation"])

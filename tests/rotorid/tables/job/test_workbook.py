@@ -10,9 +10,8 @@ import openpyxl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from job_comparison import differences
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
-from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW
+from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
@@ -210,7 +209,7 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
     back = there_and_back(
         job_from_files(files, **said), JobSource(files, overrides=Overrides(**said)), tmp_path / "a.xlsx"
     )
-    assert (back.conventions.phase, back.conventions.angles) == ("lag", "against rotation")
+    assert (back.conventions.labels.phase, back.conventions.labels.angles) == ("lag", "against rotation")
     path = write_job(folder, PARTS["tolerance and errors"])
     job = read_job(path, amplitude_error_percent=4.0)
     back = there_and_back(
@@ -221,7 +220,7 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
     stored = folder / "influence.csv"
     job = job_from_files(files[:1], influence=stored)
     back = there_and_back(job, JobSource(files[:1], stored), tmp_path / "c.xlsx")
-    assert back.conventions.phase == "lag"
+    assert back.conventions.labels.phase == "lag"
     assert openpyxl.load_workbook(tmp_path / "c.xlsx").sheetnames[-1] == "influence"
     assert [
         w.replace(str(tmp_path / "c.xlsx") + " (sheet 'influence')", "X") for w in back.trials.warnings

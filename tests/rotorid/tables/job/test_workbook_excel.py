@@ -10,8 +10,8 @@ import numpy as np
 import openpyxl
 import pytest
 from cases import each_of
-from job_comparison import differences
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
+from workbook_jobs import differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
@@ -113,11 +113,11 @@ def test_the_form_has_headers_explanations_and_choices():
         "with rotation", "against rotation", "clockwise", "counter-clockwise"
     ]  # fmt: skip
     assert {"amplitude_um_pp", "amplitude_mm_s_rms", "amplitude"} <= set(choices("runs")["D1"])
-    assert choices("runs")["B1"] == ["speed_rpm", "speed_Hz", "speed_rad_s"]
+    assert choices("runs")["B1"] == ["speed_rpm", "speed_rad_s", "speed_Hz"]
     assert choices("runs")["D2:D1048576"] == (0.0, float("inf"))
     assert choices("runs")["E2:E1048576"] == (-360.0, 360.0)
     assert "mass_oz" in choices("weights")["C1"]
-    assert choices("planes")["M2:M1048576"] == ["yes", "no"]
+    assert choices("planes")["E2:E1048576"] == ["yes", "no"]
 
 
 def test_every_name_that_the_form_offers_is_known(tmp_path):
@@ -157,12 +157,12 @@ def test_the_form_with_settings(tmp_path):
     )
     book = openpyxl.load_workbook(path)
     keys = [cell.value for cell in book["settings"]["A"]]
-    assert read_job(path).conventions.phase == "lead"
+    assert read_job(path).conventions.labels.phase == "lead"
     for key, value in (("phase", "lag"), ("errors.phase_deg", "1,5")):
         book["settings"].cell(keys.index(key) + 1, 2).value = value
     book.save(path)
     job = read_job(path)
-    assert (job.conventions.phase, job.left_out) == ("lag", ("1",))
+    assert (job.conventions.labels.phase, job.left_out) == ("lag", ("1",))
     assert job.trials.errors.phase == pytest.approx(np.radians(1.5))
     sheet = tmp_path / "sheet.xlsx"
     sheet.write_bytes(job_workbook_bytes(job, JobSource((path,)), sheet))

@@ -7,7 +7,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_csv
 
 from balancing import Labels, correct, estimate_influence
-from rotorid.tables import Conventions, job_from_files, read_influence, read_job, write_influence
+from rotorid.tables import job_from_files, read_influence, read_job, write_influence
 from rotorid.tables.runs.conventions import STATED_ANGLES, check_angles, resolve_angles
 
 TABLES = 'runs = "runs.csv"\nweights = "weights.csv"\n'
@@ -43,7 +43,7 @@ SAID = [
 @pytest.mark.parametrize(("text", "sign"), SAID)
 def test_clockwise_is_with_or_against_the_rotation(job, text, sign):
     read = job(text)
-    assert read.conventions.angle_sign == read.trials.labels.angle_sign == sign
+    assert read.conventions.labels.angle_sign == read.trials.labels.angle_sign == sign
     mounted = read.trials.weights[1, 0]
     assert mounted == pytest.approx(2.5e-3 * np.exp(1j * np.radians(sign * 50)), rel=1e-12)
     mass, angle = read.trials.labels.weight(mounted)
@@ -67,9 +67,9 @@ def test_the_output_says_what_the_input_said(job):
 
 def test_another_word_instead_of_that_of_the_job(job):
     read = job('angles = "clockwise"\n' + CLOCKWISE, angles="against rotation")
-    assert (read.conventions.angle_sign, read.trials.labels.angle_words) == (-1, "against rotation")
+    assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "against rotation")
     read = job(CLOCKWISE, angles="counter-clockwise")
-    assert (read.conventions.angle_sign, read.trials.labels.angle_words) == (-1, "counter-clockwise")
+    assert (read.conventions.labels.angle_sign, read.trials.labels.angle_words) == (-1, "counter-clockwise")
     the_only(
         complaints(job, "", angles="clockwise"),
         "job.toml",
@@ -122,7 +122,7 @@ def test_a_workbook(folder):
     settings += [["view", "free end"], ["key_phasor.angle_deg", 30]]
     sheets = {"runs": RUNS, "weights": WEIGHTS, "settings": settings}
     read = read_job(write_book(folder / "job.xlsx", sheets))
-    assert (read.conventions.angle_sign, read.key_phasor) == (-1, -30.0)
+    assert (read.conventions.labels.angle_sign, read.key_phasor) == (-1, -30.0)
     assert read.trials.labels.turning_in_words() == (
         "angles from the mark clockwise seen from the free end, the rotor turns counter-clockwise"
     )
@@ -150,7 +150,7 @@ def test_files_without_a_job_cannot_say_how_the_rotor_turns(folder):
     files = [folder / "runs.csv", folder / "weights.csv"]
     with pytest.raises(ValueError, match="angles that count clockwise need the direction of rotation"):
         job_from_files(files, angles="clockwise")
-    assert job_from_files(files, angles="against rotation").conventions.angle_sign == -1
+    assert job_from_files(files, angles="against rotation").conventions.labels.angle_sign == -1
 
 
 def test_words():
@@ -161,14 +161,15 @@ def test_words():
     with pytest.raises(ValueError, match="'clockwise' or 'counter-clockwise', not 'left'"):
         check_angles("left")
     for bad, words in (
+        ({"phase": "late"}, "phase must be 'lead' or 'lag', not 'late'"),
+        ({"angles": "clockwise"}, "angles must be 'with rotation' or 'against rotation', not 'clockwise'"),
         ({"rotation": "left"}, "rotation must be 'clockwise' or 'counter-clockwise', not 'left'"),
         ({"rotation": "clockwise", "view": "top"}, "view must be 'drive end' or 'free end', not 'top'"),
         ({"view": "free end"}, "a view from the free end cannot be understood without"),
         ({"clock": True}, "angles that count clockwise or counter-clockwise cannot be understood without"),
     ):
-        for made in (Conventions, Labels):
-            with pytest.raises(ValueError, match=words):
-                made(**bad)
+        with pytest.raises(ValueError, match=words):
+            Labels(**bad)
 
 
 @pytest.mark.parametrize("rotation", ["clockwise", "counter-clockwise"])

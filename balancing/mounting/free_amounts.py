@@ -1,49 +1,45 @@
-"""Vectors that free amounts in steps can make in one plane: a lattice in every pair of neighbouring holes."""
+"""Vectors that free amounts make in one hole of a plane or in two neighbouring ones, of any size or in steps.
+
+In neighbouring holes less than half a turn apart, amounts a e^{iα} + b e^{iβ}, a, b ≥ 0, fill the sector
+between them; with a step they are a lattice in it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from balancing.mounting.discrete_sets import (
+from balancing.mounting.attainable import (
     DIRECTIONS,
-    LONGEST,
+    NOTHING,
     SAME,
-    Attainable,
-    PieceSums,
     disc_lowest,
     distinct,
+    lens,
+    nearest_allowed,
+    places,
 )
 from balancing.mounting.holes import WIDEST, Holes, Mounting, mounting
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
-__all__ = ["StepSums", "attainable"]
+__all__ = ["FreeAmounts"]
+
+_ROUNDING = 1e-12
 
 
-def attainable(
-    holes: Holes, usable: BoolArray, max_weight: float, reach: float, longest: int = LONGEST
-) -> Attainable:
-    """The set of one plane, of pieces or of free amounts.
+class FreeAmounts:
+    """Free amounts in one hole or two neighbouring ones; with a step an `Attainable` set.
 
     Parameters
     ----------
     holes
-        Positions and pieces.
+        Positions.
     usable
         Which holes can be used, shape (H,).
     max_weight
         Largest |mounted + d|.
     reach
-        Free amounts: no vector larger than this is needed.
-    longest
-        Pieces: sums of one half of the holes that are listed at most.
+        No vector larger than this is needed; where no step is given, 1e-4 of it is one.
     """
-    if holes.free_amounts:
-        return StepSums(holes, usable, max_weight, reach)
-    return PieceSums(holes, usable, max_weight, longest)
-
-
-class StepSums:
-    """Free amounts in steps, in one hole or two neighbouring ones."""
 
     def __init__(self, holes: Holes, usable: BoolArray, max_weight: float, reach: float) -> None:
         self.holes, self.max_weight, self.mounted = holes, max_weight, holes.mounted
@@ -55,27 +51,33 @@ class StepSums:
         where = where[np.argsort(np.mod(holes.angles[where], 2 * np.pi))]
         angle = np.mod(holes.angles[where], 2 * np.pi)
         after = np.diff(angle, append=angle[0] + 2 * np.pi)
-        pairs: list[tuple[int, int]] = []
-        for k, gap in enumerate(after):
-            following = int(where[(k + 1) % len(where)])
-            close = len(where) > 1 and gap <= WIDEST
-            pairs.append((int(where[k]), following if close else -1))
-        self.pairs = pairs
+        close = (after <= WIDEST) & (len(where) > 1)
+        self.pairs = np.column_stack((where, np.where(close, np.roll(where, -1), -1)))
         self.directions = np.exp(1j * holes.angles[where])
+
+    @property
+    def surround(self) -> bool:
+        """Whether any vector can be made of any amounts: no two neighbours are too far apart."""
+        return bool((self.pairs >= 0).all())
+
+    def aim(self, z: complex) -> None:
+        """See `Attainable`; nothing needs to be listed."""
 
     def near(self, z: complex, low: float, high: float, most: int) -> tuple[ComplexArray, IntArray] | None:
         """See `Attainable`."""
+        middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
+        inner = low if middle == z else -1.0
         found, keys, total = [], [], 0.0
         for n, (p, q) in enumerate(self.pairs):
             e = np.exp(1j * self.holes.angles[p]) * self.step
             f = np.exp(1j * self.holes.angles[q]) * self.step if q >= 0 else 1j * e
             sine = (np.conj(e) * f).imag / abs(e)
-            middle = (np.conj(z) * f).imag / (np.conj(e) * f).imag
-            a0, a1 = max(0, np.ceil(middle - high / sine)), np.floor(middle + high / sine)
+            at = (np.conj(middle) * f).imag / (np.conj(e) * f).imag
+            a0, a1 = max(0, np.ceil(at - radius / sine)), np.floor(at + radius / sine)
             if a1 - a0 > most:
                 return None
             a = np.arange(a0, a1 + 1)
-            b, count, row = _chords(a * e, f, z, low, high, most if q >= 0 else 0)
+            b, count, row = _chords(a * e, f, complex(middle), inner, float(radius), most if q >= 0 else 0)
             total += count
             if total > most:
                 return None
@@ -83,11 +85,12 @@ class StepSums:
             keys.append(np.column_stack((np.full(len(b), n), a[row], b)).astype(np.int64))
         d, key = np.concatenate(found), np.concatenate(keys)
         distance = np.abs(d - z)
-        good = (distance > low) & (distance <= high)
-        if np.isfinite(self.max_weight):
-            good &= np.abs(d + self.holes.mounted) <= self.max_weight * (1 + 1e-9)
+        good = (
+            (distance > low) & (distance <= high) & (np.abs(d + self.mounted) <= self.max_weight * (1 + 1e-9))
+        )
         d, key, distance = d[good], key[good], distance[good]
-        one = distinct(d, max(1e-7 * self.step, SAME * float(np.abs(d).max(initial=0.0))))
+        quantum = max(1e-7 * self.step, SAME * float(np.abs(d).max(initial=0.0)))
+        one = distinct((key[:, 1:] > 0).sum(axis=1), places(d, quantum))
         one = one[np.argsort(distance[one], kind="stable")]
         return d[one], key[one]
 
@@ -97,39 +100,57 @@ class StepSums:
         cone = 0.0 if along.min() >= 0 else -abs(g) * self.reach
         return max(cone, disc_lowest(g, self.max_weight, self.holes.mounted))
 
-    def _pointed(self) -> bool:
-        return any(q < 0 for _, q in self.pairs)
-
     def normals(self) -> ComplexArray:
         """See `Attainable`."""
-        edges = np.concatenate((1j * self.directions, -1j * self.directions)) if self._pointed() else ()
+        edges = () if self.surround else np.concatenate((1j * self.directions, -1j * self.directions))
         return np.concatenate((DIRECTIONS, edges))
 
     def mount(self, key: IntArray) -> Mounting:
         """See `Attainable`."""
         amounts = np.zeros(len(self.holes.angles))
-        p, q = self.pairs[int(key[0])]
-        amounts[p] += key[1] * self.step
-        if q >= 0:
-            amounts[q] += key[2] * self.step
+        for hole, number in zip(self.pairs[key[0]], key[1:], strict=True):
+            amounts[hole] += number * self.step if hole >= 0 else 0.0
         return mounting(self.holes, amounts=amounts)
 
-    def place(self, d: complex) -> Mounting:
-        """Any amounts whose vector is d, where neighbours are less than 180° apart all around."""
+    def place(self, d: complex) -> Mounting | None:
+        """Any amounts whose vector is d; None: it does not lie between two neighbours."""
         amounts = np.zeros(len(self.holes.angles))
-        for p, q in self.pairs:
-            e, f = np.exp(1j * self.holes.angles[[p, q]])
-            area = (np.conj(e) * f).imag
-            a, b = (np.conj(d) * f).imag / area, (np.conj(e) * d).imag / area
-            if min(a, b) >= -1e-12 * abs(d):
-                amounts[p], amounts[q] = max(a, 0.0), max(b, 0.0)
-                break
-        return mounting(self.holes, amounts=amounts)
+        for p, q in self.pairs[self.pairs[:, 1] >= 0]:
+            alpha, beta = self.holes.angles[[p, q]]
+            across = np.array([-(d * np.exp(-1j * beta)).imag, (d * np.exp(-1j * alpha)).imag])
+            both = across / np.sin(beta - alpha)
+            both[np.abs(both) <= _ROUNDING * abs(d)] = 0.0
+            if (both >= 0).all():
+                amounts[[p, q]] = both
+                return mounting(self.holes, amounts=amounts)
+        return None
 
-    @property
-    def surround(self) -> bool:
-        """Whether any vector can be made of any amounts."""
-        return not self._pointed()
+    def place_nearest(self, z: complex) -> Mounting:
+        """Any amounts whose vector is the nearest to z within the largest weight.
+
+        Between two neighbours it is the nearest vector of the plane's disc, otherwise it stands in one hole:
+        the amounts a there with |m + a e| ≤ R, m what is mounted, are an interval, from a quadratic equation.
+
+        Raises
+        ------
+        ValueError
+            Where nothing is within the largest weight.
+        """
+        whole = self.place(nearest_allowed(z, self.mounted, self.max_weight))
+        if whole is not None:
+            return whole
+        m = self.mounted * np.conj(self.directions)
+        inside = (self.max_weight * (1 + _ROUNDING)) ** 2 - m.imag**2
+        root = np.sqrt(np.maximum(inside, 0.0))
+        low, high = np.maximum(-m.real - root, 0.0), -m.real + root
+        amount = np.clip((z * np.conj(self.directions)).real, low, np.maximum(low, high))
+        error = np.where((inside >= 0) & (high >= low), np.abs(amount * self.directions - z), np.inf)
+        best = int(np.argmin(error))
+        if np.isinf(error[best]):
+            raise ValueError(NOTHING)
+        amounts = np.zeros(len(self.holes.angles))
+        amounts[self.pairs[best, 0]] = amount[best]
+        return mounting(self.holes, amounts=amounts)
 
 
 def _chords(
