@@ -77,7 +77,7 @@ def asked_for(monkeypatch, read, *files):
 @pytest.mark.parametrize(
     ("read", "folder", "pattern", "least"),
     [
-        (rotorid.read_rotor, "compressor", "rotor.toml", 45),
+        (rotorid.read_rotor, "compressor", "rotor.toml", 25),
         (rotorid.read_harmonic_model, "identify", "*/model.toml", 6),
         (rotorid.read_ode_model, "fit", "*/model.toml", 15),
     ],

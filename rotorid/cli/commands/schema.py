@@ -1,4 +1,4 @@
-"""`rotorid schema`: the keys of a job file as a JSON schema, for editors."""
+"""`rotorid schema`: the keys of a job or rotor file as a JSON schema, for editors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rotorid.cli.output import json_text
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job or rotor.")],
     json: JsonOption = True,
 ) -> None:
     """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_
 NODE = Kind(
     lambda section, key: section.take(key), {"type": ["integer", "string"], "minimum": 1}, "a node or station"
 )
-NAME = Kind(lambda section, key: section.name(key), {"type": "string"}, "text", "name")
+NAME = Kind(lambda section, key: section.name(key), {"type": "string"}, "text", cell="name")
 
 
 def _one_or_two(section: Section, key: str) -> Pair | None:
@@ -51,15 +51,17 @@ def _one_or_two(section: Section, key: str) -> Pair | None:
 
 
 _NUMBER = {"type": "number", "minimum": 0}
-PAIR = Kind(_one_or_two, {"anyOf": [_NUMBER, {"type": "array", "items": _NUMBER}]}, "a number, or [x, y]")
-_COEFFICIENTS = tuple(
-    Key(name, number(), about)
-    for quantity, about in (
-        ("stiffness", "force in the first direction against a displacement in the second"),
-        ("damping", "force in the first direction against a velocity in the second"),
-    )
-    for name in (SCALARS[quantity], *(full for pair in ENTRIES[quantity].items() for full in pair))
-)
+_TWO = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
+PAIR = Kind(_one_or_two, {"anyOf": [_NUMBER, _TWO]}, "a number, or [x, y]")
+
+
+def _coefficient_keys(quantity: str, motion: str) -> Iterator[Key]:
+    yield Key(SCALARS[quantity], number(), f"{quantity}, the same in all directions")
+    for short, full in ENTRIES[quantity].items():
+        yield Key(short, number(), f"`{full}` in short")
+        yield Key(full, number(), f"force in {short[1]} against a {motion} in {short[2]}")
+
+
 _PLACE = (
     Key("node", NODE, "the node, a number from 1, or a station"),
     Key("name", NAME, "a name", default=""),
@@ -71,10 +73,12 @@ _STAND = (
     Key(PEDESTAL[1], PAIR, "its stiffness; one number, or two for x and y", default=0.0),
     Key(PEDESTAL[2], PAIR, "its damping; one number, or two for x and y", default=0.0),
 )
-_TABLE = Key("table", TEXT, "a table of these coefficients over speed")
-KEYS_OF = {
-    kind.name: (*_PLACE, *(_STAND if kind is KINDS[0] else ()), *_COEFFICIENTS, _TABLE) for kind in KINDS
-}
+_COEFFICIENTS = (
+    *_coefficient_keys("stiffness", "displacement"),
+    *_coefficient_keys("damping", "velocity"),
+    Key("table", TEXT, "a table of these coefficients over speed"),
+)
+KEYS_OF = {kind.name: (*_PLACE, *(_STAND if kind is KINDS[0] else ()), *_COEFFICIENTS) for kind in KINDS}
 """Of a `[[bearing]]` and the others of `KINDS`."""
 _SETTLED = {key.name for key in (*_PLACE, *_STAND)}
 _STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)
@@ -178,7 +182,10 @@ def _coefficients(
     table = read_table(folder / file, kind, COLUMNS, problems, first=True)
     if table is None:
         return None
-    _check_speeds(table, problems)
+    speed = table.numbers("speed")
+    table.must_be("speed", speed >= 0, "a speed of 0 or more")
+    rising = np.insert(~(np.diff(speed) <= 0), 0, True)
+    table.must_be("speed", rising, "a speed above that of the row before (ascending, each once)")
     present = [column.stem for column in COLUMNS[1:] if column.stem in table]
     if not present:
         expected = f"a column of coefficients, such as {listing(c.names[0] for c in COLUMNS[1:4])}"
@@ -192,12 +199,8 @@ def _coefficients(
         if name in values:
             complain[name](f"nothing: {table.source} has a column {table.fields[name].name}")
         values[name] = table.numbers(name)
-        complain[name] = _in_header(table, name, problems)
-
-    def missing(name: str, expected: str) -> None:
-        table.in_header(name, expected)
-
-    return _Coefficients(values, complain, missing, tuple(table.numbers("speed").tolist()))
+        complain[name] = _in_header(table, name)
+    return _Coefficients(values, complain, table.in_header, tuple(table.numbers("speed").tolist()))
 
 
 def _note(
@@ -222,16 +225,9 @@ def _note(
         complain[name] = lambda expected, key=key: section.complain(key, expected)  # type: ignore[misc]
 
 
-def _in_header(table: Table, name: str, problems: Problems) -> Callable[[str], None]:
-    field = table.fields[name]
-    return lambda expected: problems.add(table.source, table.header_row, field.name, field.name, expected)
-
-
-def _check_speeds(table: Table, problems: Problems) -> None:
-    speed = table.numbers("speed")
-    table.must_be("speed", speed >= 0, "a speed of 0 or more")
-    rising = np.insert(~(np.diff(speed) <= 0), 0, True)
-    table.must_be("speed", rising, "a speed above that of the row before (ascending, each once)")
+def _in_header(table: Table, name: str) -> Callable[[str], None]:
+    column = table.fields[name].name
+    return lambda expected: table.problems.add(table.source, table.header_row, column, column, expected)
 
 
 def _quantity(quantity: str, given: _Coefficients) -> Coefficient | tuple[Coefficient, ...] | None:

@@ -54,7 +54,7 @@ DISC = (
     Key("inner_diameter_m", _SIZE, "bore of a disc by geometry; default: none"),
     Key("density_kg_per_m3", _SIZE, "of a disc by geometry; default: the material's"),
 )
-_INERTIA, _GEOMETRY = ([key.name for key in part] for part in (DISC[2:5], DISC[5:]))
+INERTIA, _GEOMETRY = ([key.name for key in part] for part in (DISC[2:5], DISC[5:]))
 ROTOR = (
     Key(
         "shaft",
@@ -108,15 +108,12 @@ def read_rotor(path: str | Path) -> Rotor:
         return read_rotor_file(path, problems)
     shaft = read_shaft(path, Material(), problems)
     problems.stop()
-    assert shaft is not None
-    return build(str(path), shaft, {}, problems)
+    return build(str(path), problems.need(shaft), {}, problems)
 
 
 def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
-    data = read_toml(path, problems)
-    problems.stop()
-    top = Section(str(path), data or {}, problems)
+    top = Section(str(path), problems.need(read_toml(path, problems)), problems)
     said = take(top, ROTOR)
     shaft = read_shaft(path.parent / said["shaft"], said["material"], problems) if said["shaft"] else None
     n_nodes = len(shaft.length) + 1 if shaft else sys.maxsize
@@ -132,7 +129,7 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
         for section in said[kind.name]
     ]
     problems.stop()
-    assert shaft is not None
+    shaft = problems.need(shaft)
     whole = dataclasses.replace(
         shaft,
         discs=(*shaft.discs, *filter(None, discs)),
@@ -201,9 +198,9 @@ def _disc(section: Section, read_node: Callable[[Section], int | None], material
     """Mass and inertias, or a geometry; its density is the material's unless it says another."""
     said = take(section, DISC)
     node = read_node(section)
-    mass, polar, diametral, width, outer, inner, density = (said[key] for key in (*_INERTIA, *_GEOMETRY))
+    mass, polar, diametral, width, outer, inner, density = (said[key] for key in (*INERTIA, *_GEOMETRY))
     by_geometry = [key for key in _GEOMETRY if key in section]
-    by_inertia = [key for key in _INERTIA if key in section]
+    by_inertia = [key for key in INERTIA if key in section]
     if by_geometry and by_inertia:
         section.complain(
             by_inertia[0], f"either mass and moments of inertia or a geometry, which {by_geometry[0]} gives"
