@@ -4,6 +4,7 @@ import re
 
 from rotorid.samples import sample_data
 from rotorid.tables.job import keys
+from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys
 from rotorid.tables.reader.key import key_lines
 from rotorid.tables.rotor import bearing, rotor_file
 
@@ -15,6 +16,11 @@ TABLES = {
     "key of [slow_roll.SENSOR]": keys.VECTOR,
     "key of [planes.NAME]": keys.PLANE,
     "key of [sensors.NAME]": keys.SENSOR,
+    "key of a model file for harmonic tests": harmonic_file.HARMONIC,
+    "key of a model file with states": ode_file.TIME_STATES,
+    "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),
+    "key of [nuisance]": ode_file.NUISANCE,
+    "key of [errors] of a model file": shared_keys.ERRORS,
     "key of a rotor file": rotor_file.ROTOR,
     "key of [material]": rotor_file.MATERIAL,
     "key of [model]": rotor_file.MODEL,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -106,13 +107,11 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
         table.must_be(stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}")
     warn_of_table(table, elements)
-    return Shaft(
-        length[elements],
-        diameter[elements],
-        inner[elements],
-        *(table.numbers(stem, getattr(material, stem))[elements] for stem in material_of),
-        *_attached(table),
-    )
+    own: dict[str, Any] = {
+        stem: table.numbers(stem, getattr(material, stem))[elements] for stem in material_of
+    }
+    discs, supports = _attached(table)
+    return Shaft(length[elements], diameter[elements], inner[elements], discs=discs, supports=supports, **own)
 
 
 def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:
