@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid import expressions
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.expressions import LARGEST, ExpressionError, is_name
+from rotorid.expressions import LARGEST, ExpressionError
 from rotorid.tables.models.matrix_form import MATRICES, Matrices, has_matrices, matrices_of
 from rotorid.tables.models.shared_keys import (
     BOUNDS,
