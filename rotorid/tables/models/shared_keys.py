@@ -59,7 +59,7 @@ BOUNDS = Key("bounds", by_own_name(_LIMITS), "name = [lowest, highest], `inf` fo
 
 
 def unlike_a_name(name: object, reserved: str) -> str:
-    """What is expected instead of what is no name, or nothing; `reserved` is a letter with another meaning."""
+    """What is expected instead of what is no name, or nothing; `reserved` is a letter with a meaning."""
     if isinstance(name, str) and is_name(name) and name != reserved:
         return ""
     return f"names: a letter, then letters, digits and _; not {reserved} and no function"
