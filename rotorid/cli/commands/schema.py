@@ -6,13 +6,14 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption
-from rotorid.cli.output import json_text
+from rotorid.cli.common import command
+from rotorid.cli.output import Destination, json_text
 
 
+@command(to=("json",))
 def schema(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job or rotor.")],
-    json: JsonOption = True,
+    to: Destination,  # a schema is JSON with or without --json
 ) -> None:
     """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.
 
