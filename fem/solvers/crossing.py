@@ -61,7 +61,7 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class _Root:
-    """A speed, rad/s, the eigenvalue and its vector in the basis, shape (R,)."""
+    """A mode at a speed, rad/s: its eigenvalue and vector in the basis, shape (R,)."""
 
     speed: float
     value: complex
@@ -85,6 +85,11 @@ class _Bracket:
 def off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
     """Whirl frequency less the speed."""
     return np.asarray(np.abs(lam.imag) - speed)
+
+
+def growth_rate(lam: ComplexArray, _: FloatArray | None = None) -> FloatArray:
+    """Re λ / |λ|, at any speed: 0 where a mode neither grows nor decays."""
+    return np.asarray(lam.real / np.abs(lam))
 
 
 def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> Crossings:
