@@ -22,6 +22,7 @@ from rotorid.cli.commands import (
     influence,
     reduce,
     response,
+    schema,
     split,
     tolerance,
     trial_weight,
@@ -53,6 +54,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "reduce": reduce.reduce,
     "identify": identify.identify,
     "fit": fit.fit,
+    "schema": schema.schema,
     "validate": validate.validate,
 }
 for _name, _command in _COMMANDS.items():

@@ -31,7 +31,7 @@ class Command(TyperCommand):
 
 
 def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public type for it
-    """Put the methods behind the help of each option declared as Annotated[…, Option(…), choices].
+    """Put the methods behind the help of each option that chooses one: Annotated[…, Option(…), choices].
 
     `choices` is a function of the workflow: registries by the names of the options, read only for help.
     """
@@ -40,9 +40,9 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
     hints = get_type_hints(command.callback, include_extras=True)
     for parameter in command.params:
         declared: tuple[Any, ...] = getattr(hints.get(parameter.name), "__metadata__", ())
-        for choices in declared[1:]:
-            told = described(choices()[parameter.name])
-            parameter.help = f"{declared[0].help} {told}" if declared[0].help else told
+        choices = declared[1]() if declared[1:] and declared[1] else {}
+        if parameter.name in choices:
+            parameter.help = f"{declared[0].help} {described(choices[parameter.name])}"
 
 
 def nearest_choice(message: str) -> str:

@@ -1,72 +1,126 @@
-"""Options that several commands have, each declared once."""
+"""Parameters of commands: the options of a workflow, told by its dataclass, and where the result goes."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import inspect
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
 
+from rotorid.cli.output import Destination
 
-def options_of(kind: type) -> Callable[..., object]:
-    """Make the options of a command: their help is the documentation of its dataclass, field by field.
-
-    What is given back takes the name of a field, its metavar, names in place of its own, and the least value.
-    """
-    texts: dict[str, str] = {}
-    names: list[str] = []
-    for line in (inspect.getdoc(kind) or "").partition("----------\n")[2].splitlines():
-        if line.startswith(" "):
-            texts |= {name: f"{texts.get(name, '')} {line.strip()}".strip() for name in names}
-        elif line:
-            names = line.split(", ")
-
-    def option(field: str, metavar: str | None = None, *names: str, least: float | None = None) -> object:
-        return typer.Option(*names, metavar=metavar, help=texts[field], min=least)
-
-    return option
-
-
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")
-]
-PlotOption = Annotated[
-    Path | None,
-    typer.Option("--plot", metavar="FILE", help="Picture, .png, .svg or .pdf."),
-]
-OutputOption = Annotated[Path | None, typer.Option("--output", metavar="FILE", help="Table, .csv or .xlsx.")]
-ReportOption = Annotated[
-    Path | None,
-    typer.Option("--report", metavar="FILE", help="Sheet to print or to send, .html, one file."),
-]
+Command = Callable[..., None]
+USUAL = ("json", "plot", "output")
+WITH_REPORT = (*USUAL, "report")
 RotorArgument = Annotated[
     Path,
     typer.Argument(metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml)."),
 ]
-PhaseOption = Annotated[str | None, typer.Option(metavar="lead|lag", help="What a positive phase means.")]
-AnglesOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="DIRECTION",
-        help="How angles count: with rotation, against rotation, or clockwise and counter-clockwise "
-        "where the job states its rotation.",
-    ),
-]
-AmplitudeErrorOption = Annotated[
-    float | None,
-    typer.Option(metavar="PERCENT", min=0.0, help="Standard deviation of a reading's amplitude."),
-]
-PhaseErrorOption = Annotated[
-    float | None,
-    typer.Option(metavar="DEGREES", min=0.0, help="Standard deviation of a reading's phase."),
-]
-RunErrorOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="PERCENT",
-        min=0.0,
-        help="Standard deviation of what changes from run to run, percent of a reading.",
-    ),
-]
+_TYPES: dict[str, Any] = {"bool": bool, "int": int, "float": float, "Path": Path, "Amplitudes": list[str]}
+"""What is typed, by the first alternative of an annotation; else one of a few words, or any text."""
+
+
+def command(
+    options: type | None = None,
+    *,
+    names: Mapping[str, Sequence[str]] | None = None,
+    least: Mapping[str, float] | None = None,
+    to: Sequence[str] = USUAL,
+) -> Callable[[Command], Command]:
+    """Replace the parameters `options` and `to` of a command by one for each field of these dataclasses.
+
+    Their help and their metavar are the documentation of the dataclass, field by field, their names and
+    defaults those of the fields.
+
+    Parameters
+    ----------
+    options
+        The dataclass of the workflow's options; None for a command without.
+    names
+        What is typed instead of `--field`.
+    least
+        The least value of a number.
+    to
+        Which fields of `Destination` the command has.
+    """
+    own = [] if options is None else [*_parameters(options, names or {}, least or {})]
+    where = [one for one in _parameters(Destination, {}, {}) if one.name in to]
+
+    def decorate(function: Command) -> Command:
+        hints = get_type_hints(function, include_extras=True)
+        told: list[inspect.Parameter] = []
+        for name, parameter in inspect.signature(function).parameters.items():
+            expanded = {"options": own, "to": where}.get(name)
+            told += expanded or [parameter.replace(annotation=hints[name])]
+
+        @functools.wraps(function)
+        def wrapper(**given: Any) -> None:  # noqa: ANN401 - what typer has read
+            if options is not None:
+                given["options"] = _taken(options, given)
+            given["to"] = _taken(Destination, given)
+            function(**given)
+
+        only = inspect.Parameter.KEYWORD_ONLY
+        told = [parameter.replace(kind=only) for parameter in told]
+        wrapper.__signature__ = inspect.Signature(told)  # type: ignore[attr-defined]
+        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in told}
+        return wrapper
+
+    return decorate
+
+
+def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
+    """The dataclass made of its fields among what typer has read; lists as tuples."""
+    found = {}
+    for field in dataclasses.fields(kind):
+        value = given.pop(field.name, None)
+        found[field.name] = (
+            field.default if value is None else tuple(value) if isinstance(value, list) else value
+        )
+    return kind(**found)
+
+
+def _parameters(
+    kind: type, names: Mapping[str, Sequence[str]], least: Mapping[str, float]
+) -> Iterator[inspect.Parameter]:
+    """One option for each field of a dataclass."""
+    about = _documentation(kind)
+    choices = getattr(sys.modules[kind.__module__], "choices", None)
+    for field in dataclasses.fields(kind):
+        name, metavar, text = field.name, *about[field.name]
+        found = _type(kind, str(field.type))
+        flag = [f"--{name.replace('_', '-')}"] if found is bool else []  # without its --no-…
+        option = typer.Option(*names.get(name, flag), metavar=metavar, help=text, min=least.get(name))
+        default = None if field.default == () else field.default
+        if field.default is dataclasses.MISSING:
+            default = inspect.Parameter.empty
+        typed = found if default is not None else found | None
+        annotation: Any = Annotated[typed, option, choices]
+        yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _type(kind: type, annotation: str) -> Any:  # noqa: ANN401 - a type, for typer
+    first = annotation.partition(" | ")[0]
+    if first in _TYPES:
+        return _TYPES[first]
+    known = getattr(sys.modules[kind.__module__], first, str)
+    return known if get_origin(known) is Literal else str
+
+
+def _documentation(kind: type) -> dict[str, tuple[str | None, str]]:
+    """Metavar and text of each attribute, from lines `name : METAVAR` and the indented ones below."""
+    found: dict[str, tuple[str | None, str]] = {}
+    name = ""
+    for line in (inspect.getdoc(kind) or "").partition("----------\n")[2].splitlines():
+        if line.startswith(" "):
+            metavar, text = found[name]
+            found[name] = metavar, f"{text} {line.strip()}".strip()
+        elif line:
+            name, _, metavar = line.partition(" : ")
+            found[name] = metavar or None, ""
+    return found

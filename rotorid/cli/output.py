@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import json
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,98 +16,92 @@ import typer
 from rotorid.cli.progress import busy
 
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
     from matplotlib.figure import Figure
 
     from rotorid.workflows.outcome import Outcome
 
-_O = TypeVar("_O", bound="DataclassInstance")
 _R = TypeVar("_R", bound="Outcome")
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
 STATE_SPACES = (".json", ".npz", ".mat")
 
 
-def chosen(kind: type[_O], given: Mapping[str, Any]) -> _O:
-    """The options of a workflow among the parameters of its command, which have the same names.
+@dataclass(frozen=True)
+class Destination:
+    """Where the result of a command goes.
 
-    Parameters
+    Attributes
     ----------
-    kind
-        A dataclass of options.
-    given
-        The parameters: `locals()` at the beginning of the command.
+    json
+        One JSON document on standard output, nothing else.
+    plot : FILE
+        Picture, .png, .svg or .pdf.
+    output : FILE
+        Table, .csv or .xlsx.
+    report : FILE
+        Sheet to print or to send, .html, one file.
     """
-    fields = dataclasses.fields(kind)
-    found = {f.name: f.default if given[f.name] is None else given[f.name] for f in fields}
-    return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in found.items()})
+
+    json: bool = False
+    plot: Path | None = None
+    output: Path | None = None
+    report: Path | None = None
+
+    def deliver(
+        self,
+        what: str,
+        work: Callable[[], _R],
+        *,
+        draw: Callable[[_R], Figure] | None = None,
+        more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = (),
+    ) -> _R:
+        """Do the work of a command, print what it found, and write its files, all of them or none.
+
+        Parameters
+        ----------
+        what
+            What takes so long, for the sign of life.
+        work
+            Gives the result.
+        draw
+            Makes the picture; default: the result's main one.
+        more
+            Further files, how their names may end, and what makes them.
+
+        Raises
+        ------
+        ValueError
+            For a file that could not be written, before any work is done, and for one that was read.
+        """
+        from rotorid.cli.verbose import note
+        from rotorid.tables.reader.problems import printable
+        from rotorid.tables.reader.writing import table_bytes, write_files
+
+        plot, output = self.plot, self.output
+        files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = [
+            (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
+            (output, TABLES, lambda r: table_bytes(output or Path(), r.to_frame())),
+            *more,
+            (self.report, (".html",), lambda r: r.sheet()),
+        ]
+        check_targets([(path, endings) for path, endings, _ in files])
+        with busy(what):
+            found = work()
+        document = found.document
+        note(document)
+        targets = {path: build for path, _, build in files if path is not None}
+        check_inputs(targets, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
+        write_files({path: build(found) for path, build in targets.items()})
+        if self.json:
+            typer.echo(json_text(document))
+        else:
+            written = [f"written: {printable(str(path))}" for path in targets]
+            typer.echo("\n".join([found.summary(), *written]))
+        return found
 
 
-def deliver(
-    what: str,
-    work: Callable[[], _R],
-    *,
-    as_json: bool,
-    plot: Path | None = None,
-    output: Path | None = None,
-    report: Path | None = None,
-    draw: Callable[[_R], Figure] | None = None,
-    more: Sequence[tuple[Path | None, Callable[[_R], bytes]]] = (),
-) -> _R:
-    """Do the work of a command, print what it found, and write its files, all of them or none.
-
-    Parameters
-    ----------
-    what
-        What takes so long, for the sign of life.
-    work
-        Gives the result.
-    as_json
-        Print one JSON document instead of text.
-    plot, output, report
-        Files for the picture, the table and the sheet, checked by `check_targets` before.
-    draw
-        Makes the picture; default: the result's main one.
-    more
-        Further files, and what makes them.
-    """
-    from rotorid.cli.verbose import note
-    from rotorid.tables.reader.problems import printable
-    from rotorid.tables.reader.writing import table_bytes, write_files
-
-    with busy(what):
-        found = work()
-    document = found.document
-    note(document)
-    targets = [path for path in (plot, output, report, *(path for path, _ in more)) if path is not None]
-    check_inputs(targets, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
-    written: dict[Path, bytes] = {}
-    if plot is not None:
-        written[plot] = figure_bytes(found.figure() if draw is None else draw(found), plot)
-    if output is not None:
-        written[output] = table_bytes(output, found.to_frame())
-    written |= {path: build(found) for path, build in more if path is not None}
-    if report is not None:
-        written[report] = found.sheet()
-    write_files(written)
-    if as_json:
-        typer.echo(json_text(document))
-    else:
-        typer.echo("\n".join([found.summary(), *(f"written: {printable(str(path))}" for path in written)]))
-    return found
-
-
-def check_targets(
-    plot: Path | None,
-    output: Path | None,
-    *more: Path | None,
-    model: Path | None = None,
-    state_space: Path | None = None,
-    report: Path | None = None,
-) -> None:
-    """Refuse files that could not be written, before any work is done; `more` are tables, too."""
-    targets = [(plot, PICTURES), (output, TABLES), *((path, TABLES) for path in more)]
-    targets += [(model, (".toml",)), (state_space, STATE_SPACES), (report, (".html",))]
+def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
+    """Refuse files that could not be written, with how their names may end, before any work is done."""
     asked: list[Path] = []
     for path, endings in targets:
         if path is None:

@@ -63,7 +63,7 @@ class ValidateOptions:
     Attributes
     ----------
     every
-        Tell every number, not only the sources.
+        Every number, not only the sources.
     """
 
     every: bool = False

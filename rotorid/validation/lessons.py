@@ -19,17 +19,13 @@ from rotorid.harmonic.natural import natural_modes
 from rotorid.harmonic.rows import build_rows
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_measurements
-from rotorid.validation.row import Row, number, row
+from rotorid.validation.row import Printed, Row, row
 
 SECTION = "[S] section 1.8"
 TASKS = ("5_1", "5_2", "6_1", "6_2", "7_1", "7_2", "8_1", "8_2")
-TWICE = "rounded twice: 0.1946 became 0.195, and that 0.20"
-TABLE_6_1 = "the table prints -0.31, the calculation uses -0.37"
-STIFFNESS = "the frequencies and shapes that the book computes from it are those of 5e3"
-EI = "0.36*0.16/(3*1.03e6) is 0.1864e-7; the book goes on with 0.0187e-6"
-CUT = "one unit of the last digit: 4.5817e7 is cut to 4.581e7, not rounded"
-DIGITS = "20 digits are printed; double precision holds 15"
-NAUGHT = "0 is exact at this frequency, and a half unit of it would be no test"
+BOOK = Printed("lessons.csv")
+Task = tuple[Identification, Mapping[str, Any]]
+"""An exercise, identified, and what its `expected.toml` says."""
 
 
 def rows() -> list[Row]:
@@ -45,7 +41,7 @@ def rows() -> list[Row]:
     ]
 
 
-def _identified(folder: str) -> tuple[Identification, Mapping[str, Any]]:
+def _identified(folder: str) -> Task:
     """The exercise of a folder, identified, and what its `expected.toml` says."""
     path = sample_data() / "identify" / folder
     file = read_harmonic_model(path / "model.toml")
@@ -53,9 +49,7 @@ def _identified(folder: str) -> tuple[Identification, Mapping[str, Any]]:
     return identify(file.model, read_measurements(path / "data.csv", file)), expected
 
 
-def _estimates(
-    source: str, task: tuple[Identification, Mapping[str, Any]], units: Sequence[str]
-) -> list[Row]:
+def _estimates(source: str, task: Task, units: Sequence[str]) -> list[Row]:
     """Printed estimates and combinations of an exercise."""
     result, expected = task
     combinations = {c.words: c.value for c in result.combinations}
@@ -68,7 +62,7 @@ def _estimates(
     return found
 
 
-def _worst(task: tuple[Identification, Mapping[str, Any]], *names: str) -> float:
+def _worst(task: Task, *names: str) -> float:
     """Largest error of the estimates, percent of the parameters of the direct problem."""
     result, expected = task
     return 100 * max(abs(result.value(name) / float(expected["truth"][name]) - 1) for name in names)
@@ -81,168 +75,144 @@ def _predicted(model: HarmonicModel, truth: Mapping[str, float], w: Sequence[flo
     return model.predict(values, np.array(w, dtype=float), inputs)[model.outputs[0]]
 
 
-def _amplitudes(
-    source: str, name: str, w: Sequence[float], found: ComplexArray, printed: Sequence[tuple[str, str]]
-) -> list[Row]:
-    """Real and imaginary parts of an amplitude at some frequencies; "" is left to the caller."""
-    rows = []
-    for omega, value, pair in zip(w, found, printed, strict=True):
-        for part, computed, text in zip(("Re", "Im"), (value.real, value.imag), pair, strict=True):
-            quantity = f"{part} {name} at omega = {omega:g}"
-            if text == "0":
-                rows.append(row(source, quantity, text, float(computed), 1e-12, NAUGHT))
-            elif text:
-                rows.append(row(source, quantity, text, float(computed)))
-    return rows
+def _amplitudes(name: str, w: Sequence[float], found: ComplexArray) -> dict[str, float]:
+    """Real and imaginary parts of an amplitude at some frequencies."""
+    parts: dict[str, float] = {}
+    for omega, value in zip(w, found.tolist(), strict=True):
+        parts |= {
+            f"Re {name} at omega = {omega:g}": value.real,
+            f"Im {name} at omega = {omega:g}": value.imag,
+        }
+    return parts
 
 
 # Section 1.8 and lesson 6: a feedback system, T0 = 1, T1 = 0.5, T2 = 0.8, K = 10, H = 1
 
 
+def _feedback() -> ComplexArray:
+    """The amplitude S at omega = 1 and 2."""
+    return _predicted(_model("task_6_1"), {"T1": 0.5, "T2": 0.8, "F": 1.0}, (1.0, 2.0))
+
+
 def _feedback_1_8() -> list[Row]:
-    model = _model("task_6_1")
-    w = (1.0, 2.0)
-    exact = _predicted(model, {"T1": 0.5, "T2": 0.8, "F": 1.0}, w)
-    texts = (("-0.041", "0.093"), ("-0.368", "0.195"))
-    found = _amplitudes(SECTION, "S", w, exact, texts)
-    rounded = np.array([complex(number(re), number(im)) for re, im in texts])
-    signals = {"S": rounded, "F": np.ones(2, dtype=complex)}
-    tests = Experiments(("1", "2"), np.array(w), signals, np.zeros(2, dtype=bool))
-    matrix, right, _ = build_rows(model, tests).real_rows()
-    printed = (("-0.052", "1.1"), ("-1.1", "-0.052"), ("1.1", "7.0"), ("-3.5", "2.2"))
-    for i, texts_of_row in enumerate(printed):
-        for j, text in enumerate(texts_of_row):
-            found.append(row(SECTION, f"K({i + 1},{j + 1})", text, float(matrix[i, j])))
-    for i, text in enumerate((".41", "-.93", "3.7", "-2.0")):
-        found.append(row(SECTION, f"Y({i + 1})", text, float(right[i])))
+    amplitudes = _amplitudes("S", (1.0, 2.0), _feedback())
+    re_1, im_1, re_2, im_2 = (BOOK.number(SECTION, quantity) for quantity in amplitudes)
+    signals = {"S": np.array([complex(re_1, im_1), complex(re_2, im_2)]), "F": np.ones(2, dtype=complex)}
+    tests = Experiments(("1", "2"), np.array([1.0, 2.0]), signals, np.zeros(2, dtype=bool))
+    matrix, right, _ = build_rows(_model("task_6_1"), tests).real_rows()
+    numbers = {f"K({i + 1},{j + 1})": value for (i, j), value in np.ndenumerate(matrix)}
+    numbers |= {f"Y({i + 1})": value for i, value in enumerate(right)}
     task = _identified("section_1_8")
-    found += _estimates(SECTION, task, ("", ""))
-    found.append(row(SECTION, "largest error, %", "3", _worst(task, "T1", "T2")))
-    return found
-
-
-def _feedback_6(
-    task_1: tuple[Identification, Mapping[str, Any]], task_2: tuple[Identification, Mapping[str, Any]]
-) -> list[Row]:
-    source = "[S] task 6.1"
-    w = (1.0, 2.0)
-    S = _predicted(_model("task_6_1"), {"T1": 0.5, "T2": 0.8, "F": 1.0}, w)
-    found = _amplitudes(source, "S", w, S, (("-0.041", "0.093"), ("", "")))
-    real, imaginary = float(S[1].real), float(S[1].imag)
-    found += [
-        row(source, "Re S at omega = 2, table", "-0.31", real, erratum=TABLE_6_1, corrected="-0.37"),
-        row(source, "Re S at omega = 2, calculation", "-.37", real),
-        row(source, "Im S at omega = 2", "0.20", imaginary, 0.0055, TWICE),
-        *_estimates(source, task_1, (", s", ", s")),
-        row(source, "error of T1, %", "1.2", _worst(task_1, "T1")),
-        row(source, "error of T2, %", "1", _worst(task_1, "T2")),
-    ]
-    source = "[S] task 6.2"
     return [
-        *found,
-        *_estimates(source, task_2, ("", ", s")),
-        row(source, "error of K, %", "1", _worst(task_2, "K")),
-        row(source, "error of T1, %", "1.2", _worst(task_2, "T1")),
+        *BOOK.rows(SECTION, amplitudes | numbers),
+        *_estimates(SECTION, task, ("", "")),
+        *BOOK.rows(SECTION, {"largest error, %": _worst(task, "T1", "T2")}),
+    ]
+
+
+def _feedback_6(task_1: Task, task_2: Task) -> list[Row]:
+    first, second = "[S] task 6.1", "[S] task 6.2"
+    S = _feedback()
+    at_2 = complex(S[1])
+    said = {
+        **_amplitudes("S", (1.0,), S[:1]),
+        "Re S at omega = 2, table": at_2.real,
+        "Re S at omega = 2, calculation": at_2.real,
+        "Im S at omega = 2": at_2.imag,
+    }
+    return [
+        *BOOK.rows(first, said),
+        *_estimates(first, task_1, (", s", ", s")),
+        *BOOK.rows(first, {f"error of {name}, %": _worst(task_1, name) for name in ("T1", "T2")}),
+        *_estimates(second, task_2, ("", ", s")),
+        *BOOK.rows(second, {f"error of {name}, %": _worst(task_2, name) for name in ("K", "T1")}),
     ]
 
 
 # Lesson 5: one mass, and the rotor of a pump
 
 
-def _one_mass(task: tuple[Identification, Mapping[str, Any]]) -> list[Row]:
+def _one_mass(task: Task) -> list[Row]:
     source = "[S] task 5.1"
     w = (10.0, 20.0, 30.0)
     X = _predicted(task[0].model, {**task[1]["truth"], "F": 10.0}, w)
-    texts = (("0", "-0.1"), ("-3.3e-3", "-2.2e-4"), ("-1.2e-3", "-4.7e-5"))
     return [
-        *_amplitudes(source, "X", w, X, texts),
+        *BOOK.rows(source, _amplitudes("X", w, X)),
         *_estimates(source, task, (", N/m", ", kg/s")),
-        row(source, "largest error, %", "0.01", _worst(task, "c", "alpha")),
+        *BOOK.rows(source, {"largest error, %": _worst(task, "c", "alpha")}),
     ]
 
 
-def _pump(task: tuple[Identification, Mapping[str, Any]]) -> list[Row]:
+def _pump(task: Task) -> list[Row]:
     source = "[S] task 5.2"
     w = (80.0, 100.0)
     Z = _predicted(task[0].model, {**task[1]["truth"], "F": 0.0}, w)
-    zero = "99790 is 9.979e4 with a zero for the digit that is not printed"
+    calculation = {"Re Z at omega = 80, calculation": Z[0].real}
+    after = {
+        "c, N/m, in the text": task[0].value("c"),
+        "b, kg/s, in the text": task[0].value("b"),
+        "largest error, %": _worst(task, "c", "b"),
+    }
     return [
-        *_amplitudes(source, "Z", w, Z, (("1.4e-6", "-16e-6"), ("0", "-20e-6"))),
-        row(source, "Re Z at omega = 80, calculation", "1.43e-6", float(Z[0].real)),
+        *BOOK.rows(source, _amplitudes("Z", w, Z) | calculation),
         *_estimates(source, task, (", N/m", ", kg/s")),
-        row(source, "c, N/m, in the text", "99790", task[0].value("c"), erratum=zero, corrected="99791"),
-        row(source, "b, kg/s, in the text", "9977", task[0].value("b")),
-        row(source, "largest error, %", "0.23", _worst(task, "c", "b")),
+        *BOOK.rows(source, after),
     ]
 
 
 # Lesson 7: a chain of three masses
 
 
-def _chain(
-    task_1: tuple[Identification, Mapping[str, Any]], task_2: tuple[Identification, Mapping[str, Any]]
-) -> list[Row]:
-    source = "[S] task 7.1"
+def _chain(task_1: Task, task_2: Task) -> list[Row]:
+    first, second = "[S] task 7.1", "[S] task 7.2"
     result, expected = task_1
     truth = np.array([expected["truth"][name] for name in result.parameters])
-    z = _squares(result.model, truth)
-    found = [
-        row(source, f"omega{i + 1}^2, 1/s^2", text, float(z[i]))
-        for i, text in enumerate(("150.823", "687.236", "2.412e3"))
-    ]
+    direct = {f"omega{i}^2, 1/s^2": z for i, z in enumerate(_squares(result.model, truth), start=1)}
     shapes = _shapes(result.model, truth, (1, 2), (150.0, 690.0, 2400.0))
-    texts = (("1.346", "0.821", "-0.922"), ("1.923", "-2.161", "0.243"))
-    for name, line, values in zip(("A2", "A3"), texts, shapes, strict=True):
-        found += [row(source, f"{name}, mode {k + 1}", line[k], float(values[k])) for k in range(3)]
+    for name, values in zip(("A2", "A3"), shapes, strict=True):
+        direct |= {f"{name}, mode {k}": value for k, value in enumerate(values, start=1)}
+    direct["c3 of the direct problem, N/m"] = result.value("c3")
     stiffness = (", N/m",) * 3
     return [
-        *found,
-        row(
-            source,
-            "c3 of the direct problem, N/m",
-            "5e4",
-            result.value("c3"),
-            erratum=STIFFNESS,
-            corrected="5.0e3",
-        ),
-        *_estimates(source, task_1, stiffness),
-        row(source, "largest error, %", "0.5", _worst(task_1, "c1", "c2", "c3")),
-        *_estimates("[S] task 7.2", task_2, (*stiffness, ", kg", ", kg")),
-        row("[S] task 7.2", "largest error of a mass, %", "1", _worst(task_2, "m2", "m3")),
+        *BOOK.rows(first, direct),
+        *_estimates(first, task_1, stiffness),
+        *BOOK.rows(first, {"largest error, %": _worst(task_1, "c1", "c2", "c3")}),
+        *_estimates(second, task_2, (*stiffness, ", kg", ", kg")),
+        *BOOK.rows(second, {"largest error of a mass, %": _worst(task_2, "m2", "m3")}),
     ]
 
 
 # Lesson 8: a beam with two masses in compliance form
 
 
-def _beam(
-    task_1: tuple[Identification, Mapping[str, Any]], task_2: tuple[Identification, Mapping[str, Any]]
-) -> list[Row]:
-    source = "[S] task 8.1"
+def _beam(task_1: Task, task_2: Task) -> list[Row]:
+    first, second = "[S] task 8.1", "[S] task 8.2"
     result, expected = task_1
     truth = np.array([expected["truth"][name] for name in result.parameters])
     z = _squares(result.model, truth)
     delta = _compliance()
-    found = [
-        row(source, "delta11, m/N", ".143e-7", float(delta[0, 0])),
-        row(source, "delta22, m/N", ".187e-7", float(delta[1, 1]), erratum=EI, corrected=".186e-7"),
-        row(source, "delta12, m/N", ".146e-7", float(delta[0, 1])),
-    ]
-    for i, text in enumerate(("2182641.1576268901752", "45817128.427626566046")):
-        exact = 1e-11 * number(text)
-        found.append(row(source, f"omega{i + 1}^2, 1/s^2", text, float(z[i]), exact, DIGITS))
     (A2,) = _shapes(result.model, truth, (1,), (2.183e6, 4.581e7))
+    direct = {
+        "delta11, m/N": delta[0, 0],
+        "delta22, m/N": delta[1, 1],
+        "delta12, m/N": delta[0, 1],
+        "omega1^2, 1/s^2": z[0],
+        "omega2^2, 1/s^2": z[1],
+        "omega1^2 rounded, 1/s^2": z[0],
+        "omega2^2 rounded, 1/s^2": z[1],
+        "A2, mode 1": A2[0],
+        "A2, mode 2": A2[1],
+    }
+    errors = {
+        "largest error of a mass, %": _worst(task_2, "m1", "m2"),
+        "largest error of a stiffness, %": _worst(task_2, "c1", "c2"),
+    }
     return [
-        *found,
-        row(source, "omega1^2 rounded, 1/s^2", "2.183e6", float(z[0])),
-        row(source, "omega2^2 rounded, 1/s^2", "4.581e7", float(z[1]), 1e4, CUT),
-        row(source, "A2, mode 1", "1.208", float(A2[0])),
-        row(source, "A2, mode 2", "-.414", float(A2[1])),
-        *_estimates(source, task_1, (", N/m", ", N/m")),
-        row(source, "largest error, %", "8", _worst(task_1, "c1", "c2")),
-        *_estimates("[S] task 8.2", task_2, (", kg", ", kg", ", N/m", ", N/m")),
-        row("[S] task 8.2", "largest error of a mass, %", "0.06", _worst(task_2, "m1", "m2")),
-        row("[S] task 8.2", "largest error of a stiffness, %", "12", _worst(task_2, "c1", "c2")),
+        *BOOK.rows(first, direct),
+        *_estimates(first, task_1, (", N/m", ", N/m")),
+        *BOOK.rows(first, {"largest error, %": _worst(task_1, "c1", "c2")}),
+        *_estimates(second, task_2, (", kg", ", kg", ", N/m", ", N/m")),
+        *BOOK.rows(second, errors),
     ]
 
 

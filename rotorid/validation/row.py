@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -209,6 +210,39 @@ def printed_table(name: str) -> list[dict[str, str]]:
     path = resources.files("rotorid.validation") / "data" / name
     lines = path.read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in lines if line.strip() and not line.startswith("#")))
+
+
+class Printed:
+    """A table of printed numbers with the columns of `row`, by source and quantity.
+
+    Raises
+    ------
+    KeyError
+        For a number that the table has not.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.lines = {(line["source"], line["quantity"]): line for line in printed_table(name)}
+
+    def number(self, source: str, quantity: str) -> float:
+        """As it is printed."""
+        return number(self.lines[source, quantity]["printed"])
+
+    def rows(self, source: str, computed: Mapping[str, float]) -> list[Row]:
+        """Computed numbers, by their quantities, beside the printed ones."""
+        return [self._row(self.lines[source, quantity], value) for quantity, value in computed.items()]
+
+    def _row(self, line: Mapping[str, str], computed: float) -> Row:
+        return row(
+            line["source"],
+            line["quantity"],
+            line["printed"],
+            computed,
+            float(line["tolerance"]) if line["tolerance"] else None,
+            line["reason"],
+            line["erratum"],
+            line["corrected"] or None,
+        )
 
 
 def tables() -> list[Path]:

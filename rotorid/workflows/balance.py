@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.given import file_of
+from rotorid.workflows.given import check_choices, file_of
 from rotorid.workflows.other_readings import with_contradiction, with_other_readings
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.outcome import Parts, provenance, workflow
 from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
 from rotorid.workflows.verdict import judge
 
@@ -53,56 +53,65 @@ def choices() -> dict[str, Sequence[Method[Any]]]:
 
 @dataclass(frozen=True)
 class BalanceOptions:
-    """Options of `balance`.
+    """Options of `balance`; conventions and errors stand in place of what the job says.
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the readings count; default: weighted where their errors are known, else least-squares.
-    influence
+    influence : FILE
         Stored influence coefficients.
-    coefficients
+    coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.
-    model_error
+    model_error : PERCENT
         Standard deviation of computed coefficients; combined: 20 if not given.
-    amplitude_error, phase_error, run_error, phase, angles
-        In place of what the job says, errors in percent and degrees.
-    planes
+    amplitude_error : PERCENT
+        Standard deviation of a reading's amplitude.
+    phase_error : DEGREES
+        Standard deviation of a reading's phase.
+    run_error : PERCENT
+        Standard deviation of what changes from run to run, percent of a reading.
+    phase : lead|lag
+        What a positive phase means.
+    angles : DIRECTION
+        How angles count: with rotation, against rotation, or clockwise and counter-clockwise where the job
+        states its rotation.
+    planes : LIST
         Use these planes only.
-    speeds
+    speeds : LIST
         Use these speeds only, in the unit of the runs table, or with another one: 20Hz,25Hz.
-    max_mass
+    max_mass : MASS
         Largest weight of every plane, 5g; or left=5g,right=3g.
-    limit
+    limit : SENSOR=VALUE
         Largest amplitude of a sensor; VALUE alone: of all. May be repeated.
-    ridge
+    ridge : STRENGTH
         Small weights where planes act alike: 0.01 … 0.1, or auto.
-    truncate
+    truncate : NUMBER
         Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
     split
         Choose pieces in the holes of the job, all planes together (a picture of discs).
-    split_seconds
+    split_seconds : SECONDS
         For the proof that no choice is better.
     refine
         Add the job's check runs to its trial runs: coefficients and trim from all of them.
     history
         All runs and check runs of the job in one table, too.
-    best_planes
+    best_planes : K
         Use the best K planes, after comparing all choices.
     trade_off
         Residual against total weight, too (a second picture).
-    grade
+    grade : GRADE
         Judge the planes by ISO 21940-11: G0.4 to G4000.
-    rotor_mass
+    rotor_mass : MASS
         For --grade, such as 500kg.
-    service_speed
+    service_speed : SPEED
         For --grade, such as 3000rpm.
-    positions
+    positions : LIST
         For --grade, along the shaft: left=100mm,right=600mm; default: half in each plane.
-    bearings
+    bearings : A,B
         For --positions, 0mm,700mm.
-    centre
+    centre : POSITION
         For --positions: of the centre of mass.
     """
 
@@ -136,7 +145,7 @@ class BalanceOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Balance(Outcome):
+class Balance(Parts):
     """A correction, and what was asked for beside it.
 
     Attributes
@@ -161,9 +170,11 @@ class Balance(Outcome):
     curve: TradeOff | None
     history: History | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        parts = {
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The correction, and what was asked for beside it."""
+        return {
+            "": self.result,
             "mounting": self.mounted,
             "check": self.check,
             "verdict": self.verdict,
@@ -171,16 +182,13 @@ class Balance(Outcome):
             "trade_off": self.curve,
             "history": self.history,
         }
-        known = {key: part.to_dict() for key, part in parts.items() if part is not None}
-        return {**self.result.to_dict(), **known}
 
     def summary(self) -> str:
         """For the terminal."""
-        parts = (self.result, self.mounted, self.check, self.verdict, self.subsets, self.curve, self.history)
-        blocks = [part.summary() for part in parts if part is not None]
+        text = super().summary()
         if self.result.limits is not None and (self.subsets or self.curve):
-            blocks.append("The comparison of planes and the trade-off do not look at the limits.")
-        return "\n\n".join(blocks)
+            text += "\n\nThe comparison of planes and the trade-off do not look at the limits."
+        return text
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
@@ -282,10 +290,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
 
 def _check(options: BalanceOptions) -> None:
     """Refuse options that are not known or do not go together, before anything is read."""
-    from rotorid.base.registry import find
-
-    if options.method is not None:
-        find(choices()["method"], options.method, "--method")
+    check_choices(options, choices())
     if options.coefficients is not None:
         one_of(options.coefficients, "--coefficients", KINDS)
     if options.ridge is not None and options.truncate is not None:
@@ -300,6 +305,7 @@ def _check(options: BalanceOptions) -> None:
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
     from rotorid.tables import Job
+    from rotorid.tables.job.job_data import Overrides
     from rotorid.tables.job.source import JobSource
 
     stored = None if options.influence is None else Path(options.influence)
@@ -307,7 +313,7 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     said = (options.phase, options.angles, *errors)
     if not isinstance(job, Job):
         files = job if isinstance(job, Sequence) and not isinstance(job, str) else [job]
-        return JobSource(tuple(file_of(file, "a job") for file in files), stored, *said)
+        return JobSource(tuple(file_of(file, "a job") for file in files), stored, Overrides(*said))
     if any(value is not None for value in (stored, *said)):
         raise ValueError("the conventions of a job, its errors and coefficients are stated where it is read")
     return job
@@ -386,7 +392,8 @@ def _again(
 ) -> Correction:
     """The same files under other conventions."""
     with catch_warnings(action="ignore"):  # said when the job was read
-        job = _read(replace(source, phase=phase, angles=angles), options)
+        said = replace(source.overrides, phase=phase, angles=angles)
+        job = _read(replace(source, overrides=said), options)
     return _correct(job, _choose(job, options), planes, options)
 
 
@@ -405,8 +412,8 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
-    from balancing.iso21940 import tolerance
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.quantities import positions
+    from rotorid.workflows.tolerance import permissible
 
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
     along = (options.positions, options.bearings, options.centre)
@@ -422,14 +429,8 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
     at = dict.fromkeys(planes) if options.positions is None else positions(options.positions)
     if set(at) != set(planes):
         raise ValueError(f"--positions must name the planes that are used, {', '.join(planes)}")
-    return tolerance(
-        mass(weight, "--rotor-mass"),
-        speed_with_unit(speed, "--service-speed"),
-        grade,
-        planes=at,
-        bearings=None if options.bearings is None else two_positions(options.bearings),
-        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
-    )
+    said = "--rotor-mass", "--service-speed"
+    return permissible(weight, speed, grade, at, options.bearings, options.centre, names=said)
 
 
 def _trade_off(result: Correction, influence: Influence, job: Job) -> TradeOff:

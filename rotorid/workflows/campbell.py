@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
+from rotorid.workflows.critical import Separation
 from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Band, Speeds, band, rising_speeds
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from fem import Campbell, Rotor
@@ -28,7 +29,7 @@ class CampbellOptions:
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm.
     number
         How many modes, by default 6; forward and backward whirl count apart.
-    operating
+    operating : A:B
         Operating speeds, such as 5300:6500rpm.
     """
 
@@ -38,27 +39,23 @@ class CampbellOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CampbellDiagram(Outcome):
+class CampbellDiagram(Parts):
     """Whirl over speed, and the operating range, rad/s."""
 
     whirl: Campbell
     operating: tuple[float, float] | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        beside = self._separation()
-        return self.whirl.to_dict() | ({} if beside is None else {"operating": beside})
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """Whirl, and the critical speeds that show a peak beside the operating range."""
+        from fem.campbell import HEAVY
+
+        peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
+        return {"": self.whirl, "operating": self.operating and Separation(peaks, self.operating)}
 
     def summary(self) -> str:
         """For the terminal."""
-        from fem.separation import separation_text
-
-        beside = self._separation()
-        return "\n".join([self.whirl.summary(), *([] if beside is None else [separation_text(beside)])])
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per speed and mode."""
-        return self.whirl.to_frame()
+        return "\n".join(part.summary() for part in self.parts.values() if part is not None)
 
     def figure(self) -> Figure:
         """The Campbell diagram over the logarithmic decrements."""
@@ -66,16 +63,6 @@ class CampbellDiagram(Outcome):
 
         unstable = [(window.first, window.last) for window in self.whirl.windows]
         return campbell_figure(self.whirl, self.whirl.criticals, operating=self.operating, unstable=unstable)
-
-    def _separation(self) -> dict[str, Any] | None:
-        """Of the critical speeds that show a peak."""
-        from fem.campbell import HEAVY
-        from fem.separation import separation
-
-        if self.operating is None:
-            return None
-        peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
-        return separation(peaks, self.operating)
 
 
 @workflow

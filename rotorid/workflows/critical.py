@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Band, band
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ class CriticalOptions:
         Estimate by refinement how far off the mesh makes each.
     speed_map
         Critical speeds over the stiffness of the bearings, too; the picture is of them then.
-    operating
+    operating : A:B
         Operating speeds, such as 5300:6500rpm.
     """
 
@@ -40,8 +41,28 @@ class CriticalOptions:
     operating: Band | None = None
 
 
+@dataclass(frozen=True)
+class Separation:
+    """Critical speeds beside the operating range, all in rad/s."""
+
+    speeds: Sequence[float]
+    operating: tuple[float, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Distances as JSON types."""
+        from fem.separation import separation
+
+        return separation(self.speeds, self.operating)
+
+    def summary(self) -> str:
+        """In words."""
+        from fem.separation import separation_text
+
+        return separation_text(self.to_dict())
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CriticalSpeeds(Outcome):
+class CriticalSpeeds(Parts):
     """Modes, and what was asked for beside them."""
 
     modes: Modes
@@ -49,22 +70,11 @@ class CriticalSpeeds(Outcome):
     chart: SpeedMap | None
     operating: tuple[float, float] | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        document: dict[str, Any] = self.modes.to_dict()
-        if self.operating is not None:
-            document["operating"] = self._separation(self.operating)
-        parts = {"mesh_check": self.mesh, "map": self.chart}
-        return document | {key: part.to_dict() for key, part in parts.items() if part is not None}
-
-    def summary(self) -> str:
-        """For the terminal."""
-        from fem.separation import separation_text
-
-        blocks = [self.modes.summary()]
-        if self.operating is not None:
-            blocks.append(separation_text(self._separation(self.operating)))
-        return "\n\n".join([*blocks, *(part.summary() for part in (self.mesh, self.chart) if part)])
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The modes, and what was asked for beside them."""
+        apart = self.operating and Separation(self.modes.frequencies.tolist(), self.operating)
+        return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
 
     def to_frame(self) -> pd.DataFrame:
         """The modes, or the map."""
@@ -97,11 +107,6 @@ class CriticalSpeeds(Outcome):
             chart=self.chart,
             operating=self.operating,
         )
-
-    def _separation(self, operating: tuple[float, float]) -> dict[str, Any]:
-        from fem.separation import separation
-
-        return separation(self.modes.frequencies.tolist(), operating)
 
 
 @workflow

@@ -80,10 +80,7 @@ class Demo(Outcome):
     @property
     def commands(self) -> list[list[str]]:
         """The commands as typed, `rotorid` first."""
-        return [
-            ["rotorid", *(part.replace("{}", str(self.folder), 1) for part in step.arguments)]
-            for step in self.sample.steps
-        ]
+        return [step.command(self.folder) for step in self.sample.steps]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -15,13 +18,17 @@ class Step:
         Under which its result stands in the JSON document.
     title
         What it does, in a few words.
-    arguments
+    line
         As typed after `rotorid`; `{}` is the folder of the demo.
     """
 
     key: str
     title: str
-    arguments: tuple[str, ...]
+    line: str
+
+    def command(self, folder: Path | str) -> list[str]:
+        """Its words for a folder, `rotorid` first."""
+        return ["rotorid", *(word.replace("{}", str(folder), 1) for word in shlex.split(self.line))]
 
 
 @dataclass(frozen=True)
@@ -37,54 +44,50 @@ class Sample:
         explaining files, and licenses.
     steps
         What is run, in order.
-    pictures
-        What the commands write, file names within the folder of the demo.
     """
 
     about: str
     sources: tuple[str, ...]
     steps: tuple[Step, ...]
-    pictures: tuple[str, ...]
 
+    @property
+    def pictures(self) -> list[str]:
+        """What the commands draw, file names within the folder of the demo."""
+        words = [word for step in self.steps for word in step.command("")]
+        return [file.strip("/") for option, file in pairwise(words) if option == "--plot"]
 
-SPEEDS = "1000:15000:250rpm"
-TURBO, COMPRESSOR, ROTOR = "{}/turbo_job", "{}/compressor", "{}/rotor23.csv"
-TASK_5_1, TASK_4_1 = "{}/identify/task_5_1", "{}/identify/task_4_1"
-RUN_DOWN = "{}/fit/run_down"
 
 SAMPLES = {
     "main": Sample(
         "critical speeds, correction weights and three masses of one rotor",
         ("rotor23.csv", "turbo_job"),
         (
-            Step("critical", "Critical speeds", ("critical", ROTOR, "--plot", "{}/modes.png")),
-            Step("balance", "Balancing", ("balance", f"{TURBO}/job.toml", "--plot", "{}/balance.png")),
+            Step("critical", "Critical speeds", "critical {}/rotor23.csv --plot {}/modes.png"),
+            Step("balance", "Balancing", "balance {}/turbo_job/job.toml --plot {}/balance.png"),
             Step(
                 "reduce",
                 "Reduction",
-                ("reduce", ROTOR, "--nodes", "7,12,18", "--modes", "2", "--plot", "{}/reduction.png"),
+                "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --plot {}/reduction.png",
             ),
         ),
-        ("modes.png", "reduction.png", "balance.png"),
     ),
     "balancing": Sample(
         "trial runs to weights, the smallest largest amplitude, a check run and the trim after it",
         ("turbo_job",),
         (
-            Step("balance", "Weights", ("balance", f"{TURBO}/job.toml", "--plot", "{}/balance.png")),
+            Step("balance", "Weights", "balance {}/turbo_job/job.toml --plot {}/balance.png"),
             Step(
                 "minmax",
                 "The smallest largest amplitude, with at most 430 g·mm in each plane",
-                ("balance", f"{TURBO}/job.toml", "--method", "minmax", "--max-mass", "430g_mm"),
+                "balance {}/turbo_job/job.toml --method minmax --max-mass 430g_mm",
             ),
-            Step("check", "The check run beside its prediction", ("balance", f"{TURBO}/checked.toml")),
+            Step("check", "The check run beside its prediction", "balance {}/turbo_job/checked.toml"),
             Step(
                 "trim",
                 "Trim: coefficients refined by the check run",
-                ("balance", f"{TURBO}/checked.toml", "--refine", "--plot", "{}/trim.png"),
+                "balance {}/turbo_job/checked.toml --refine --plot {}/trim.png",
             ),
         ),
-        ("balance.png", "trim.png"),
     ),
     "holes": Sample(
         "weights as pieces in the holes of three discs, and one weight split by hand",
@@ -93,21 +96,15 @@ SAMPLES = {
             Step(
                 "balance",
                 "Pieces in holes, all planes together",
-                ("balance", f"{TURBO}/holes.toml", "--split", "--plot", "{}/discs.png"),
+                "balance {}/turbo_job/holes.toml --split --plot {}/discs.png",
             ),
-            Step(
-                "split",
-                "One weight on one disc",
-                ("split", "35g@120", "--holes", "24", "--pieces", "10g,20g"),
-            ),
+            Step("split", "One weight on one disc", "split 35g@120 --holes 24 --pieces 10g,20g"),
         ),
-        ("discs.png",),
     ),
     "rig": Sample(
         "a real rig: eleven runs with known weights, each read three times",
         ("rk4",),
-        (Step("balance", "Weights", ("balance", "{}/rk4/job.toml", "--plot", "{}/balance.png")),),
-        ("balance.png",),
+        (Step("balance", "Weights", "balance {}/rk4/job.toml --plot {}/balance.png"),),
     ),
     "rotor": Sample(
         "a compressor: critical speeds, Campbell diagram, response with margins",
@@ -116,50 +113,36 @@ SAMPLES = {
             Step(
                 "critical",
                 "Critical speeds beside the operating range",
-                (
-                    *("critical", f"{COMPRESSOR}/rotor.toml", "-n", "4"),
-                    *("--operating", "5300:6500rpm", "--plot", "{}/modes.png"),
-                ),
+                "critical {}/compressor/rotor.toml -n 4 --operating 5300:6500rpm --plot {}/modes.png",
             ),
             Step(
                 "campbell",
                 "Campbell diagram",
-                (
-                    *("campbell", f"{COMPRESSOR}/rotor.toml", "--speeds", SPEEDS),
-                    *("--plot", "{}/campbell.png"),
-                ),
+                "campbell {}/compressor/rotor.toml --speeds 1000:15000:250rpm --plot {}/campbell.png",
             ),
             Step(
                 "response",
                 "Response to unbalance",
-                (
-                    *("response", f"{COMPRESSOR}/rotor.toml", "--unbalance", f"{COMPRESSOR}/unbalance.csv"),
-                    *("--speeds", SPEEDS, "--sensors", "probe DE:45,probe NDE:45"),
-                    *("--operating", "5300:6500rpm", "--plot", "{}/bode.png"),
-                ),
+                "response {}/compressor/rotor.toml --unbalance {}/compressor/unbalance.csv "
+                "--speeds 1000:15000:250rpm --sensors 'probe DE:45,probe NDE:45' --operating "
+                "5300:6500rpm --plot {}/bode.png",
             ),
         ),
-        ("modes.png", "campbell.png", "bode.png"),
     ),
     "reduction": Sample(
         "a rotor as three masses: which nodes, beside other methods, and as a model file",
         ("rotor23.csv",),
         (
             Step(
-                "rank",
-                "All places of three masses, ranked",
-                ("reduce", ROTOR, "--rank", "--plot", "{}/map.png"),
+                "rank", "All places of three masses, ranked", "reduce {}/rotor23.csv --rank --plot {}/map.png"
             ),
             Step(
                 "reduce",
                 "The book's places, beside Guyan, IRS and SEREP",
-                (
-                    *("reduce", ROTOR, "--nodes", "7,12,18", "--modes", "2", "--methods"),
-                    *("--model", "{}/three_masses.toml", "--plot", "{}/reduction.png"),
-                ),
+                "reduce {}/rotor23.csv --nodes 7,12,18 --modes 2 --methods --model "
+                "{}/three_masses.toml --plot {}/reduction.png",
             ),
         ),
-        ("map.png", "reduction.png"),
     ),
     "identification": Sample(
         "coefficients from harmonic tests, and data that cannot tell all of them",
@@ -168,18 +151,16 @@ SAMPLES = {
             Step(
                 "determined",
                 "Stiffness and damping of one mass",
-                ("identify", f"{TASK_5_1}/model.toml", f"{TASK_5_1}/data.csv", "--plot", "{}/identify.png"),
+                "identify {}/identify/task_5_1/model.toml {}/identify/task_5_1/data.csv --plot "
+                "{}/identify.png",
             ),
             Step(
                 "undetermined",
                 "Three unknowns, of which the data tell two",
-                (
-                    *("identify", f"{TASK_4_1}/model.toml", f"{TASK_4_1}/data.csv"),
-                    *("--method", "output-error", "--amplitude-error", "2", "--phase-error", "1"),
-                ),
+                "identify {}/identify/task_4_1/model.toml {}/identify/task_4_1/data.csv --method "
+                "output-error --amplitude-error 2 --phase-error 1",
             ),
         ),
-        ("identify.png",),
     ),
     "record": Sample(
         "dampers and a mass of a rotor from its decay after a blow",
@@ -188,12 +169,8 @@ SAMPLES = {
             Step(
                 "fit",
                 "Parameters of a model from a record",
-                (
-                    *("fit", f"{RUN_DOWN}/model.toml", f"{RUN_DOWN}/record.csv"),
-                    *("--plot", "{}/run_down.png"),
-                ),
+                "fit {}/fit/run_down/model.toml {}/fit/run_down/record.csv --plot {}/run_down.png",
             ),
         ),
-        ("run_down.png",),
     ),
 }

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
-from rotorid.workflows.given import file_of
-from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.given import check_choices, file_of, refuse
+from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
 from rotorid.workflows.parameters import number, pairs
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
 
     from rotorid.base.registry import Method
@@ -35,32 +34,32 @@ class FitOptions:
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the parameters are searched.
-    integrator
+    integrator : NAME
         How the equations are solved.
-    loss
+    loss : LOSS
         What a residual counts.
-    start
+    start : LIST
         Starting values instead of the model's: k=2,d=0.1; the others stay.
-    starts
+    starts : N
         Begin from several places, to find other minima.
-    seed
+    seed : N
         Other places to start from; default: 0.
-    max_iterations
+    max_iterations : N
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
-    max_seconds
+    max_seconds : S
         Limit of the search; what it has found by then has no intervals.
-    trajectory
+    trajectory : model|data
         Where quasilinearization (default: model) and multiple shooting (default: data) begin: the model's own
         solution, or the measured outputs.
-    pieces
+    pieces : N
         Of each record in multiple shooting; default: 12, or fewer for a short one.
-    rtol
+    rtol : X
         Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
-    sigma
+    sigma : LIST
         Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
         from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
     """
@@ -90,22 +89,15 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RecordFit(Outcome):
+class RecordFit(Parts):
     """What the fit found."""
 
     fit: Fit
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return self.fit.to_dict()
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.fit.summary()
-
-    def to_frame(self) -> pd.DataFrame:
-        """One row per parameter."""
-        return self.fit.to_frame()
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The fit."""
+        return {"": self.fit}
 
     def figure(self) -> Figure:
         """Record and model, residuals, sensitivities, iterations."""
@@ -177,18 +169,15 @@ def fit(
 
 def _check(options: FitOptions) -> None:
     """Refuse names that are not known, and options that the method or the integrator would not look at."""
-    from rotorid.base.registry import names
-
-    for option, known in choices().items():
-        one_of(getattr(options, option), f"--{option}", names(known))
+    check_choices(options, choices())
     if options.trajectory is not None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):
             raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
-    if options.pieces is not None and options.method != "multiple-shooting":
-        raise ValueError("--pieces belongs to --method multiple-shooting")
-    if options.seed is not None and options.starts == 1:
-        raise ValueError("--seed belongs to --starts N: it chooses the other places to begin from")
+    if options.method != "multiple-shooting":
+        refuse(options, ("pieces",), "belongs to --method multiple-shooting")
+    if options.starts == 1:
+        refuse(options, ("seed",), "belongs to --starts N: it chooses the other places to begin from")
     if options.rtol is None:
         return
     if not 1e-13 <= options.rtol <= 0.01:

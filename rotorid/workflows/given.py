@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import cmath
 import dataclasses
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rotorid.base.registry import Method, find
 from rotorid.workflows.parameters import option_name
 
 if TYPE_CHECKING:
@@ -72,6 +73,26 @@ def changed(options: DataclassInstance) -> dict[str, object]:
     """Options that differ from their defaults."""
     given = {field: getattr(options, field.name) for field in dataclasses.fields(options)}
     return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
+
+
+def refuse(options: DataclassInstance, needless: Collection[str], why: str) -> None:
+    """Refuse the first of these options that is given: with the others it means nothing.
+
+    Raises
+    ------
+    ValueError
+        Its name and `why`.
+    """
+    for name in changed(options):
+        if name in needless:
+            raise ValueError(f"{option_name(name)} {why}")
+
+
+def check_choices(options: DataclassInstance, choices: Mapping[str, Sequence[Method[Any]]]) -> None:
+    """Refuse names that no registry has, with the nearest one; None is the default."""
+    for option, known in choices.items():
+        if (name := getattr(options, option)) is not None:
+            find(known, name, option_name(option))
 
 
 def plain(value: object) -> object:

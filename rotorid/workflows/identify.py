@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.suggestions import one_of
-from rotorid.workflows.given import file_of
-from rotorid.workflows.outcome import Outcome, log, phase, provenance, workflow
+from rotorid.workflows.given import check_choices, file_of, refuse
+from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
 from rotorid.workflows.parameters import Speeds, speeds
 
 if TYPE_CHECKING:
@@ -31,17 +31,17 @@ class IdentifyOptions:
 
     Attributes
     ----------
-    method
+    method : METHOD
         How the coefficients are found.
-    loss
+    loss : LOSS
         Of output error.
-    amplitude_error
+    amplitude_error : PERCENT
         One standard deviation of an amplitude, in percent; before that of the model.
-    phase_error
+    phase_error : DEGREES
         One standard deviation of a phase, in degrees; before that of the model.
-    design
+    design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
-    choose
+    choose : N
         How many of them; default: as many as the parameters, at least 2.
     """
 
@@ -62,24 +62,20 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Coefficients(Outcome):
+class Coefficients(Parts):
     """What data told, and which frequencies to measure next; one of them may be missing."""
 
     identification: Identification | None
     design: Design | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        document = {} if self.identification is None else self.identification.to_dict()
-        return document if self.design is None else {**document, "design": self.design.to_dict()}
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return "\n\n".join(part.summary() for part in self._parts)
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """Both of them."""
+        return {"": self.identification, "design": self.design}
 
     def to_frame(self) -> pd.DataFrame:
         """The frequencies, or else one row per parameter."""
-        return self._parts[-1].to_frame()
+        return super().to_frame() if self.design is None else self.design.to_frame()
 
     def figure(self) -> Figure:
         """Amplitudes, phases or shapes, residuals and correlations."""
@@ -88,10 +84,6 @@ class Coefficients(Outcome):
         if self.identification is None:
             raise ValueError(_NO_DATA)
         return figure_identification(self.identification)
-
-    @property
-    def _parts(self) -> list[Identification | Design]:
-        return [part for part in (self.identification, self.design) if part is not None]
 
 
 @workflow
@@ -151,16 +143,13 @@ def identify(
 
 def _check(options: IdentifyOptions, *, measured: bool) -> None:
     """Refuse names that are not known, no data, and options that do not go together."""
-    from rotorid.base.registry import names
-
-    for option, known in choices().items():
-        one_of(getattr(options, option), f"--{option}", names(known))
+    check_choices(options, choices())
     if not measured and options.design is None:
         raise ValueError(_NO_DATA)
-    if options.loss != "linear" and options.method != "output-error":
-        raise ValueError("--loss belongs to --method output-error: linear regression has none")
-    if options.choose is not None and options.design is None:
-        raise ValueError("--choose belongs to --design FIRST:LAST:STEP")
+    if options.method != "output-error":
+        refuse(options, ("loss",), "belongs to --method output-error: linear regression has none")
+    if options.design is None:
+        refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
 
 
 def _errors(

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
 from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
+from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
 from rotorid.workflows.parameters import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
     from matplotlib.figure import Figure
@@ -27,11 +27,11 @@ class InfluenceOptions:
     Attributes
     ----------
     planes
-        Correction planes: "7,12,18", or nodes and stations.
+        Correction planes: nodes or stations, such as 7,12,18.
     sensors
-        "2:45,22:45", or nodes and stations with angles from x in degrees.
+        Sensors: nodes or stations, each with its angle from x in degrees: 2:45,22:45 (without: 0).
     speeds
-        "1000:6000:50rpm", or rad/s.
+        FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:6000:50rpm.
     """
 
     planes: Nodes
@@ -40,19 +40,16 @@ class InfluenceOptions:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RotorInfluence(Outcome):
+class RotorInfluence(Parts):
     """Influence coefficients, and the rotor that they are of."""
 
     coefficients: InfluenceCoefficients
     rotor: Rotor
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return self.coefficients.to_dict()
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.coefficients.summary()
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The coefficients."""
+        return {"": self.coefficients}
 
     def to_frame(self) -> pd.DataFrame:
         """The file of stored coefficients that `balance` reads."""

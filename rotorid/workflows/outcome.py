@@ -68,23 +68,39 @@ class Outcome(ABC):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Found(Outcome):
+class Parts(Outcome):
+    """Results of the library beside each other."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> Mapping[str, Any]:
+        """Results by their keys in the document, where "" is its top; None: not asked for."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
+        return {**known.pop("", {}), **known}
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return "\n\n".join(part.summary() for part in self.parts.values() if part is not None)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table of the first."""
+        frame: pd.DataFrame = next(iter(self.parts.values())).to_frame()
+        return frame
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Parts):
     """One result of the library as it is; subclasses say which."""
 
     found: Any
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        return dict(self.found.to_dict())
-
-    def summary(self) -> str:
-        """For the terminal."""
-        return str(self.found.summary())
-
-    def to_frame(self) -> pd.DataFrame:
-        """Its table."""
-        frame: pd.DataFrame = self.found.to_frame()
-        return frame
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """That one."""
+        return {"": self.found}
 
     def figure(self) -> Figure:
         """Its picture."""

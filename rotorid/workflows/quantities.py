@@ -15,9 +15,10 @@ from balancing.data.conventions import Labels
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.job.job_limits import with_limits
-from rotorid.tables.job.quantity import Quantity, to_job_weight
 from rotorid.tables.reader import units
+from rotorid.tables.reader.key import Quantity
 from rotorid.tables.reader.number import LARGEST_STATED, NotANumber, check_size, parse_number
+from rotorid.tables.reader.quantity import in_job_units
 from rotorid.tables.reader.units import Unit, UnitError, spelt
 from rotorid.tables.runs.conventions import ANGLES, as_angles
 from rotorid.workflows.parameters import degrees, one_of, one_speed, pairs
@@ -123,12 +124,12 @@ def weight(
     own = labels.weight_unit
     value, unit = _weight(given, what, example) if isinstance(given, str) else (given, _si(own))
     _above_zero(value, given, what, example)
-    found = to_job_weight(Quantity(what, value, unit), own, radius)
+    found = in_job_units(Quantity(what, value, unit), own, radius)
     if found is None:
         raise ValueError(
             f"{what}: the weight to be split is in {own}, to which {unit.name} converts only with --radius"
         )
-    return found
+    return found[0]
 
 
 def weights(

@@ -54,14 +54,14 @@ class ReduceOptions:
 
     Attributes
     ----------
-    nodes
+    nodes : LIST
         Where the masses stand: nodes or stations, 7,12,18.
     place
         Instead of nodes, of all places: best by frequency, best by MAC, a compromise, or the book's rule
         (extrema of the first two modes).
-    masses
+    masses : N
         How many masses are placed or ranked; default: 3.
-    modes
+    modes : N
         How many modes the regression uses; default: 2.
     normalise
         Shapes scaled to 1 at the first mass (the book), at their largest, or in length.
@@ -72,36 +72,36 @@ class ReduceOptions:
         No mass below 0.
     supports_apart
         Compliance of the shaft and its two bearings apart, (47).
-    measured
+    measured : FILE
         Table of measured modes (mode, frequency_rad_s, node, shape), used instead of computed ones.
-    compliance
+    compliance : FILE
         Without a rotor, with measured modes: table node, force_node, compliance_m_per_N.
-    seals
+    seals : LIST
         With a table of compliance: springs to the ground that it does not hold, N/m, 12=2e6.
-    errors
+    errors : LIST
         Standard deviations of the inputs in percent: compliance=1.3,shapes=1,frequencies=0.1.
-    what_if
+    what_if : LIST
         What changes of inputs do, in percent: alpha12=1.3,U31=-0.3.
-    speed
+    speed : SPEED
         Of tables of bearings and seals, and of the small model, such as 3000rpm; default: the lowest of the
         tables.
     rank
         Rank all places of the masses.
-    candidates
+    candidates : LIST
         Nodes that places are chosen from.
     trade_off
         Other masses at these nodes: frequencies against shapes.
     methods
         Beside other reductions.
-    response
+    response : A:B:STEP
         Unbalance response beside the full rotor's: A:B:STEP, rad/s or with a unit; or auto.
-    stability
+    stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
-    damping
+    damping : LIST
         Modal damping of the small model, percent of critical of the first modes: 1,0.5.
     both_planes
         Planes x and y in the model file, also where nothing couples them.
-    force
+    force : LIST
         Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
     """
 

@@ -6,12 +6,12 @@ import dataclasses
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.text import counted
-from rotorid.workflows.outcome import Outcome
+from rotorid.workflows.outcome import Parts
 from rotorid.workflows.parameters import one_of
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ NAMED = ("states", "inputs", "outputs")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ReducedRotor(Outcome):
+class ReducedRotor(Parts):
     """A reduction, what was asked for beside it, and the small model where it was needed.
 
     Attributes
@@ -62,9 +62,11 @@ class ReducedRotor(Outcome):
     both_planes: bool = False
     forces: Sequence[int | str] = ()
 
-    def to_dict(self) -> dict[str, Any]:
-        """As JSON types, without the provenance."""
-        parts = {
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The masses, and what was asked for beside them."""
+        return {
+            "": self.result,
             "what_if": self.shift,
             "placement": self.placement,
             "trade_off": self.trade_off,
@@ -73,23 +75,6 @@ class ReducedRotor(Outcome):
             "stability": self.stability,
             "small_model": self.small,
         }
-        return self.result.to_dict() | {
-            key: part.to_dict() for key, part in parts.items() if part is not None
-        }
-
-    def summary(self) -> str:
-        """For the terminal."""
-        parts = (
-            self.result,
-            self.shift,
-            self.placement,
-            self.trade_off,
-            self.methods,
-            self.response,
-            self.stability,
-            self.small,
-        )
-        return "\n\n".join(part.summary() for part in parts if part is not None)
 
     def to_frame(self) -> pd.DataFrame:
         """The ranking where it was asked for, else masses and modes."""

@@ -44,12 +44,12 @@ class ResponseOptions:
     ----------
     speeds
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:20rpm.
-    sensors
+    sensors : LIST
         Nodes or stations with angles from x in degrees, 2:45,22:45; default: all stations, or else all
         supports, in x.
-    operating
+    operating : A:B
         Operating speeds, such as 5300:6500rpm.
-    at
+    at : SPEED
         Speed of the orbits that are drawn, 5800rpm; default: at the largest reading.
     """
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import changed
+from rotorid.workflows.given import changed, refuse
 from rotorid.workflows.outcome import Outcome, provenance, workflow
 from rotorid.workflows.parameters import degrees, option_name, pairs
 
@@ -45,49 +45,49 @@ class SplitOptions:
 
     Attributes
     ----------
-    holes
+    holes : N|DEG,DEG,…
         Number of equally spaced holes, or their angles, ascending.
-    first_hole
+    first_hole : DEG
         Angle of hole 1 of equally spaced ones; default: 0.
-    pieces
+    pieces : 10g,20g
         Available pieces; without them amounts are free.
-    stock
+    stock : 8,4
         How many there are of each of the pieces.
-    per_hole
+    per_hole : N
         Pieces in one hole, at most; default: 1.
-    most_pieces
+    most_pieces : N
         Pieces altogether, at most.
-    good_enough
+    good_enough : PERCENT
         Fewest pieces whose error is not larger.
-    taken
+    taken : HOLE:WEIGHT,…
         Holes in which something is mounted already, such as 3:10g,7:20g.
-    max_mass
+    max_mass : WEIGHT
         Largest weight of the plane, as a vector sum.
-    step
+    step : 0.5g
         Smallest step of free amounts in holes, or of the scale for one weight.
-    angle_step
+    angle_step : DEG
         Step of the angle for one weight.
-    mounted
+    mounted : VECTOR
         What is mounted already and counts towards VECTOR, such as 10g@30+20g@200 (trim).
-    two
+    two : 20g,30g
         Angles of two fixed weights instead of holes.
-    drill
+    drill : DIAMETER
         Drill material away opposite to VECTOR instead, such as 8mm.
     grind
         Grind it off opposite to VECTOR instead.
-    radius
+    radius : LENGTH
         Where the masses stand; from where radial holes are drilled, or where axial ones are.
     axial
         Drill along the rotor's axis or towards it.
-    depth
+    depth : LENGTH
         Largest depth of the full diameter, such as 20mm.
-    density
+    density : KG/M3
         Of the material drilled; default: 7850.
-    tip_angle
+    tip_angle : DEG
         Of the drill; 180 for a flat one; default: 118.
-    spacing
+    spacing : DEG
         Between holes in a row, where one would be too deep; default: 1.5 diameters.
-    angles
+    angles : WAY
         "with rotation" or "against rotation", of all angles.
     """
 
@@ -216,10 +216,10 @@ def _way(options: SplitOptions, *, single: bool) -> str:
         )
     way = ways[0] if ways else ""
     for name, belongs in _BELONGS.items():
-        if name in given and way not in belongs:
+        if way not in belongs:
             needed = " or ".join(option_name(one) for one in belongs if one)
             how = f"only with {needed}" if needed else f"not with {option_name(way)}"
-            raise ValueError(f"{option_name(name)} means something {how}")
+            refuse(options, (name,), f"means something {how}")
     return way
 
 

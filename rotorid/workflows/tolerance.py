@@ -20,17 +20,17 @@ class ToleranceOptions:
 
     Attributes
     ----------
-    mass
+    mass : MASS
         Of the rotor, such as 500kg.
-    speed
+    speed : SPEED
         Highest service speed, such as 3000rpm.
-    grade
+    grade : GRADE
         Balance quality grade, G0.4 to G4000.
-    planes
+    planes : LIST
         One or two correction planes, with positions along the shaft or without: left=100mm,right=600mm.
-    bearings
+    bearings : A,B
         Positions of both bearings, 0mm,700mm; default: the planes are the tolerance planes.
-    centre
+    centre : POSITION
         Of the centre of mass, such as 350mm.
     """
 
@@ -64,15 +64,36 @@ def tolerance(options: ToleranceOptions) -> PermissibleUnbalance:
     ValueError
         For an option that cannot be.
     """
-    from balancing.iso21940 import tolerance as permissible
+    shaft = options.planes, options.bearings, options.centre
+    found = permissible(options.mass, options.speed, options.grade, *shaft)
+    return PermissibleUnbalance(found=found, provenance=provenance((), options))
+
+
+def permissible(
+    rotor_mass: Amount,
+    speed: Amount,
+    grade: str | float,
+    planes: Positions | None,
+    bearings: str | tuple[float, float] | None,
+    centre: Amount | None,
+    *,
+    names: tuple[str, str] = ("--mass", "--speed"),
+) -> Tolerance:
+    """The tolerance of a rotor from quantities as people write them; `names` of the first two for complaints.
+
+    Raises
+    ------
+    ValueError
+        For a quantity or a grade that cannot be.
+    """
+    from balancing.iso21940 import tolerance as of_numbers
     from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
 
-    found = permissible(
-        mass(options.mass, "--mass"),
-        speed_with_unit(options.speed, "--speed"),
-        options.grade,
-        planes=None if options.planes is None else positions(options.planes),
-        bearings=None if options.bearings is None else two_positions(options.bearings),
-        centre=None if options.centre is None else length(options.centre, "--centre", "350mm"),
+    return of_numbers(
+        mass(rotor_mass, names[0]),
+        speed_with_unit(speed, names[1]),
+        grade,
+        planes=None if planes is None else positions(planes),
+        bearings=None if bearings is None else two_positions(bearings),
+        centre=None if centre is None else length(centre, "--centre", "350mm"),
     )
-    return PermissibleUnbalance(found=found, provenance=provenance((), options))

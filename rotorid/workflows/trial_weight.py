@@ -8,9 +8,9 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rotorid.workflows.given import changed, job_source
+from rotorid.workflows.given import job_source, refuse
 from rotorid.workflows.outcome import Outcome, log, provenance, workflow
-from rotorid.workflows.parameters import Names, degrees, names, number, one_of, option_name
+from rotorid.workflows.parameters import Names, degrees, names, number, one_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,43 +33,46 @@ class TrialWeightOptions:
 
     Attributes
     ----------
-    rotor_mass
+    rotor_mass : MASS
         Of the rotor, such as 500kg.
-    bearing_load
+    bearing_load : FORCE
         Carried at the plane, such as 2500N.
-    carried_by
+    carried_by : N
         Planes that share the mass of the rotor.
-    speed
+    speed : SPEED
         Such as 3000rpm.
-    radius
+    radius : RADIUS
         Where the weight goes, 200mm.
-    fraction
+    fraction : PERCENT
         Force of the weight, of the load (without a job).
-    share
+    share : PERCENT
         Change, of the largest reading (with a job).
-    plane
+    plane : LIST
         Planes of the job; default: all of them.
-    mass
+    mass : MASS
         Try this weight, with a job: what would it do?
-    max_mass
+    max_mass : MASS
         Largest weight of the plane, 30g.
-    reading_phase
+    reading_phase : DEGREES
         Of the largest initial reading, no job.
-    lag
+    lag : below|at|above|DEGREES
         Speed against the critical one, or the lag.
-    critical
+    critical : SPEED
         Critical speed, in place of --lag: 2400rpm.
-    damping
+    damping : RATIO
         Damping ratio at the critical speed.
-    sensor_angle
+    sensor_angle : DEGREES
         Where the sensor is (without a job).
-    key_phasor
+    key_phasor : DEGREES
         Where the key phasor is (without a job).
-    measures
+    measures : QUANTITY
         displacement, velocity, acceleration (without a job).
-    phase, angles
-        What a positive phase means, and how angles count.
-    unit
+    phase : lead|lag
+        What a positive phase means.
+    angles : DIRECTION
+        How angles count: with rotation, against rotation, or clockwise and counter-clockwise where the job
+        states its rotation.
+    unit : UNIT
         Of the result without a job: g, oz, kg, mg or lb.
     """
 
@@ -156,11 +159,11 @@ def trial_weight(
     )
     files: Sequence[Path] = ()
     if job is None:
-        _refuse(options, _WITH_JOB, "needs a job with coefficients")
+        refuse(options, _WITH_JOB, "needs a job with coefficients")
         found = [_from_force(options, carried)]
     else:
         why = "is for a trial weight without a job, which has phases, speeds and coefficients"
-        _refuse(options, _WITHOUT_JOB, why)
+        refuse(options, _WITHOUT_JOB, why)
         read = job_source(job, options.phase, options.angles)
         found, files = _from_job(read, options, carried), read.files
     first = found[0]
@@ -168,12 +171,6 @@ def trial_weight(
         if value is not None:
             log.info("%s = %.6g", name, value)
     return TrialWeights(weights=tuple(found), provenance=provenance(files, options))
-
-
-def _refuse(options: TrialWeightOptions, needless: Sequence[str], why: str) -> None:
-    for name in changed(options):
-        if name in needless:
-            raise ValueError(f"{option_name(name)} {why}")
 
 
 def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:

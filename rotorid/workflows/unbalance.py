@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import job_source
+from rotorid.workflows.given import check_choices, job_source, refuse
 from rotorid.workflows.outcome import Found, provenance, workflow
 from rotorid.workflows.parameters import Nodes, nodes
 
@@ -32,13 +32,13 @@ class UnbalanceOptions:
     ----------
     stations
         Nodes or stations where unbalance may be: 6,9,12.
-    method
+    method : METHOD
         How the unbalance follows from the readings.
-    modes
+    modes : K
         Of the rotor, for modal: 1 … K.
-    ridge
+    ridge : STRENGTH
         For ridge; default: from the errors.
-    model_error
+    model_error : PERCENT
         Standard deviation of the coefficients.
     """
 
@@ -74,14 +74,14 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     """
     from balancing.coefficients.from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
-    from rotorid.base.registry import find
     from rotorid.workflows.coefficients import computed
 
-    method = find(choices()["method"], options.method, "--method").name
+    check_choices(options, choices())
+    method = options.method
     if (options.modes is not None) != (method == "modal"):
         raise ValueError("--method modal and --modes K belong together")
-    if options.ridge is not None and method != "ridge":
-        raise ValueError("--ridge is an option of --method ridge")
+    if method != "ridge":
+        refuse(options, ("ridge",), "is an option of --method ridge")
     read = job_source(job)
     if read.rotor is None:
         raise ValueError('this needs a rotor model: rotor = "rotor.toml" in the job file')

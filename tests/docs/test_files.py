@@ -4,6 +4,7 @@ import re
 
 import pytest
 from cases import each_of
+from keys_in_files import with_tables
 
 import rotorid
 from rotorid.expressions import FUNCTIONS
@@ -36,19 +37,6 @@ NAMED_BY_USERS = {
     "start",
     "force",
 }
-JOB = """
-runs = "runs.csv"
-weights = "weights.csv"
-[errors]
-phase_deg = 2
-[key_phasor]
-angle_deg = 0
-[slow_roll."probe 1"]
-amplitude = 0
-phase_deg = 0
-[planes.left]
-[sensors."probe 1"]
-"""
 TABLES = {
     "rotor": rotor.COLUMNS,
     "bearing": bearing.COLUMNS,
@@ -89,7 +77,6 @@ def asked_for(monkeypatch, read, *files):
 @pytest.mark.parametrize(
     ("read", "folder", "pattern", "least"),
     [
-        (rotorid.read_job, "", "*_job/*.toml", 40),
         (rotorid.read_rotor, "compressor", "rotor.toml", 45),
         (rotorid.read_harmonic_model, "identify", "*/model.toml", 6),
         (rotorid.read_ode_model, "fit", "*/model.toml", 15),
@@ -103,28 +90,18 @@ def test_every_key_that_a_reader_asks_for_is_described(read, folder, pattern, le
     assert keys - WORDS == set()
 
 
-@pytest.mark.filterwarnings("ignore::rotorid.tables.TableWarning")
-def test_the_rarer_keys_of_a_job_are_described(tmp_path, monkeypatch):
-    for name in ("runs.csv", "weights.csv"):
-        (tmp_path / name).write_bytes((sample_data() / "turbo_job" / name).read_bytes())
-    (tmp_path / "job.toml").write_text(JOB, encoding="utf-8")
-    keys = asked_for(monkeypatch, rotorid.read_job, tmp_path / "job.toml")
-    assert {"amplitude", "angle_deg", "floor", "forbidden_deg", "limit"} <= keys
-    assert keys - WORDS == set()
-
-
 def test_a_key_that_is_not_described_would_be_found(monkeypatch):
     keys = asked_for(monkeypatch, rotorid.read_rotor, sample_data() / "compressor" / "rotor.toml")
     assert (keys | {"mas_kg"}) - WORDS == {"mas_kg"}
 
 
-def test_every_sheet_and_every_column_of_a_workbook_is_described():
-    assert {*jobbook.TABLES, *jobbook.SETTINGS} <= WORDS
-    for sheet in ("planes", "sensors"):
-        columns = jobkeys.COLUMNS[sheet]
-        assert set(columns.usual) <= WORDS
-        for name in columns.more:  # in any unit: the beginning counts
-            assert any(name == word or name.startswith(word.rstrip("gm_") + "_") for word in WORDS), name
+def test_every_sheet_of_a_workbook_is_described():
+    assert {*jobkeys.TABLES, *jobbook.SETTINGS} <= WORDS
+
+
+def test_the_tables_of_keys_of_a_job_are_those_of_the_code():
+    """`python tests/helpers/keys_in_files.py` writes them."""
+    assert with_tables(TEXT) == TEXT
 
 
 def test_every_function_of_expressions_is_named():

@@ -156,6 +156,8 @@ left-in-one-plane           balance sample_data/left_in/job.toml --best-planes 1
 rk4                         balance sample_data/rk4/job.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 template                    balance --template job.xlsx
+schema-job                  schema job
+schema-misspelt             schema jop
 balance-misspelt-column     balance misspelt.csv {TURBO}/weights.csv
 balance-missing-run         balance {TURBO}/runs.csv short.csv
 balance-misspelt-key        balance sample_data/turbo_job/misspelt.toml
@@ -280,7 +282,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "schema", "validate"),
 )
 
 MODELLED = {

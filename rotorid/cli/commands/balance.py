@@ -3,30 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import (
-    AmplitudeErrorOption,
-    AnglesOption,
-    JsonOption,
-    OutputOption,
-    PhaseErrorOption,
-    PhaseOption,
-    PlotOption,
-    ReportOption,
-    RunErrorOption,
-    options_of,
-)
-from rotorid.cli.output import check_targets, chosen, deliver
-from rotorid.workflows.balance import BalanceOptions, choices
+from rotorid.cli.common import WITH_REPORT, command
+from rotorid.cli.output import TABLES, Destination, check_targets
+from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
 
-say = options_of(BalanceOptions)
 
-
+@command(
+    BalanceOptions,
+    least={
+        "model_error": 0.0,
+        "amplitude_error": 0.0,
+        "phase_error": 0.0,
+        "run_error": 0.0,
+        "split_seconds": 0.1,
+        "best_planes": 1,
+    },
+    to=WITH_REPORT,
+)
 def balance(
     files: Annotated[
         list[Path] | None,
@@ -35,35 +35,8 @@ def balance(
             help="Job (.toml, .xlsx); or runs and weights tables; or a runs table with --influence.",
         ),
     ] = None,
-    method: Annotated[str | None, say("method", "METHOD"), choices] = None,
-    influence: Annotated[Path | None, say("influence", "FILE")] = None,
-    coefficients: Annotated[str | None, say("coefficients", "KIND")] = None,
-    model_error: Annotated[float | None, say("model_error", "PERCENT", least=0.0)] = None,
-    amplitude_error: AmplitudeErrorOption = None,
-    phase_error: PhaseErrorOption = None,
-    run_error: RunErrorOption = None,
-    phase: PhaseOption = None,
-    angles: AnglesOption = None,
-    planes: Annotated[str | None, say("planes", "LIST")] = None,
-    speeds: Annotated[str | None, say("speeds", "LIST")] = None,
-    max_mass: Annotated[str | None, say("max_mass", "MASS")] = None,
-    limit: Annotated[list[str] | None, say("limit", "SENSOR=VALUE")] = None,
-    ridge: Annotated[str | None, say("ridge", "STRENGTH")] = None,
-    truncate: Annotated[float | None, say("truncate", "NUMBER")] = None,
-    split: Annotated[bool, say("split", None, "--split")] = False,
-    split_seconds: Annotated[
-        float, say("split_seconds", "SECONDS", least=0.1)
-    ] = BalanceOptions.split_seconds,
-    refine: Annotated[bool, say("refine", None, "--refine")] = False,
-    history: Annotated[bool, say("history", None, "--history")] = False,
-    best_planes: Annotated[int | None, say("best_planes", "K", least=1)] = None,
-    trade_off: Annotated[bool, say("trade_off", None, "--trade-off")] = False,
-    grade: Annotated[str | None, say("grade", "GRADE")] = None,
-    rotor_mass: Annotated[str | None, say("rotor_mass", "MASS")] = None,
-    service_speed: Annotated[str | None, say("service_speed", "SPEED")] = None,
-    positions: Annotated[str | None, say("positions", "LIST")] = None,
-    bearings: Annotated[str | None, say("bearings", "A,B")] = None,
-    centre: Annotated[str | None, say("centre", "POSITION")] = None,
+    *,
+    options: BalanceOptions,
     save_influence: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Write the coefficients, .csv or .xlsx."),
@@ -72,10 +45,7 @@ def balance(
         Path | None,
         typer.Option(metavar="FILE.xlsx", help="Write an empty workbook to fill in."),
     ] = None,
-    sheet: ReportOption = None,
-    json: JsonOption = False,
-    plot: PlotOption = None,
-    output: OutputOption = None,
+    to: Destination,
 ) -> None:
     """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
 
@@ -88,7 +58,6 @@ def balance(
     Example: rotorid balance --template job.xlsx, and when it is filled in: rotorid balance job.xlsx --output
     sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
     """
-    options = chosen(BalanceOptions, locals())
     if template is not None:
         _write_template(template, files or ())
         return
@@ -96,18 +65,14 @@ def balance(
         raise ValueError(
             "give a job (.toml, .xlsx) or a runs table and a weights table; --template writes a form"
         )
-    check_targets(plot, output, save_influence, report=sheet)
+    output = to.output
     workbook = output if output is not None and output.suffix.lower() == ".xlsx" else None
-    deliver(
+    replace(to, output=None if workbook else output).deliver(
         "correction weights",
         lambda: work(files, options),
-        as_json=json,
-        plot=plot,
-        output=None if workbook else output,
-        report=sheet,
         more=[
-            (save_influence, lambda found: found.influence_table(save_influence or "")),
-            (workbook, lambda found: found.workbook(workbook or "")),
+            (save_influence, TABLES, lambda found: found.influence_table(save_influence or "")),
+            (workbook, TABLES, lambda found: found.workbook(workbook or "")),
         ],
     )
 
@@ -128,7 +93,7 @@ def _write_template(path: Path, files: Sequence[Path]) -> None:
         raise ValueError(
             "--template writes an empty workbook: leave the job away, or use --output for its own"
         )
-    check_targets(None, path)
+    check_targets([(path, TABLES)])
     if path.suffix.lower() != ".xlsx":
         raise ValueError(f"{path}: the form is a workbook; the name must end in .xlsx")
     if path.exists():

@@ -9,13 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import JsonOption
-from rotorid.cli.output import chosen, deliver, json_text
+from rotorid.cli.common import command
+from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
 
 
+@command(to=("json",))
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
@@ -24,7 +25,8 @@ def demo(
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SAMPLES)}.")
     ] = DemoOptions.sample,
     show: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
-    json: JsonOption = False,
+    *,
+    to: Destination,
 ) -> None:
     """Write a sample to DIR, run its commands on it, and say where the pictures are.
 
@@ -33,15 +35,15 @@ def demo(
     Example: rotorid demo demo --sample holes
     """
     if show:
-        deliver("samples", samples, as_json=json)
+        to.deliver("samples", samples)
         return
-    made = work(folder, chosen(DemoOptions, locals()))
-    if json:
+    made = work(folder, DemoOptions(sample))
+    if to.json:
         typer.echo(json_text(made.run(_document).document))
         return
-    for heading, command in made.told():
+    for heading, words in made.told():
         typer.echo(heading)
-        _run(command)
+        _run(words)
         typer.echo("")
     typer.echo(made.summary())
 

@@ -6,14 +6,13 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import JsonOption, OutputOption, PlotOption, options_of
-from rotorid.cli.output import check_targets, chosen, deliver
+from rotorid.cli.common import command
+from rotorid.cli.output import Destination
 from rotorid.workflows.split import SplitOptions
 from rotorid.workflows.split import split as work
 
-say = options_of(SplitOptions)
 
-
+@command(SplitOptions, names={"axial": ("--axial/--radial",)})
 def split(
     vector: Annotated[
         str,
@@ -23,31 +22,8 @@ def split(
             "with + between them are added.",
         ),
     ],
-    holes: Annotated[str | None, say("holes", "N|DEG,DEG,…")] = None,
-    first_hole: Annotated[float | None, say("first_hole", "DEG")] = None,
-    pieces: Annotated[str | None, say("pieces", "10g,20g")] = None,
-    stock: Annotated[str | None, say("stock", "8,4")] = None,
-    per_hole: Annotated[int | None, say("per_hole", "N")] = None,
-    most_pieces: Annotated[int | None, say("most_pieces", "N")] = None,
-    good_enough: Annotated[float | None, say("good_enough", "PERCENT")] = None,
-    taken: Annotated[str | None, say("taken", "HOLE:WEIGHT,…")] = None,
-    max_mass: Annotated[str | None, say("max_mass", "WEIGHT")] = None,
-    step: Annotated[str | None, say("step", "0.5g")] = None,
-    angle_step: Annotated[float | None, say("angle_step", "DEG")] = None,
-    mounted: Annotated[str | None, say("mounted", "VECTOR")] = None,
-    two: Annotated[str | None, say("two", "20g,30g")] = None,
-    drill: Annotated[str | None, say("drill", "DIAMETER")] = None,
-    grind: Annotated[bool, say("grind", None, "--grind")] = False,
-    radius: Annotated[str | None, say("radius", "LENGTH")] = None,
-    axial: Annotated[bool, say("axial", None, "--axial/--radial")] = False,
-    depth: Annotated[str | None, say("depth", "LENGTH")] = None,
-    density: Annotated[float | None, say("density", "KG/M3")] = None,
-    tip_angle: Annotated[float | None, say("tip_angle", "DEG")] = None,
-    spacing: Annotated[float | None, say("spacing", "DEG")] = None,
-    angles: Annotated[str, say("angles", "WAY")] = SplitOptions.angles,
-    json: JsonOption = False,
-    plot: PlotOption = None,
-    output: OutputOption = None,
+    options: SplitOptions,
+    to: Destination,
 ) -> None:
     """Mount one given weight: in holes (exactly the nearest), at two angles, or by drilling or grinding.
 
@@ -57,6 +33,4 @@ def split(
 
     rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
-    options = chosen(SplitOptions, locals())
-    check_targets(plot, output)
-    deliver("split", lambda: work(vector, options), as_json=json, plot=plot, output=output)
+    to.deliver("split", lambda: work(vector, options))

@@ -8,24 +8,40 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.mounting.holes import Holes
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.runs.conventions import Conventions
+from rotorid.tables.runs.conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
     from fem.model.rotor import Rotor
     from fem.model.sensors import Sensor
 
-Source = Path | Grid
-"""A table of a job: a file, or the cells of a sheet."""
 
+@dataclass(frozen=True)
+class Overrides:
+    """What the caller says instead of a job, or where none says it.
 
-def source_name(source: Source) -> str:
-    """How messages name a table."""
-    return source.source if isinstance(source, Grid) else str(source)
+    Raises
+    ------
+    ValueError
+        If a value is none of the allowed ones.
+    """
+
+    phase: str | None = None
+    angles: str | None = None
+    amplitude_error_percent: float | None = None
+    phase_error_deg: float | None = None
+    run_error_percent: float | None = None
+
+    def __post_init__(self) -> None:
+        Labels(phase=as_phase(self.phase or "lead"))
+        if self.angles is not None:
+            check_angles(self.angles)
+        sizes = self.amplitude_error_percent or 0.0, self.phase_error_deg or 0.0
+        StatedErrors(*sizes, run_percent=self.run_error_percent)
 
 
 @dataclass(frozen=True, eq=False)

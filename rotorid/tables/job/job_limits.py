@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,63 +12,63 @@ import numpy as np
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import listing
-from rotorid.tables.job.keys import PlaneKeys, SensorKeys
-from rotorid.tables.job.quantity import Quantity, to_job_weight
+from rotorid.tables.job.job_planes import Planes
+from rotorid.tables.job.keys import FORBIDDEN
 from rotorid.tables.reader import units
+from rotorid.tables.reader.key import Quantity, Said
 from rotorid.tables.reader.number import parse_number
+from rotorid.tables.reader.quantity import in_job_units, other_kind
 from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speeds
 
 if TYPE_CHECKING:
     from rotorid.tables.job.job_data import Job
 
 
-def make_limits(
-    trials: Trials,
-    planes: Sequence[str],
-    plane_keys: Mapping[str, PlaneKeys],
-    sensor_keys: Mapping[str, SensorKeys],
-    tolerance_percent: float,
-) -> Limits | None:
-    """Limits in SI with the rotation, in the order of `trials.speeds`, `trials.sensors` and `planes`.
+def read_limits(said: Said, planes: Planes) -> tuple[Limits | None, FloatArray | None]:
+    """Limits of planes and sensors, and weights of the readings in the fit; problems are noted.
 
-    None where nothing is limited. Problems are noted with the sections.
+    Returns
+    -------
+    Limits
+        In SI with the rotation, in the order of speeds, sensors and planes of the job; None: nothing limited.
+    ndarray
+        Of each reading, (S, C): that of its speed times that of its sensor; None: all 1.
     """
-    labels = trials.labels
+    return _limits(said, planes), _row_weights(said, planes.trials)
+
+
+def _limits(said: Said, planes: Planes) -> Limits | None:
+    trials, labels = planes.trials, planes.trials.labels
     amount, arcs = {}, {}
-    for name, plane in plane_keys.items():
-        if name not in planes:
+    for name, plane in said["planes"].items():
+        if name not in planes.names:
             continue
-        if plane.max_weight is not None:
-            value = to_job_weight(plane.max_weight, labels.weight_unit, plane.radius)
+        most = plane["max_mass_g"]
+        if most is not None:
+            value = in_job_units(most, labels.weight_unit, planes.radii.get(name))
             if value is None:
-                plane.section.complain(plane.max_weight.key, _other_kind(labels.weight_unit))
+                plane.section.complain(most.key, other_kind("max", labels.weight_unit))
             else:
-                amount[name] = value
-        if plane.forbidden:
-            arcs[name] = tuple(labels.arc_from(*pair, opposite=plane.remove) for pair in plane.forbidden)
+                amount[name] = value[0]
+        forbidden = plane[FORBIDDEN.name]
+        if forbidden:
+            arcs[name] = tuple(labels.arc_from(*pair, opposite=plane["remove"]) for pair in forbidden)
     residual: dict[str, float | FloatArray] = {}
-    for name, sensor in sensor_keys.items():
-        if name in trials.sensors and sensor.limits:
-            rows = at_speeds(sensor.section, "limit", sensor.limits, trials, tolerance_percent, math.inf)
+    for name, sensor in said["sensors"].items():
+        if name in trials.sensors and sensor["limit"]:
+            rows = at_speeds(said, sensor.section, "limit", sensor["limit"], trials, math.inf)
             residual[name] = rows / labels.vibration_scale
     made = Limits.of(
-        len(trials.speeds), trials.sensors, planes, max_weight=amount, residual=residual, forbidden=arcs
+        len(trials.speeds), trials.sensors, planes.names, max_weight=amount, residual=residual, forbidden=arcs
     )
     return made if made.any else None
 
 
-def make_row_weights(
-    trials: Trials,
-    sensor_keys: Mapping[str, SensorKeys],
-    top: Section,
-    speed_weights: Mapping[str, float],
-    tolerance_percent: float,
-) -> FloatArray | None:
-    """Weight of each reading in the fit, (S, C): that of its speed times that of its sensor; None: all 1."""
-    sensors = np.array([sensor_keys[s].weight if s in sensor_keys else 1.0 for s in trials.sensors])
-    speeds = at_speeds(top, "speed_weights", speed_weights, trials, tolerance_percent, 1.0)
+def _row_weights(said: Said, trials: Trials) -> FloatArray | None:
+    top, named = said.section, said["sensors"]
+    sensors = np.array([named[name]["weight"] if name in named else 1.0 for name in trials.sensors])
+    speeds = at_speeds(said, top, "speed_weights", said["speed_weights"], trials, 1.0)
     if not sensors.any():
         top.complain("sensors", "at least one sensor with a weight above 0", value=False)
     if not speeds.any():
@@ -79,12 +79,7 @@ def make_row_weights(
 
 
 def at_speeds(
-    section: Section,
-    key: str,
-    numbers: Mapping[str, float],
-    trials: Trials,
-    tolerance_percent: float,
-    default: float,
+    said: Said, section: Section, key: str, numbers: Mapping[str, float], trials: Trials, default: float
 ) -> FloatArray:
     """Numbers by speed (in the job's unit; "" for all speeds) as an array (S,); `default` where none is."""
     unit = units.SPEED[trials.labels.speed_unit]
@@ -94,9 +89,9 @@ def at_speeds(
         if not word:
             continue
         speed = unit.to_si(parse_number(word))
-        near = int(np.argmin(np.abs(trials.speeds - speed)))
-        if not same_speed(float(trials.speeds[near]), speed, tolerance_percent):
-            known = listing((show_speed(float(value), unit) for value in trials.speeds), "and")
+        near = nearest_speed(trials.speeds, speed, said["speed_tolerance_percent"])
+        if near is None:
+            known = show_speeds(trials.speeds, unit)
             section.complain(key, f"speeds of the runs table, not {word}: there are {known}")
         elif near in seen:
             section.complain(key, f"each speed once; {seen[near]} and {word} count as one")
@@ -104,12 +99,6 @@ def at_speeds(
             seen[near] = word
             out[near] = number
     return out
-
-
-def _other_kind(weight_unit: str) -> str:
-    mass = units.weight(weight_unit).kind == "mass"
-    key, are = ("max_mass_g", "masses") if mass else ("max_unbalance_g_mm", "unbalances (mass × radius)")
-    return f"{key}, because the weights of the job are {are}, or radius_mm too, to convert"
 
 
 def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[str, Quantity]) -> Job:
@@ -141,13 +130,13 @@ def with_limits(job: Job, weights: Mapping[str, Quantity], amplitudes: Mapping[s
     old = job.limits or Limits.none(len(trials.speeds), len(trials.sensors), len(job.planes))
     most, residual = old.max_weight.copy(), old.residual.copy()
     for plane, weight in weights.items():
-        size = to_job_weight(weight, own, job.radii.get(plane))
+        size = in_job_units(weight, own, job.radii.get(plane))
         if size is None:
             raise ValueError(
                 f"{weight.key}: the weights of the job are in {own}, to which {weight.unit.name} converts "
                 f"only with a radius_mm of plane {plane!r} in the job"
             )
-        most[job.planes.index(plane)] = size
+        most[job.planes.index(plane)] = size[0]
     for sensor, amplitude in amplitudes.items():
         residual[:, trials.sensors.index(sensor)] = amplitude.si
     holes = {}

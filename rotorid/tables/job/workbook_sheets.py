@@ -15,15 +15,17 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+from rotorid.tables.job.keys import CELLS, FORBIDDEN, TABLES
 from rotorid.tables.job.source import JobTables
-from rotorid.tables.job.workbook_reading import TABLES
 from rotorid.tables.reader.columns import REMARKS
 from rotorid.tables.reader.grid import Cell, Grid, Row, Shown, show
 from rotorid.tables.reader.number import decimal_comma, parse_number
+from rotorid.tables.reader.pages import Line
 
-TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key", "hole_names", "station")
+TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""
-Line = tuple[Cell, ...]
+NAMES = {*TEXT_COLUMNS, *(name for name, cell in CELLS.items() if cell in ("name", "words"))}
+"""Those, and settings that a spreadsheet would take for a date."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -49,14 +51,14 @@ def job_sheets(
     sheets = {name: table_lines(job.tables[name]) for name in TABLES[:2] if name in job.tables}
     for table, key, names in (("planes", "plane", planes), ("sensors", "sensor", sensors)):
         lines = _named(job, table, key, names)
-        sheets[table] = [*_comments(job.comments.get(table, ())), *lines]
-    settings = {k: v for k, v in job.settings.items() if k not in ("planes", "sensors")}
+        sheets[table] = [*_comments(job.written.comments.get(table, ())), *lines]
+    settings = {k: v for k, v in job.written.settings.items() if k not in ("planes", "sensors")}
     if job.rotor is not None:
         settings["rotor"] = relative(job.rotor, target)
-    above = _comments((*job.comments.get("settings", ()), *_other_remarks(job, settings)))
+    above = _comments((*job.written.comments.get("settings", ()), *_other_remarks(job, settings)))
     sheets["settings"] = [*above, *_settings(job, settings)]
     sheets |= {name: table_lines(job.tables[name]) for name in TABLES[2:] if name in job.tables}
-    return sheets | {title: _padded(rows) for title, rows in job.notes.items()}
+    return sheets | {title: _padded(rows) for title, rows in job.written.notes.items()}
 
 
 def relative(file: Path, target: Path) -> str:
@@ -94,11 +96,6 @@ def table_lines(grid: Grid) -> list[Line]:
     return lines
 
 
-def as_rows(lines: Iterable[Line]) -> list[Row]:
-    """Lines as a reader of workbooks finds them, with their row numbers."""
-    return list(enumerate(lines, start=1))
-
-
 def _number(cell: Cell, separator: str, *, comma: bool) -> Cell:
     if not isinstance(cell, str) or not cell:
         return cell
@@ -125,10 +122,10 @@ def _padded(rows: Sequence[Row]) -> list[Line]:
 
 def _named(job: JobTables, table: str, key: str, names: Sequence[str]) -> list[Line]:
     """Rows of one plane or sensor each: what is said about it, by columns, and remarks."""
-    said: Mapping[str, Mapping[str, Any]] = job.settings.get(table, {})
+    said: Mapping[str, Mapping[str, Any]] = job.written.settings.get(table, {})
     items = [*said, *(name for name in names if name not in said)]
     columns = list(dict.fromkeys(column for section in said.values() for column in section))
-    notes = [job.remarks.get((table, item), {}) for item in items]
+    notes = [job.written.remarks.get((table, item), {}) for item in items]
     remarks = list(dict.fromkeys(column for note in notes for column in note))
     # A first cell that begins with # would make its row a comment.
     first = ("note",) if any(item.startswith("#") for item in items) else ()
@@ -143,7 +140,7 @@ def _named(job: JobTables, table: str, key: str, names: Sequence[str]) -> list[L
 def _settings(job: JobTables, settings: Mapping[str, Any]) -> list[Line]:
     """Rows of key and value."""
     rows = list(_flat(settings, ()))
-    notes = [job.remarks.get(("settings", ".".join(parts)), {}) for parts, _ in rows]
+    notes = [job.written.remarks.get(("settings", ".".join(parts)), {}) for parts, _ in rows]
     remarks = list(dict.fromkeys(column for note in notes for column in note))
     lines: list[Line] = [("key", "value", *remarks)]
     for (parts, value), note in zip(rows, notes, strict=True):
@@ -154,7 +151,7 @@ def _settings(job: JobTables, settings: Mapping[str, Any]) -> list[Line]:
 def _other_remarks(job: JobTables, settings: Mapping[str, Any]) -> Iterable[str]:
     """Remarks on settings that no longer stand in the sheet settings: planes, sensors, tables."""
     here = {".".join(parts) for parts, _ in _flat(settings, ())}
-    for (sheet, key), note in job.remarks.items():
+    for (sheet, key), note in job.written.remarks.items():
         if sheet == "settings" and key not in here:
             yield f"{key}: {'; '.join(show(cell) for cell in note.values())}"
 
@@ -176,7 +173,7 @@ def _key(parts: Sequence[str]) -> str:
 
 def _plane_setting(column: str, value: Any) -> Cell:  # noqa: ANN401
     """A value about a plane or sensor; one pair of angles may stand without a list around it."""
-    alone = column == "forbidden_deg" and isinstance(value, list) and not isinstance(value[0], list)
+    alone = FORBIDDEN.accepts(column) and isinstance(value, list) and not isinstance(value[0], list)
     return _setting([value] if alone else value)
 
 

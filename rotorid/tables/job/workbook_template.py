@@ -3,170 +3,74 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
-from rotorid.tables.job.workbook_pages import Choice, Page, book_bytes
+from rotorid.base.text import sentence
+from rotorid.tables.job.keys import ERRORS, JOB, PLANE, SENSOR
 from rotorid.tables.job.workbook_reading import OPTIONAL
-from rotorid.tables.job.workbook_sheets import Line
-from rotorid.tables.runs.conventions import DEFAULT_TOLERANCE, PHASES, ROTATIONS, STATED_ANGLES, VIEWS
+from rotorid.tables.job.workbook_sheets import NAMES
+from rotorid.tables.reader import kinds, units
+from rotorid.tables.reader.key import Key, Kind
+from rotorid.tables.reader.pages import Choice, Line, Page, book_bytes
 
-_POSITIVE = Choice(low=0.0, high=math.inf)
-_YES_NO = Choice(("yes", "no"))
-
-
-@dataclass(frozen=True)
-class _Column:
-    """A column of a sheet: its meaning, what may stand below it, and other names it may have."""
-
-    name: str
-    meaning: str
-    allowed: str
-    choice: Choice | None = None
-    names: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Key:
-    """A row of the sheet settings; a value that is none of the choices is refused until somebody chooses."""
-
-    name: str
-    meaning: str
-    choice: Choice
-    value: str = ""
-
-
-_RUNS = (
-    _Column("run", "Name of the run: one start of the machine with the same weights on it.", "text"),
-    _Column(
-        "speed_rpm",
-        "Speed. Change the name of the column for another unit.",
-        "a number above 0",
-        _POSITIVE,
-        ("speed_rpm", "speed_Hz", "speed_rad_s"),
-    ),
-    _Column("sensor", "Name of the sensor. Every run needs every sensor at every speed.", "text"),
-    _Column(
-        "amplitude_um_pp",
-        "Amplitude at the running speed (1x). The end of the name is the unit: _pp is peak to peak, _rms, "
-        "neither is peak; the name amplitude alone is for readings without a known unit.",
-        "a number of 0 or more",
-        _POSITIVE,
-        (
-            "amplitude_um_pp",
-            "amplitude_um",
-            "amplitude_um_rms",
-            "amplitude_mm_s_rms",
-            "amplitude_mm_s",
-            "amplitude_mil_pp",
-            "amplitude_in_s",
-            "amplitude_g",
-            "amplitude_g_rms",
-            "amplitude_m_s2",
-            "amplitude",
+_NOTE = Key("note", Kind(kinds.TEXT.read, allowed="anything"), "remarks; nobody computes with them")
+_RARE = ("holes_deg", "hole_names", "step_g", "node", "angle_deg")
+"""Keys of planes and sensors for which the form has no column; one may be added."""
+_RUN = Key("run", kinds.TEXT, "name of the run: one start of the machine with the same weights on it")
+_TABLES = {
+    "runs": (
+        _RUN,
+        Key("speed_rpm", kinds.ABOVE_ZERO, "speed", units.SPEED),
+        Key("sensor", kinds.TEXT, "name of the sensor; every run needs every sensor at every speed"),
+        Key(
+            "amplitude_um_pp amplitude_mm_s_rms amplitude_g_rms amplitude",
+            kinds.number(0.0),
+            "amplitude at the running speed (1x): the end of the name is the unit, _pp is peak to peak, _rms "
+            "root mean square, neither is peak; the name amplitude alone is for readings without a unit",
+            units.VIBRATION,
         ),
+        Key("phase_deg", kinds.TURN, "phase; the sheet settings says whether it leads or lags"),
+        _NOTE,
     ),
-    _Column(
-        "phase_deg",
-        "Phase at the running speed; the sheet settings says whether it leads or lags.",
-        "a number from -360 to 360",
-        Choice(),
+    "weights": (
+        _RUN,
+        Key("plane", kinds.TEXT, "name of the plane in which the weight was during this run"),
+        Key(
+            "mass_g unbalance_g_mm",
+            kinds.ABOVE_ZERO,
+            "the weight; every weight that is mounted during a run has a row, also one that stays in from an "
+            "earlier run, and a run without weights has none",
+            units.WEIGHT,
+        ),
+        Key(
+            "angle_deg",
+            kinds.TURN,
+            "angle from the mark on the rotor; the sheet settings says in which direction it counts",
+        ),
+        _NOTE,
     ),
-    _Column("note", "Remarks; nobody computes with them.", "anything"),
-)
-_WEIGHTS = (
-    _Column("run", "Name of a run of the sheet runs.", "text; a run without weights has no row here"),
-    _Column("plane", "Name of the plane in which the weight was during this run.", "text"),
-    _Column(
-        "mass_g",
-        "The weight. Change the name of the column for another unit. Every weight that is mounted during a "
-        "run has a row, also one that stays in from an earlier run.",
-        "a number above 0",
-        _POSITIVE,
-        ("mass_g", "mass_kg", "mass_mg", "mass_oz", "mass_lb", "unbalance_g_mm", "unbalance_oz_in"),
+    "planes": (
+        Key("plane", kinds.TEXT, "name of a plane of the sheet weights; without settings it needs no row"),
+        *(key for key in PLANE if key.names[0] not in _RARE),
+        _NOTE,
     ),
-    _Column(
-        "angle_deg",
-        "Angle from the mark on the rotor; the sheet settings says in which direction it counts.",
-        "a number from -360 to 360",
-        Choice(),
+    "sensors": (
+        Key("sensor", kinds.TEXT, "name of a sensor of the sheet runs; without settings it needs no row"),
+        *(key for key in SENSOR if key.names[0] not in _RARE),
+        _NOTE,
     ),
-    _Column("note", "Remarks.", "anything"),
-)
-_PLANES = (
-    _Column("plane", "Name of a plane of the sheet weights.", "text; planes without settings need no row"),
-    _Column(
-        "radius_mm",
-        "Radius of the corrections.",
-        "a number above 0, or blank",
-        _POSITIVE,
-        ("radius_mm", "radius_m", "radius_in"),
-    ),
-    _Column(
-        "trial_radius_mm",
-        "Radius of the trial weights, where it is another.",
-        "above 0, or blank",
-        _POSITIVE,
-        ("trial_radius_mm", "trial_radius_m", "trial_radius_in"),
-    ),
-    _Column(
-        "max_mass_g",
-        "The largest weight that may be mounted.",
-        "above 0, or blank",
-        _POSITIVE,
-        ("max_mass_g", "max_mass_kg", "max_mass_oz", "max_unbalance_g_mm", "max_unbalance_oz_in"),
-    ),
-    _Column("forbidden_deg", "Angles at which nothing can be mounted.", "20 to 60; 300 to 340, or blank"),
-    _Column("holes", "Number of equally spaced holes.", "a whole number, or blank", Choice(low=1, high=1000)),
-    _Column("first_hole_deg", "Angle of hole number 1.", "-360 to 360, or blank (0)", Choice()),
-    _Column(
-        "available_g",
-        "Weights of which each can be mounted in a hole.",
-        "5; 10; 20, or blank",
-        names=("available_g", "available_kg", "available_oz", "available_g_mm", "available_oz_in"),
-    ),
-    _Column(
-        "per_hole", "How many weights one hole takes.", "a whole number, or blank", Choice(low=1, high=100)
-    ),
-    _Column("stock", "How many there are of each available weight.", "4; 4; 2, or blank"),
-    _Column("taken", "Weights that are in holes already, by number of the hole.", "3: 10; 5: 20, or blank"),
-    _Column("remove", "Whether material is taken away (drilled, ground) instead.", "yes or no", _YES_NO),
-    _Column("use", "Whether this plane is used; no keeps it out.", "yes or no", _YES_NO),
-    _Column("note", "Remarks.", "anything"),
-)
-_SENSORS = (
-    _Column("sensor", "Name of a sensor of the sheet runs.", "text; sensors without settings need no row"),
-    _Column("limit", "Largest amplitude that is allowed, in the unit of the readings.", "above 0, or blank"),
-    _Column("weight", "How much this sensor counts in the fit.", "0 or more, or blank (1)", _POSITIVE),
-    _Column("note", "Remarks.", "anything"),
-)
+}
 _SETTINGS = (
-    _Key(
-        "phase",
-        "Whether a positive phase leads or lags, to be chosen. Most instruments show lag: the angle that the "
-        "rotor turns from the pulse to the positive peak.",
-        Choice(PHASES),
-        "lead or lag?",
-    ),
-    _Key(
-        "angles",
-        "How angles on the rotor count, to be chosen. Clockwise and counter-clockwise need rotation.",
-        Choice(STATED_ANGLES),
-        "which way?",
-    ),
-    _Key("rotation", "How the rotor turns, seen from the same end as the angles.", Choice(ROTATIONS)),
-    _Key("view", "The end from which that is seen.", Choice(VIEWS)),
-    _Key(
-        "speed_tolerance_percent",
-        f"Speeds of different runs that differ by less count as one. Blank: {DEFAULT_TOLERANCE:g}.",
-        Choice(low=0.0, high=20.0),
-    ),
-    _Key("errors.amplitude_percent", "One standard deviation of an amplitude, percent of it.", _POSITIVE),
-    _Key("errors.phase_deg", "One standard deviation of a phase, degrees.", _POSITIVE),
-    _Key("errors.floor", "One standard deviation at amplitude 0, in the unit of the readings.", _POSITIVE),
-    _Key("errors.run_percent", "What changes from run to run, one standard deviation, percent.", _POSITIVE),
-    _Key("errors.run_floor", "The same at amplitude 0, in the unit of the readings.", _POSITIVE),
+    *(key for key in JOB if "enum" in key.kind.schema or key.name == "speed_tolerance_percent"),
+    *(replace(key, name=f"errors.{key.name}") for key in ERRORS),
 )
-_TABLES = {"runs": _RUNS, "weights": _WEIGHTS, "planes": _PLANES, "sensors": _SENSORS}
+_TO_CHOOSE = {"phase": "lead or lag?", "angles": "which way?"}
+"""Values that are none of the choices are refused until somebody chooses."""
+_COMMON = (
+    *("rpm", "Hz", "rad_s", "mm", "m", "in", "g", "kg", "mg", "oz", "lb", "g_mm", "oz_in"),
+    *("um_pp", "um", "um_rms", "mm_s_rms", "mm_s", "mil_pp", "in_s", "g_rms", "m_s2"),
+)
+"""Units that the lists of names in the headers offer."""
 _HOW: tuple[Line, ...] = (
     ("How to fill in this workbook",),
     ("1. Sheet runs: one row per run, speed and sensor; the first run without any trial weight.",),
@@ -208,37 +112,59 @@ def template_bytes() -> bytes:
     return book_bytes([*pages, _settings(), _notes()], "runs")
 
 
-def _form(title: str, columns: tuple[_Column, ...]) -> Page:
+def _form(title: str, keys: tuple[Key, ...]) -> Page:
+    names = [key.names[0] for key in keys]
     return Page(
         title,
-        [tuple(column.name for column in columns)],
-        explained={column.name: f"{column.meaning} Allowed: {column.allowed}." for column in columns},
-        choices={column.name: column.choice for column in columns if column.choice is not None},
+        [tuple(names)],
+        names=NAMES,
+        explained={name: f"{_about(key)} {_allowed(key)}" for name, key in zip(names, keys, strict=True)},
+        choices={name: found for name, key in zip(names, keys, strict=True) if (found := _choice(key))},
         cell_choices={
-            (1, place): Choice(column.names, strict=False)
-            for place, column in enumerate(columns, start=1)
-            if column.names
+            (1, place): Choice(_names(key), strict=False)
+            for place, key in enumerate(keys, start=1)
+            if key.units is not None
         },
     )
 
 
+def _names(key: Key) -> tuple[str, ...]:
+    """Common names of a column, in its units."""
+    return tuple(name for name, unit in key.variants.items() if unit is None or unit.name in _COMMON)
+
+
+def _choice(key: Key) -> Choice | None:
+    """What a cell may hold, of the schema of its key."""
+    schema = key.kind.schema
+    if "enum" in schema:
+        return Choice(tuple(schema["enum"]))
+    if schema.get("type") == "boolean":
+        return Choice(("yes", "no"))
+    if schema.get("type") not in ("number", "integer"):
+        return None
+    return Choice(low=schema.get("minimum", 0.0), high=schema.get("maximum", math.inf))
+
+
+def _about(key: Key) -> str:
+    return sentence(key.about.replace("`", ""))
+
+
+def _allowed(key: Key) -> str:
+    return f"Allowed: {key.kind.allowed}."
+
+
 def _settings() -> Page:
-    rows: list[Line] = [(key.name, key.value, _explained(key)) for key in _SETTINGS]
+    rows: list[Line] = [
+        (key.name, _TO_CHOOSE.get(key.name, ""), f"{_about(key)} {_allowed(key)}") for key in _SETTINGS
+    ]
+    found = {(row, 2): _choice(key) for row, key in enumerate(_SETTINGS, start=2)}
     return Page(
         "settings",
         [("key", "value", OPTIONAL), *rows],
+        names=NAMES,
         explained={"key": "What is set; further keys may be added.", "value": "Its value, or blank."},
-        cell_choices={(row, 2): key.choice for row, key in enumerate(_SETTINGS, start=2)},
+        cell_choices={place: choice for place, choice in found.items() if choice is not None},
     )
-
-
-def _explained(key: _Key) -> str:
-    words = key.choice.texts
-    return f"{key.meaning} Allowed: {_listed(words)}" if words else key.meaning
-
-
-def _listed(words: tuple[str, ...]) -> str:
-    return f"{', '.join(words[:-1])} or {words[-1]}"
 
 
 _MORE = (
@@ -253,20 +179,19 @@ _MORE = (
 
 def _notes() -> Page:
     """All explanations in one place, and the example of Brüel & Kjær's application note 17-227."""
-    columns: list[Line] = [
-        (title, column.name, column.meaning, column.allowed, ", ".join(column.names))
-        for title, own in _TABLES.items()
-        for column in own
+    tables = {**_TABLES, "settings": _SETTINGS}
+    rows: list[Line] = [
+        (title, key.names[0], _about(key), key.kind.allowed, ", ".join(_names(key)))
+        for title, keys in tables.items()
+        for key in keys
     ]
-    keys: list[Line] = [("settings", key.name, _explained(key), "", "") for key in _SETTINGS]
     return Page(
         "notes",
         [
             *_HOW,
             (),
             ("sheet", "column or key", "meaning", "allowed values", "other names of the column"),
-            *columns,
-            *keys,
+            *rows,
             (),
             *((words,) for words in _MORE),
             (),

@@ -29,6 +29,8 @@ from rotorid.tables.reader.workbook import is_workbook, pick_sheet, read_workboo
 
 REMARKS = ("note", "comment")
 _UNCLEAR = Unit("?", "unclear")
+Source = str | Path | Grid
+"""A table: a file, or the cells of a sheet."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,7 @@ class Table:
 
 
 def read_table(
-    path: str | Path,
+    source: Source,
     sheet: str,
     columns: Sequence[Column],
     problems: Problems,
@@ -150,8 +152,8 @@ def read_table(
 
     Parameters
     ----------
-    path
-        `.xlsx` is a workbook, everything else text.
+    source
+        A file, of which `.xlsx` is a workbook and everything else text, or the cells of a sheet.
     sheet
         Name of the sheet in a workbook; the only sheet may have any name (with `first`, the first one).
     columns
@@ -166,14 +168,17 @@ def read_table(
     Table or None
         None where not even the columns are clear; otherwise unusable cells hold NaN or `""`.
     """
-    grid = read_grid(Path(path), sheet, problems, first=first, may_be_empty=may_be_empty)
+    grid = read_grid(source, sheet, problems, first=first, may_be_empty=may_be_empty)
     return None if grid is None else make_table(grid, columns, problems)
 
 
 def read_grid(
-    path: Path, sheet: str, problems: Problems, *, first: bool = False, may_be_empty: bool = False
+    source: Source, sheet: str, problems: Problems, *, first: bool = False, may_be_empty: bool = False
 ) -> Grid | None:
     """The cells of a text file or of a sheet."""
+    if isinstance(source, Grid):
+        return source
+    path = Path(source)
     if is_workbook(path):
         sheets = read_workbook(path, problems)
         chosen = None if sheets is None else pick_sheet(path, sheets, sheet, problems, first=first)
@@ -184,6 +189,11 @@ def read_grid(
     data = read_bytes(path, problems)
     text = None if data is None else decode(str(path), data, problems)
     return None if text is None else parse_text(str(path), text, problems, may_be_empty=may_be_empty)
+
+
+def source_name(source: Source) -> str:
+    """How messages name a table."""
+    return source.source if isinstance(source, Grid) else str(source)
 
 
 def sheet_source(path: Path, title: str) -> str:

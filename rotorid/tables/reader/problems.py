@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 
 from rotorid.base.suggestions import suggest
@@ -77,8 +77,22 @@ class Problems:
         """Note one problem."""
         self._items.append(Problem(file, row, column, value, expected))
 
+    def extend(self, more: Iterable[Problem]) -> None:
+        """Note those of another file, or of an `InputError`."""
+        self._items.extend(more)
+
+    def __iter__(self) -> Iterator[Problem]:
+        return iter(self._items)
+
     def __len__(self) -> int:
         return len(self._items)
+
+    def apart(self, files: Collection[str]) -> Problems:
+        """Those of some files, taken out of these."""
+        own = Problems()
+        own.extend(problem for problem in self._items if problem.file in files)
+        self._items = [problem for problem in self._items if problem.file not in files]
+        return own
 
     def withdraw(self, file: str) -> None:
         """Forget what was noted about a file: a better explanation follows."""

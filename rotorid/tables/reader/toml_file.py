@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,9 @@ class Section:
         self._problems = problems
         self._prefix = prefix
         self._where = where or {}
+        self._taken: list[str] = []
         self._known: list[str] = []
+        self.refused: set[str] = set()
 
     def __contains__(self, key: str) -> bool:
         return key in self._data
@@ -92,7 +94,8 @@ class Section:
         return self._where.get(name, (self.source, None, name))
 
     def complain(self, key: str, expected: str, *, value: bool = True) -> None:
-        """Note a problem with a key."""
+        """Note a problem with a key, which is one of the `refused` then."""
+        self.refused.add(key)
         found = _shown(self._data[key]) if value and key in self._data else None
         name = f"{self._prefix}{key}"
         source, row, column = self.place(name)
@@ -100,8 +103,12 @@ class Section:
 
     def take(self, key: str) -> Any:  # noqa: ANN401  whatever the file holds
         """The value as it is, None if there is none."""
-        self._known.append(key)
+        self._taken.append(key)
         return self._data.get(key)
+
+    def know(self, names: Iterable[str]) -> None:
+        """Name these as the known keys; without them it is those that are taken."""
+        self._known.extend(names)
 
     def number(
         self, key: str, default: float | None = None, *, low: float = -math.inf, high: float = math.inf
@@ -201,16 +208,18 @@ class Section:
 
     def refuse(self, expected: str) -> None:
         """Note a problem with these settings as a whole."""
-        self._problems.add(self.source, None, self._prefix.rstrip(".") or None, None, expected)
+        source, row, column = self.place(self._prefix.rstrip("."))
+        self._problems.add(source, row, column or None, None, expected)
 
     def finish(self) -> None:
         """Complain about every key that nobody took."""
+        names = self._known or self._taken
         for key in self._data:
-            if key not in self._known:
-                hint = did_you_mean(key, self._known)
-                known = listing(self._known, "and") or "none yet"
+            if key not in self._taken and key not in self.refused:
+                hint = did_you_mean(key, names)
+                known = listing(names, "and") or "none yet"
                 # nothing is printed of a file of something else
-                shown = bool(self._prefix or hint) or any(name in self._data for name in self._known)
+                shown = bool(self._prefix or hint) or any(name in self._data for name in self._taken)
                 self.complain(key, f"a known key{hint}; known are {known}", value=shown)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import pi, sqrt
 
@@ -72,6 +72,7 @@ UNBALANCE = {
     for mass, (up, down) in _MASSES.items()
     for radius, (far, near) in _RADII.items()
 }
+WEIGHT = {**MASS, **UNBALANCE}
 SPEED = _table("speed", {"rpm": (2.0 * pi, 60.0), "rad_s": (1.0, 1.0), "Hz": (2.0 * pi, 1.0)})
 ANGLE = _table("angle", {"deg": (pi, 180.0), "rad": (1.0, 1.0)})
 INERTIA = _table("inertia", {"kg_m2": (1.0, 1.0)})
@@ -158,16 +159,10 @@ def weight(name: str) -> Unit:
         For any other name.
     """
     name = spelt(name)
-    unit = MASS.get(name) or UNBALANCE.get(name)
+    unit = WEIGHT.get(name)
     if unit is None:
-        known = weights()
-        raise UnitError(f"a unit of weight: {listing(known)}, not {name!r}{did_you_mean(name, known)}")
+        raise UnitError(f"a unit of weight: {listing(WEIGHT)}, not {name!r}{did_you_mean(name, WEIGHT)}")
     return unit
-
-
-def weights() -> Iterable[str]:
-    """Names of all units of weight."""
-    return [*MASS, *UNBALANCE]
 
 
 def spelt(name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import math
 import os
 import re
@@ -12,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotorid.tables.reader.pages import Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problem
 
 if TYPE_CHECKING:
@@ -60,7 +60,9 @@ def table_bytes(
     if kind == ".csv":
         return csv_bytes(comments, names, rows)
     if kind == ".xlsx":
-        return _xlsx(comments, names, rows, sheet)
+        lines = [*((f"# {comment}",) for comment in comments), names, *rows]
+        page = [tuple(_one_line(cell) if isinstance(cell, str) else cell for cell in line) for line in lines]
+        return book_bytes([Page(sheet, page)], sheet)
     raise InputError([Problem(str(path), None, None, None, "a name that ends in .csv or .xlsx")])
 
 
@@ -156,27 +158,3 @@ def _one_line(text: str) -> str:
     if re.search(r"[\x00-\x1f\x7f]", line):
         raise ValueError(f"text with control characters cannot be written to a table: {text!r}")
     return line
-
-
-def _xlsx(
-    comments: Sequence[str], names: Sequence[str], rows: Sequence[Sequence[Value]], sheet: str
-) -> bytes:
-    import openpyxl
-
-    book = openpyxl.Workbook()
-    page = book.active
-    page.title = sheet
-    lines: list[Sequence[Value]] = [[f"# {_one_line(comment)}"] for comment in comments]
-    for number, line in enumerate([*lines, names, *rows], start=1):
-        for place, value in enumerate(line, start=1):
-            cell = page.cell(number, place)
-            if isinstance(value, float):
-                # Given a float, openpyxl would keep 16 digits; 17 are needed.
-                cell.value, cell.data_type = repr(value), "n"
-            elif isinstance(value, str):
-                cell.value, cell.data_type = _one_line(value), "s"
-            else:
-                cell.value = value
-    stream = io.BytesIO()
-    book.save(stream)
-    return stream.getvalue()

@@ -11,12 +11,11 @@ import numpy as np
 from balancing.data.conventions import ANGLES as ANGLES
 from balancing.data.conventions import PHASES as PHASES
 from balancing.data.conventions import Angles as Angles
-from balancing.data.conventions import Labels, Rotation, View
+from balancing.data.conventions import Labels
 from balancing.data.conventions import Phase as Phase
 from balancing.data.trials import ReadingErrors, RunScatter
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.toml_file import Section
 
 ROTATIONS = ("clockwise", "counter-clockwise")
 STATED_ANGLES = (*ANGLES, *ROTATIONS)
@@ -107,67 +106,6 @@ class StatedErrors:
         if self.run_percent is None and self.run_floor is None:
             return None
         return RunScatter((self.run_percent or 0.0) / 100.0, (self.run_floor or 0.0) / labels.vibration_scale)
-
-
-@dataclass(frozen=True)
-class Turning:
-    """What a job says about angles on the rotor and its rotation.
-
-    Attributes
-    ----------
-    angles
-        With or against the rotation; None where nobody says.
-    rotation, view, clock
-        As in `Labels`.
-    """
-
-    angles: Angles | None = None
-    rotation: Rotation | None = None
-    view: View | None = None
-    clock: bool = False
-
-
-def read_turning(top: Section, override: str | None = None) -> Turning:
-    """Take the keys angles, rotation and view of a job; problems are noted with it.
-
-    Parameters
-    ----------
-    top
-        The settings of the job.
-    override
-        Replaces `angles`, one of `STATED_ANGLES`.
-    """
-    said = top.choice("angles", STATED_ANGLES, "")
-    rotation = cast("Rotation | None", top.choice("rotation", ROTATIONS, "") or None)
-    view = cast("View | None", top.choice("view", VIEWS, "") or None)
-    stated = override or said
-    if rotation is None and "rotation" not in top:
-        if stated in ROTATIONS:
-            expected = (
-                f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the same end as the "
-                f"angles, which count {stated}"
-            )
-            top.missing("rotation", expected)
-        elif view is not None:
-            expected = f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from the {view}"
-            top.missing("rotation", expected)
-    if rotation is None:
-        return Turning(cast("Angles", stated) if stated in ANGLES else None)
-    return Turning(
-        resolve_angles(stated, rotation) if stated else None, rotation, view, clock=stated in ROTATIONS
-    )
-
-
-def read_key_phasor(top: Section) -> float:
-    """Take the direction of the key phasor, degrees from x as the job counts angles; 0 where none is said."""
-    section = top.section("key_phasor")
-    if section is None:
-        return 0.0
-    angle = section.number("angle_deg", low=-360.0, high=360.0)
-    if "angle_deg" not in section:
-        section.missing("angle_deg", "the direction of the key phasor, degrees from the model's x")
-    section.finish()
-    return angle or 0.0
 
 
 def check_angles(word: str) -> None:

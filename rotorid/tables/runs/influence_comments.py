@@ -22,13 +22,16 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit
 from rotorid.tables.runs.conventions import ANGLES, PHASES, StatedErrors
 
-_CONVENTION = re.compile(r"(phase|angle)s?\b\s*([:=]|\bis\b|\bare\b)?\s*[\"']?(.*?)[\"']?\.?", re.IGNORECASE)
-_LIKELY = {
-    "phase": re.compile(r"\bphases?\b.*\b(lead|lag)|\b(lead|lag).*\bphases?\b", re.IGNORECASE),
-    "angles": re.compile(
-        r"\bangles?\b.*\b(with|against)\b|\b(against|with) (the )?rotation\b", re.IGNORECASE
-    ),
-}
+_ALLOWED = {"phase": PHASES, "angles": ANGLES}
+_CONVENTION = re.compile(r"(phase|angles)\s*=\s*(.*)")
+_DOUBTFUL = re.compile(
+    r"(phase|angle)s?\b\s*([:=]|is\b|are\b|lead|lag).*"
+    r"|(?=.*\bphases?\b).*\b(lead|lag).*"
+    r"|.*\bangles?\b.*\b(with|against)\b.*"
+    r"|.*\b(with|against) (the )?rotation\b.*",
+    re.IGNORECASE,
+)
+"""Comments that may mean a convention in other words."""
 PHASE_MEANING = "phase_deg is the phase reading that a weight at angle 0 causes"
 ERRORS_MEANING = (
     "std and correlation are those of influence*cos(phase_deg), re, and of influence*sin(phase_deg), im"
@@ -38,23 +41,20 @@ _SIZES = ("amplitude_percent", "phase_deg", "floor")
 _RUN = ("run_percent", "run_weights_percent", "run_floor")
 """Own, common at a speed, common to the run; one number alone: common to the run."""
 _DEGREES = ("degrees_of_freedom", "reading_degrees_of_freedom")
-_COUNTS = {**dict.fromkeys((*_SIZES, *_DEGREES), (1,)), **dict.fromkeys(_RUN, (1, 3))}
-_COUNTS |= {"run_share": (1,), "run_interval": (2,), "run_case": (4,)}
-_WORDS = {"source": tuple(word for word in get_args(Source) if word != "unknown")}
-_WORDS |= {"run_source": get_args(Origin), "run_merged": ("yes", "no")}
-_KEYS = (
-    *_SIZES,
-    "source",
-    *_DEGREES,
-    *_RUN,
-    "run_source",
-    "run_share",
-    "run_interval",
-    "run_case",
-    "run_merged",
-)
-_LINE = re.compile(r"errors?\s*[.:=]\s*(.*)", re.IGNORECASE)
-_STATEMENT = re.compile(r"(\w+)\s*[:=]\s*[\"']?(.*?)[\"']?")
+_KEYS: dict[str, tuple[int, ...] | tuple[str, ...]] = {
+    **dict.fromkeys(_SIZES, (1,)),
+    "source": tuple(word for word in get_args(Source) if word != "unknown"),
+    **dict.fromkeys(_DEGREES, (1,)),
+    **dict.fromkeys(_RUN, (1, 3)),
+    "run_source": get_args(Origin),
+    "run_share": (1,),
+    "run_interval": (2,),
+    "run_case": (4,),
+    "run_merged": ("yes", "no"),
+}
+"""What may stand at each key: so many numbers, or one of some words."""
+_ERRORS = re.compile(r"errors?\s*[.:=].*", re.IGNORECASE)
+_STATEMENT = re.compile(r"errors\.(\w+)\s*=\s*(.*)")
 
 
 class Errors(NamedTuple):
@@ -72,25 +72,24 @@ class Errors(NamedTuple):
 
 
 def read_conventions(source: str, comments: Sequence[str], problems: Problems) -> dict[str, str]:
-    """What comment lines of the table say about its conventions.
+    """What comment lines of the table say about its conventions: `phase = lag`, `angles = with rotation`.
 
-    Capitals and the sign between do not matter; a comment that seems to state a convention in other words is
-    a problem, because passing over it would turn the weights round.
+    A comment that may mean a convention in other words is a problem, because passing over it would turn the
+    weights round.
     """
     said: dict[str, str] = {}
     for comment in comments:
-        match = _CONVENTION.fullmatch(comment)
-        word, sign = (" ".join(match[3].casefold().split()), match[2]) if match else ("", None)
-        key = {"phase": "phase", "angle": "angles"}.get(match[1].casefold() if match else "", "")
-        likely = key if sign else next((k for k, words in _LIKELY.items() if words.search(comment)), "")
-        if comment == PHASE_MEANING or not (likely or word in (*PHASES, *ANGLES)):
-            continue
-        key = key or likely
-        allowed = PHASES if key == "phase" else ANGLES
-        if word not in allowed or said.get(key, word) != word:
-            expected = f"# {key} = {listing(allowed)}, once{did_you_mean(word, allowed)}"
+        found = _CONVENTION.fullmatch(comment)
+        expected = ""
+        if found is not None:
+            key, word = found.groups()
+            if word not in _ALLOWED[key] or said.setdefault(key, word) != word:
+                expected = f"# {key} = {listing(_ALLOWED[key])}, once{did_you_mean(word, _ALLOWED[key])}"
+        elif _DOUBTFUL.fullmatch(comment):
+            lines = [f"# {key} = {listing(words)}" for key, words in _ALLOWED.items()]
+            expected = f"{listing(lines, 'and')}, in these words"
+        if expected:
             problems.add(source, None, None, f"# {comment}", expected)
-        said[key] = word
     return said
 
 
@@ -101,21 +100,20 @@ def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
     words: dict[str, str] = {}
     first = ""
     for number, comment in enumerate(table.comments):
-        line = _LINE.fullmatch(comment)
-        if line is None:
+        if _ERRORS.fullmatch(comment) is None:
             continue
-        statement = _STATEMENT.fullmatch(line[1])
-        key = statement[1].casefold() if statement else ""
+        statement = _STATEMENT.fullmatch(comment)
+        key, text = statement.groups() if statement else ("", "")
         try:
-            if statement is None or key not in _KEYS:
+            if key not in _KEYS:
                 hint = did_you_mean(key, _KEYS)
                 raise NotANumber(f"# errors.KEY = VALUE with one of the keys {listing(_KEYS)}{hint}")
             if (key in numbers or key in words) and key != "run_case":
                 raise NotANumber(f"errors.{key} once")
-            if key in _WORDS:
-                words[key] = _word(statement[2], _WORDS[key])
+            if isinstance(_KEYS[key][0], str):
+                words[key] = _word(text, key)
             else:
-                numbers.setdefault(key, []).append(_numbers(statement[2], key))
+                numbers.setdefault(key, []).append(_numbers(text, key))
         except NotANumber as reason:
             problems.add(table.source, _row(table, number), None, f"# {comment}", str(reason))
         first = first or comment
@@ -142,8 +140,8 @@ def read_errors(table: Table, vibration: Unit, problems: Problems) -> Errors:
 
 def _numbers(text: str, key: str) -> list[float]:
     values = [parse_number(word) for word in text.split()]
-    if len(values) not in _COUNTS[key]:
-        counts = listing([str(n) for n in _COUNTS[key]])
+    if len(values) not in _KEYS[key]:
+        counts = listing(map(str, _KEYS[key]))
         raise NotANumber("one number" if counts == "1" else f"{counts} numbers with spaces between them")
     if min(values) < 0:
         raise NotANumber("a number of 0 or more")
@@ -152,11 +150,11 @@ def _numbers(text: str, key: str) -> list[float]:
     return values
 
 
-def _word(text: str, known: Sequence[str]) -> str:
-    found = " ".join(text.casefold().split())
-    if found not in known:
+def _word(text: str, key: str) -> str:
+    known = [str(word) for word in _KEYS[key]]
+    if text not in known:
         raise NotANumber(f"one of {listing(map(repr, known))}{did_you_mean(text, known)}")
-    return found
+    return text
 
 
 def _run_errors(
@@ -196,7 +194,7 @@ def check_notes(notes: Sequence[str]) -> None:
     """
     problems = Problems()
     for note in notes:
-        if _LINE.fullmatch(note) or read_conventions("", [note], problems) or len(problems):
+        if _ERRORS.fullmatch(note) or read_conventions("", [note], problems) or len(problems):
             raise ValueError(
                 f"the note {note!r} would be read as a statement about conventions or errors: reword it"
             )

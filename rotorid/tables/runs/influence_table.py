@@ -16,8 +16,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, make_table, must_be, read_grid
-from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.columns import Column, Source, make_table, must_be, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, UnitError
 from rotorid.tables.reader.writing import table_bytes, write_bytes
@@ -31,7 +30,7 @@ from rotorid.tables.runs.influence_comments import (
 )
 from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
 from rotorid.tables.runs.runs_table import PHASE, SPEED
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -130,11 +129,11 @@ def read_influence(
 
 
 def load_influence(
-    source: Path | Grid, phase: Phase | None, angles: Angles | None, problems: Problems
+    source: Source, phase: Phase | None, angles: Angles | None, problems: Problems
 ) -> Stored | None:
     """As `read_influence`, from a file or from the cells of a sheet, or None and problems."""
     before = len(problems)
-    grid = source if isinstance(source, Grid) else read_grid(source, "influence", problems)
+    grid = read_grid(source, "influence", problems)
     columns = () if grid is None else (*COLUMNS, *error_columns(grid, _influence_unit))
     table = None if grid is None else make_table(grid, columns, problems)
     if table is None:
@@ -340,14 +339,15 @@ def fit_to_readings(
     rows, columns = [], []
     rpm = units.SPEED["rpm"]
     for speed in trials.speeds:
-        near = int(np.argmin(np.abs(influence.speeds - speed)))
-        if not same_speed(float(influence.speeds[near]), float(speed), tolerance_percent):
-            known = listing((show_speed(float(value), rpm) for value in influence.speeds), "and")
+        near = nearest_speed(influence.speeds, float(speed), tolerance_percent)
+        if near is None:
+            known = show_speeds(influence.speeds, rpm)
             expected = (
                 f"coefficients at {show_speed(float(speed), rpm)}, as the runs table has; there are {known}"
             )
             problems.add(source, None, "speed", None, expected)
-        rows.append(near)
+        else:
+            rows.append(near)
     for sensor in trials.sensors:
         if sensor not in influence.sensors:
             known = listing(influence.sensors, "and")

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, make_table, must_be, read_table
-from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.columns import Column, Source, Table, must_be, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs.conventions import FULL_TURN, Conventions
@@ -35,7 +33,7 @@ _RUNS_NAMED, _SPEEDS_NAMED = 20, 10
 
 
 def read_runs(
-    source: str | Path | Grid, conventions: Conventions, problems: Problems
+    source: Source, conventions: Conventions, problems: Problems
 ) -> tuple[tuple[str, ...] | None, Trials | None]:
     """Read a runs table: names of its runs, and its readings without weights; None and problems.
 
@@ -48,10 +46,7 @@ def read_runs(
     problems
         Collects the complaints.
     """
-    if isinstance(source, Grid):
-        table = make_table(source, COLUMNS, problems)
-    else:
-        table = read_table(source, "runs", COLUMNS, problems)
+    table = read_table(source, "runs", COLUMNS, problems)
     if table is None:
         return None, None
     speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))

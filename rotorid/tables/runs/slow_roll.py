@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -26,40 +25,15 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.grid import Grid
-from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.toml_file import Section
-from rotorid.tables.reader.units import Unit, UnitError
+from rotorid.tables.reader.columns import Source, source_name
+from rotorid.tables.reader.key import Said
+from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.conventions import Conventions
-from rotorid.tables.runs.speeds import same_speed, show_speed
+from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
 from rotorid.tables.runs.trials import make_trials
 
 SLOW = 0.5
 """A slow-roll run faster than this share of the lowest speed of the job gets a warning."""
-_WANTED = (
-    "a table of vectors, [slow_roll.SENSOR] with amplitude and phase_deg, or a runs table of one run at slow "
-    'speed, slow_roll = "slow.csv"'
-)
-
-
-@dataclass(frozen=True)
-class VectorKeys:
-    """One section [slow_roll.SENSOR]: amplitude in `unit` (None: that of the readings), phase in degrees."""
-
-    section: Section
-    key: str
-    amplitude: float
-    phase_deg: float
-    unit: Unit | None = None
-
-
-@dataclass(frozen=True)
-class SlowRollKeys:
-    """What a job says about slow roll: a file or the cells of a sheet, or vectors by sensor."""
-
-    top: Section
-    path: Path | Grid | None
-    vectors: Mapping[str, VectorKeys]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,66 +67,16 @@ class SlowRoll:
         return np.asarray(self.vectors[np.ix_(rows, columns)])
 
 
-def take_slow_roll(top: Section, job: Path, sheet: Grid | None = None) -> SlowRollKeys | None:
-    """Take the key `slow_roll` of a job; None without it, or with a problem.
-
-    Parameters
-    ----------
-    top
-        The settings of the job; problems are noted with it.
-    job
-        Its file: a file that it names is found relative to it.
-    sheet
-        Cells of the sheet `slow_roll` of a workbook.
-    """
-    value = top.take("slow_roll")
-    if value is None:
-        return None if sheet is None else SlowRollKeys(top, sheet, {})
-    if isinstance(value, str) and not value.isprintable():
-        expected = "a file's name without control characters: write / for \\, or put it in single quotes"
-        top.complain("slow_roll", expected)
-        return None
-    if isinstance(value, str) and value.strip():
-        return SlowRollKeys(top, job.parent / value.strip(), {})
-    if not isinstance(value, dict) or not value:
-        top.complain("slow_roll", _WANTED, value=not isinstance(value, dict))
-        return None
-    vectors = {name: _read_vector(section) for name, section in top.named("slow_roll").items()}
-    return SlowRollKeys(top, None, {name: v for name, v in vectors.items() if v is not None})
-
-
-def _read_vector(section: Section) -> VectorKeys | None:
-    section.take("amplitude")  # known, so that a misspelt one gets it as a suggestion
-    keys = [key for key in section.keys if key == "amplitude" or key.startswith("amplitude_")]
-    amplitudes = {key: section.number(key, low=0.0) for key in keys}
-    phase = section.number("phase_deg", low=-360.0, high=360.0)
-    if not keys:
-        section.missing("amplitude", "the amplitude at slow speed, in the unit of the readings")
-    for key in keys[1:]:
-        section.complain(key, f"one amplitude; {keys[0]} says it already")
-    if "phase_deg" not in section:
-        section.missing("phase_deg", "the phase at slow speed, counted as the readings count it")
-    section.finish()
-    amplitude = amplitudes[keys[0]] if len(keys) == 1 else None
-    if amplitude is None or phase is None:
-        return None
-    try:
-        unit = None if keys[0] == "amplitude" else units.vibration(keys[0].removeprefix("amplitude_"))
-    except UnitError as error:
-        section.complain(keys[0], str(error))
-        return None
-    return VectorKeys(section, keys[0], amplitude, phase, unit)
-
-
 def make_slow_roll(
-    keys: SlowRollKeys, trials: Trials, conventions: Conventions, problems: Problems
+    said: Source | Mapping[str, Said], trials: Trials, conventions: Conventions, problems: Problems
 ) -> SlowRoll | None:
     """Slow-roll vectors for the sensors of a job, or None and problems.
 
     Parameters
     ----------
-    keys
-        What the job says.
+    said
+        A runs table, or by sensor `amplitude` (in its unit, or without one in that of the readings) and
+        `phase_deg`.
     trials
         Its readings, for names, units and speeds.
     conventions
@@ -161,10 +85,10 @@ def make_slow_roll(
         Collects the complaints.
     """
     before = len(problems)
-    if keys.path is not None:
-        found = _from_file(keys.path, trials, conventions, problems)
+    if isinstance(said, Mapping):
+        found: _Found | None = _from_vectors(said, trials, conventions)
     else:
-        found = _from_vectors(keys, trials, conventions)
+        found = _from_file(said, trials, conventions, problems)
     if found is None or len(problems) > before:
         return None
     vectors, speeds, given, words = found
@@ -189,42 +113,36 @@ class _Found(NamedTuple):
     warnings: tuple[str, ...] = ()
 
 
-def _from_vectors(keys: SlowRollKeys, trials: Trials, conventions: Conventions) -> _Found:
+def _from_vectors(said: Mapping[str, Said], trials: Trials, conventions: Conventions) -> _Found:
     """Vectors of the job file, for all speeds."""
     own = units.vibration(trials.labels.vibration_unit)
     vectors = np.zeros(len(trials.sensors), dtype=complex)
-    for name, vector in keys.vectors.items():
+    for name, vector in said.items():
+        amplitude, phase = vector["amplitude"], vector["phase_deg"]
         if name not in trials.sensors:
             expected = (
                 f"a sensor of the runs table, not {name!r}{did_you_mean(name, trials.sensors)}; "
                 f"its sensors are {listing(trials.sensors, 'and')}"
             )
-            keys.top.complain(f"slow_roll.{name}", expected, value=False)
-            continue
-        unit = vector.unit or own
-        if unit.kind != own.kind:
-            vector.section.complain(vector.key, _other_unit(own.name))
-            continue
-        size = np.array([unit.to_si(vector.amplitude)])
-        angle = np.array([np.radians(vector.phase_deg)])
-        vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]
-    return _Found(vectors, None, tuple(keys.vectors))
+            vector.section.refuse(expected)
+        elif amplitude is not None and phase is not None:
+            unit = amplitude.unit if amplitude.unit.name else own
+            if unit.kind != own.kind:
+                vector.section.complain(amplitude.key, _other_unit(own.name))
+                continue
+            size, angle = np.array([unit.to_si(amplitude.value)]), np.array([np.radians(phase)])
+            vectors[trials.sensors.index(name)] = conventions.labels.vibration_from(size, angle)[0]
+    return _Found(vectors, None, tuple(said))
 
 
-def _from_file(
-    path: Path | Grid, trials: Trials, conventions: Conventions, problems: Problems
-) -> _Found | None:
+def _from_file(table: Source, trials: Trials, conventions: Conventions, problems: Problems) -> _Found | None:
     """Vectors of a runs table."""
     own = Problems()  # what is wrong with the job must not hide what is wrong with this file, nor the reverse
-    runs = make_trials(path, None, conventions, None, own)
-    try:
-        own.stop()
-    except InputError as error:
-        for problem in error.problems:
-            problems.add(problem.file, problem.row, problem.column, problem.value, problem.expected)
+    runs = make_trials(table, None, conventions, None, own)
+    problems.extend(own)
+    if runs is None:
         return None
-    assert runs is not None
-    before, source = len(problems), path.source if isinstance(path, Grid) else str(path)
+    before, source = len(problems), source_name(table)
     ours, its = (units.vibration(one.labels.vibration_unit) for one in (trials, runs))
     if its.kind != ours.kind:
         problems.add(source, None, "amplitude", its.name or "no unit", _other_unit(ours.name))
@@ -263,12 +181,11 @@ def _rows(
     rows = []
     unit = units.SPEED[trials.labels.speed_unit]
     for speed in trials.speeds:
-        near = int(np.argmin(np.abs(runs.speeds - speed)))
-        if not same_speed(float(runs.speeds[near]), float(speed), conventions.speed_tolerance_percent):
-            known = listing((show_speed(float(value), unit) for value in runs.speeds), "and")
+        near = nearest_speed(runs.speeds, float(speed), conventions.speed_tolerance_percent)
+        if near is None:
             expected = (
                 f"one slow speed, whose vectors hold for all speeds, or vectors at every speed of the job: "
-                f"{show_speed(float(speed), unit)} is not among {known}"
+                f"{show_speed(float(speed), unit)} is not among {show_speeds(runs.speeds, unit)}"
             )
             problems.add(source, None, "speed", None, expected)
             break

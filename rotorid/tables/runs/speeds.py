@@ -7,6 +7,7 @@ from collections import defaultdict
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit
@@ -101,6 +102,17 @@ def _merged_words(
         f"speeds of different runs within {tolerance_percent:g} % count as one: "
         f"{'; '.join(alike[:_NAMED])}{more}",
     )
+
+
+def nearest_speed(speeds: FloatArray, speed: float, tolerance_percent: float) -> int | None:
+    """Which of some speeds counts as one with this one; None: none of them does."""
+    near = int(np.argmin(np.abs(speeds - speed)))
+    return near if same_speed(float(speeds[near]), speed, tolerance_percent) else None
+
+
+def show_speeds(speeds: FloatArray, unit: Unit) -> str:
+    """All of some speeds in the unit of a table, for messages."""
+    return listing((show_speed(float(speed), unit) for speed in speeds), "and")
 
 
 def show_speed(speed: float, unit: Unit) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from balancing.data.conventions import Labels
 from balancing.data.trials import ReadingErrors, Trials, off_axis
-from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.columns import Source
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.conventions import DEFAULT_TOLERANCE, Angles, Conventions, Phase, StatedErrors
 from rotorid.tables.runs.runs_table import read_runs
@@ -64,8 +64,8 @@ def read_trials(
 
 
 def make_trials(
-    runs: str | Path | Grid,
-    weights: str | Path | Grid | None,
+    runs: Source,
+    weights: Source | None,
     conventions: Conventions,
     errors: StatedErrors | ReadingErrors | None,
     problems: Problems,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -11,8 +10,7 @@ from rotorid.base.arrays import ComplexArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, make_table, must_be, nearest, read_table
-from rotorid.tables.reader.grid import Grid
+from rotorid.tables.reader.columns import Column, Source, must_be, nearest, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, one_of
 from rotorid.tables.runs.conventions import FULL_TURN, Conventions
@@ -38,7 +36,7 @@ class Weights:
 
 
 def read_weights(
-    source: str | Path | Grid, runs: tuple[str, ...] | None, conventions: Conventions, problems: Problems
+    source: Source, runs: tuple[str, ...] | None, conventions: Conventions, problems: Problems
 ) -> Weights | None:
     """Read a weights table, or None and problems.
 
@@ -53,10 +51,7 @@ def read_weights(
     problems
         Collects the complaints.
     """
-    if isinstance(source, Grid):
-        table = make_table(source, COLUMNS, problems)
-    else:
-        table = read_table(source, "weights", COLUMNS, problems, may_be_empty=True)
+    table = read_table(source, "weights", COLUMNS, problems, may_be_empty=True)
     if table is None:
         return None
     present = [stem for stem in ("mass", "unbalance") if stem in table]

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, csv_text, write_book, write_csv
-from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW
+from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, job_from_files, read_job, write_influence
-from rotorid.tables.job.comparison import differences
+from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.job.source import JobSource
 from rotorid.tables.job.workbook_reading import key_parts
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
@@ -206,11 +206,15 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
         "amplitude_error_percent": 2.0,
         "phase_error_deg": 0.5,
     }
-    back = there_and_back(job_from_files(files, **said), JobSource(files, **said), tmp_path / "a.xlsx")
+    back = there_and_back(
+        job_from_files(files, **said), JobSource(files, overrides=Overrides(**said)), tmp_path / "a.xlsx"
+    )
     assert (back.conventions.labels.phase, back.conventions.labels.angles) == ("lag", "against rotation")
     path = write_job(folder, PARTS["tolerance and errors"])
     job = read_job(path, amplitude_error_percent=4.0)
-    back = there_and_back(job, JobSource((path,), amplitude_error_percent=4.0), tmp_path / "b.xlsx")
+    back = there_and_back(
+        job, JobSource((path,), overrides=Overrides(amplitude_error_percent=4.0)), tmp_path / "b.xlsx"
+    )
     assert back.trials.errors.amplitude == 0.04
     assert back.trials.errors.floor == job.trials.errors.floor > 0
     stored = folder / "influence.csv"
@@ -255,9 +259,9 @@ def test_a_rotor_that_cannot_be_named_is_refused(folder, tmp_path, monkeypatch):
 
 
 NOT_KEPT = [
-    ("[planes.1]\nholes = 3\nhole_names = ['A;B', 'C', 'D']\n", "a name for each of the 3 holes"),
+    ("[planes.1]\nholes = 3\nhole_names = ['A;B', 'C', 'D']\n", "planes.1.hole_names"),
     ("[planes.1]\nholes = 2\nhole_names = ['A:', 'C']\ntaken = { 'A:' = 3 }\n", "taken"),
-    ('[planes.1]\nholes = 2\nhole_names = ["A\\u00a0B", "C"]\n', "holes.1.names"),
+    ('[planes.1]\nholes = 2\nhole_names = ["A\\u00a0B", "C"]\n', "planes.1.hole_names"),
 ]
 
 
@@ -312,6 +316,6 @@ def test_the_comparison_sees_every_part(folder):
 
 def test_too_much_for_a_workbook_is_refused(folder, tmp_path, monkeypatch):
     path = write_job(folder, "")
-    monkeypatch.setattr("rotorid.tables.job.workbook_pages.MOST_ROWS", 6)
+    monkeypatch.setattr("rotorid.tables.reader.pages.MOST_ROWS", 6)
     with pytest.raises(ValueError, match="'runs' would have 7 rows, and a workbook holds 6"):
         job_workbook_bytes(read_job(path), JobSource((path,)), tmp_path / "sheet.xlsx")

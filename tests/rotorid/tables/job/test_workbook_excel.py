@@ -11,11 +11,11 @@ import openpyxl
 import pytest
 from cases import each_of
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
+from workbook_jobs import differences
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.job.comparison import differences
 from rotorid.tables.job.source import JobSource
 from rotorid.tables.job.workbook_template import template_bytes
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
@@ -113,11 +113,11 @@ def test_the_form_has_headers_explanations_and_choices():
         "with rotation", "against rotation", "clockwise", "counter-clockwise"
     ]  # fmt: skip
     assert {"amplitude_um_pp", "amplitude_mm_s_rms", "amplitude"} <= set(choices("runs")["D1"])
-    assert choices("runs")["B1"] == ["speed_rpm", "speed_Hz", "speed_rad_s"]
+    assert choices("runs")["B1"] == ["speed_rpm", "speed_rad_s", "speed_Hz"]
     assert choices("runs")["D2:D1048576"] == (0.0, float("inf"))
     assert choices("runs")["E2:E1048576"] == (-360.0, 360.0)
     assert "mass_oz" in choices("weights")["C1"]
-    assert choices("planes")["M2:M1048576"] == ["yes", "no"]
+    assert choices("planes")["E2:E1048576"] == ["yes", "no"]
 
 
 def test_every_name_that_the_form_offers_is_known(tmp_path):

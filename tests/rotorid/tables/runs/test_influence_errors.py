@@ -336,6 +336,7 @@ def test_wrong_unit_and_missing_column(table):
 
 
 BAD_COMMENTS = [
+    ("Errors: phase_deg: 2", "# errors.KEY = VALUE with one of the keys"),
     ("errors: two percent", "# errors.KEY = VALUE with one of the keys"),
     ("errors.phase = 2", "did you mean 'phase_deg'?"),
     ("errors.phase_deg = two", "a number"),
@@ -364,7 +365,7 @@ def test_a_comment_twice(table):
 
 def test_written_by_hand(table):
     lines, read = table
-    said = read(lines, ["errors.amplitude_percent = 3", "Errors: phase_deg: 2", "errors.floor = 4"])
+    said = read(lines, ["errors.amplitude_percent = 3", "errors.phase_deg = 2", "errors.floor = 4"])
     assert (said.errors, said.error_source) == (ReadingErrors(0.03, np.radians(2.0), 2e-6), "stated")
     said = read(
         lines, ["errors.amplitude_percent = 3", "errors.run_percent = 2", "errors.degrees_of_freedom = 9"]

@@ -195,7 +195,13 @@ BAD = [
     ("amplitude = 2.0", "amplitude_mm_s = 2", "slow_roll.A.amplitude_mm_s", "2", "an amplitude in um_pp"),
     ("amplitude = 2.0", "amplitude_um_pk = 2", "slow_roll.A.amplitude_um_pk", "2", "um (peak)"),
     ("amplitude = 2.0\n", "", "slow_roll.A.amplitude", None, "the amplitude at slow speed"),
-    ("amplitude = 2.0", "amplitude = 2\namplitude_um = 1", "slow_roll.A.amplitude_um", "1", "one amplitude"),
+    (
+        "amplitude = 2.0",
+        "amplitude = 2\namplitude_um = 1",
+        "slow_roll.A.amplitude_um",
+        "1",
+        "one key of them",
+    ),
     ("phase_deg = 35\n", "", "slow_roll.A.phase_deg", None, "the phase at slow speed"),
     ("phase_deg = 35", "phase_deg = 400", "slow_roll.A.phase_deg", "400", "from -360 to 360"),
     ("phase_deg = 35", "phase_deg = 35\nspeed = 2", "slow_roll.A.speed", "2", "a known key"),
@@ -207,7 +213,7 @@ BAD = [
         'slow_roll = "a\\tslow.csv"\n',
         "slow_roll",
         "a\tslow.csv",
-        "without control characters: write /",
+        "without control characters",
     ),
     (VECTORS, 'slow_roll = " "\n', "slow_roll", " ", "a table of vectors, [slow_roll.SENSOR]"),
 ]

@@ -5,19 +5,20 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
-from rotorid.tables.job.workbook_sheets import TEXT_COLUMNS, Line
 from rotorid.tables.reader.grid import BadCell, Cell, Shown, show
 
 LONGEST_TEXT = 32767
 MOST_ROWS = 1048576
 _LONGEST_LIST = 255
-_AS_TEXT = (*TEXT_COLUMNS, "forbidden_deg", "taken", "limit")
 _WIDEST, _NARROWEST, _LOOKED_AT = 60, 9, 200
+
+Line = tuple[Cell | None, ...]
+"""A row of cells; `""` and None are blanks."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class Page:
         Its name.
     lines
         Rows of cells; rows whose first cell begins with # stand above the header.
+    names
+        Columns of names, in which `1` is text: cells that are filled in later stay as they are typed.
     explained
         Comments on cells of the header, by name of the column.
     choices
@@ -50,6 +53,7 @@ class Page:
 
     title: str
     lines: Sequence[Line]
+    names: Collection[str] = ()
     explained: Mapping[str, str] = field(default_factory=dict)
     choices: Mapping[str, Choice] = field(default_factory=dict)
     cell_choices: Mapping[tuple[int, int], Choice] = field(default_factory=dict)
@@ -81,7 +85,7 @@ def book_bytes(pages: Sequence[Page], shown: str) -> bytes:
 def header_row(lines: Sequence[Line]) -> int:
     """Row of the header, from 1: the first that is not empty and no comment; 0 without one."""
     for number, cells in enumerate(lines, start=1):
-        if any(cell != "" for cell in cells) and not show(cells[0]).startswith("#"):
+        if any(cell not in ("", None) for cell in cells) and not str(cells[0]).startswith("#"):
             return number
     return 0
 
@@ -99,7 +103,7 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
     header = page.lines[top - 1] if top else ()
     for number, cells in enumerate(page.lines, start=1):
         for place, value in enumerate(cells, start=1):
-            if value != "":
+            if value is not None and value != "":
                 cell = sheet.cell(number, place)
                 _put(cell, value, page.title)
                 if isinstance(value, str):
@@ -107,7 +111,7 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
     for place in range(1, max((len(line) for line in page.lines), default=0) + 1):
         sheet.column_dimensions[get_column_letter(place)].width = _width(page.lines, place)
     for place, name in enumerate(header, start=1):
-        if name in _AS_TEXT:  # cells that are filled in later: 1 stays a name, 1.5 and 3:10 are no date
+        if name in page.names:  # cells that are filled in later: 1 stays a name, 1.5 and 3:10 are no date
             sheet.column_dimensions[get_column_letter(place)].number_format = "@"
         cell = sheet.cell(top, place)
         cell.font, cell.fill = Font(bold=True), PatternFill("solid", fgColor="FFE6E6E6")
@@ -120,7 +124,8 @@ def _write(sheet: Any, page: Page) -> None:  # noqa: ANN401  openpyxl has no typ
 
 def _width(lines: Sequence[Line], place: int) -> float:
     """Of a column; lines of a single cell run over the cells beside it."""
-    texts = [show(line[place - 1]) for line in lines[:_LOOKED_AT] if len(line) > 1 and len(line) >= place]
+    cells = [line[place - 1] for line in lines[:_LOOKED_AT] if len(line) > 1 and len(line) >= place]
+    texts = [show(cell) for cell in cells if cell is not None]
     return min(max(_NARROWEST, *map(len, texts), 0) + 2, _WIDEST)
 
 

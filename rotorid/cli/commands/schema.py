@@ -1,0 +1,24 @@
+"""`rotorid schema`: the keys of a job file as a JSON schema, for editors."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rotorid.cli.common import command
+from rotorid.cli.output import Destination, json_text
+
+
+@command(to=("json",))
+def schema(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job.")],
+    to: Destination,  # a schema is JSON with or without --json
+) -> None:
+    """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.
+
+    Example: rotorid schema job
+    """
+    from rotorid.tables.schema import schema as schema_of
+
+    typer.echo(json_text(schema_of(kind)))

@@ -1,0 +1,165 @@
+"""Readings of a job: conventions, trial runs, stored coefficients, slow roll subtracted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import cast
+
+from balancing.coefficients.influence import Influence
+from balancing.data.conventions import Angles, Labels, Phase, Rotation, View
+from balancing.data.trials import Trials
+from rotorid.base.text import listing
+from rotorid.tables.job.job_data import Overrides
+from rotorid.tables.reader.columns import Source, source_name
+from rotorid.tables.reader.key import Said
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.runs.conventions import (
+    ANGLES,
+    ROTATIONS,
+    Conventions,
+    StatedErrors,
+    as_angles,
+    as_phase,
+    resolve_angles,
+)
+from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
+from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
+from rotorid.tables.runs.trials import make_trials
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """What the tables of a job say, with its conventions settled and slow roll subtracted.
+
+    Attributes
+    ----------
+    trials, influence, conventions
+        As in `Job`.
+    errors
+        Of a reading and from run to run, as the job or the caller states them.
+    slow_roll
+        What was subtracted, or None.
+    """
+
+    trials: Trials
+    influence: Influence | None
+    conventions: Conventions
+    errors: StatedErrors | None
+    slow_roll: SlowRoll | None
+
+
+def read_readings(
+    said: Said, tables: Mapping[str, Source], overrides: Overrides, problems: Problems
+) -> Readings | None:
+    """Read the tables of a job, or None and problems.
+
+    Parameters
+    ----------
+    said
+        All its keys.
+    tables
+        Files and sheets, by the keys that name them.
+    overrides
+        What the caller says instead.
+    problems
+        Collects the complaints.
+    """
+    _complain_about_tables(said, tables)
+    phase = cast("Phase | None", overrides.phase or said["phase"])
+    angles, clock = _angles(said, overrides)
+    errors, others = said["errors"], overriding_errors(overrides)
+    if others:
+        errors = replace(errors or StatedErrors(), **others)
+    if "runs" not in tables:
+        return None
+    # what is wrong with the planes must not hide what is wrong with the tables
+    own = problems.apart({source_name(table) for table in tables.values()})
+    found, name = None, ""
+    if "influence" in tables:
+        name = source_name(tables["influence"])
+        found = load_influence(tables["influence"], phase, angles, own)
+    words = {} if found is None else found.said
+    labels = Labels(
+        phase=phase or as_phase(words.get("phase", "lead")),
+        angles=angles or as_angles(words.get("angles", "with rotation")),
+        rotation=cast("Rotation | None", said["rotation"]),
+        view=cast("View | None", said["view"] if said["rotation"] else None),
+        clock=clock,
+    )
+    unstated = tuple(key for key, word in (("phase", phase), ("angles", angles)) if word is None)
+    conventions = Conventions(labels, said["speed_tolerance_percent"], unstated)
+    trials = make_trials(tables["runs"], tables.get("weights"), conventions, errors, own)
+    influence = None
+    if found is not None and trials is not None:
+        tolerance = conventions.speed_tolerance_percent
+        influence = fit_to_readings(found.influence, trials, tolerance, name, own)
+    problems.extend(own)
+    if trials is None or len(own) or said.section.refused:
+        return None
+    labels = conventions.on(trials.labels if influence is None else influence.labels)
+    if influence is not None:
+        influence = replace(influence, labels=labels)
+    notes = _notes(conventions, found, name)
+    trials = replace(trials, labels=labels, warnings=notes + trials.warnings)
+    vectors = tables.get("slow_roll", said["slow_roll"])
+    roll = None if vectors is None else make_slow_roll(vectors, trials, conventions, problems)
+    if roll is not None:
+        trials = subtract_slow_roll(trials, roll)
+    return Readings(trials, influence, conventions, errors, roll)
+
+
+def _complain_about_tables(said: Said, tables: Mapping[str, Source]) -> None:
+    top = said.section
+    if "check_weights" in {*top.keys, *tables} and "check" not in {*top.keys, *tables}:
+        top.complain("check_weights", 'the check runs too, check = "check.csv" (in a workbook a sheet check)')
+    if {"weights", "influence", "rotor"}.isdisjoint({*top.keys, *tables}):
+        top.missing("weights", "a weights table, or an influence table of stored coefficients, or a rotor")
+
+
+def _angles(said: Said, overrides: Overrides) -> tuple[Angles | None, bool]:
+    """With or against the rotation, None where nobody says; and whether they are called clockwise or not."""
+    top, rotation, view = said.section, said["rotation"], said["view"]
+    stated = overrides.angles or said["angles"]
+    seen = ""
+    if stated in ROTATIONS:
+        seen = f"the same end as the angles, which count {stated}"
+    elif view is not None:
+        seen = f"the {view}"
+    if seen and "rotation" not in top:
+        top.missing("rotation", f"{listing(map(repr, ROTATIONS))}, how the rotor turns, seen from {seen}")
+    if stated is None or (rotation is None and stated not in ANGLES):
+        return None, False
+    return resolve_angles(stated, rotation), stated in ROTATIONS
+
+
+def overriding_errors(overrides: Overrides) -> dict[str, float]:
+    """The errors that the caller states, by the keys of a job."""
+    given = {
+        "amplitude_percent": overrides.amplitude_error_percent,
+        "phase_deg": overrides.phase_error_deg,
+        "run_percent": overrides.run_error_percent,
+    }
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def _notes(conventions: Conventions, found: Stored | None, stored: str) -> tuple[str, ...]:
+    """What the user should know about conventions that the coefficients state, or state otherwise."""
+    phase, angles, unstated = conventions.labels.phase, conventions.labels.angles, conventions.unstated
+    adopted = []
+    if "phase" in unstated and phase != "lead":
+        adopted.append(f"phase = {phase}")
+    if "angles" in unstated and angles != "with rotation":
+        adopted.append(f"angles {angles}")
+    notes = []
+    if adopted:
+        notes.append(
+            f"nothing states the conventions of the readings: those of {stored} are used for them too, "
+            f"{' and '.join(adopted)}"
+        )
+    if found is not None and found.said.get("phase", phase) != phase:
+        notes.append(
+            f"the readings are taken with phase = {phase}, as stated, and the coefficients with "
+            f"phase = {found.said['phase']}, as {stored} says"
+        )
+    return tuple(notes)

@@ -1,0 +1,30 @@
+"""JSON schemas of settings files, for editors: their keys in all units, and what may stand there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rotorid.base.suggestions import one_of
+from rotorid.tables.job.keys import JOB
+from rotorid.tables.reader.key import Key, file_schema
+
+FILES: dict[str, tuple[str, Sequence[Key]]] = {"job": ("Job file of rotorid", JOB)}
+"""What the file is, and its keys, by the names that `rotorid schema` takes."""
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) of a kind of file.
+
+    Parameters
+    ----------
+    kind
+        One of `FILES`.
+
+    Raises
+    ------
+    ValueError
+        For another kind.
+    """
+    title, keys = FILES[one_of(kind, "schema", list(FILES))]
+    return file_schema(keys, title)
