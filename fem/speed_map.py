@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.critical import critical_speeds
+from fem.critical import lowest_critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
 from fem.solvers.roots import bracketed_root
@@ -237,16 +237,10 @@ def _with_stiffness(rotor: Rotor, chosen: list[int], value: float) -> Rotor:
 
 def _criticals(rotor: Rotor, n: int) -> FloatArray:
     """The n lowest, NaN for those that the model does not have."""
-    for m in range(n, 0, -1):
-        try:
-            found = critical_speeds(rotor, m).frequencies[:m]
-        except ValueError:
-            # Thin discs take critical speeds away; anything else is the user's to know.
-            if m == 1 or not rotor.model.gyroscopic:
-                raise
-            continue
-        return np.concatenate((found, np.full(n - found.size, np.nan)))
-    raise ValueError(f"{n} critical speeds cannot be found; choose n from 1")
+    # Thin discs take critical speeds away; anything else is the user's to know.
+    least = 1 if rotor.model.gyroscopic else n
+    found = lowest_critical_speeds(rotor, n, least).frequencies[:n]
+    return np.concatenate((found, np.full(n - found.size, np.nan)))
 
 
 def _free(at: _Criticals, lowest: float) -> FloatArray:

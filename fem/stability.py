@@ -13,8 +13,9 @@ from fem.model.rotor import Rotor
 from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.solvers.stable_speeds import Bases
-from fem.whirl import available_modes, checked_number, checked_speeds
+from fem.whirl import available_modes, checked_number
 from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.units import RPM, speed_text
 
@@ -150,7 +151,7 @@ def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
         )
     if int(steps) != steps or steps < 1:
         raise ValueError(f"the range is divided into at least one step; got {steps!r}")
-    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1))
+    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1), ascending=True)
 
 
 def searched(found: Bases | None, grows: BoolArray, whirl: Whirl) -> Stability:

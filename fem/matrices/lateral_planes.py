@@ -173,8 +173,6 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
 
 def project(P: Planes, basis: FloatArray) -> Quadratic:
     """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
-    from scipy.linalg import block_diag
-
     d, p, f = basis.shape[1], P.planes, len(P.feet)
     strain = strains(P.rotor, basis)
     flat = strain.reshape(-1, d)
@@ -189,7 +187,11 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
 
     def planes(sides: AnyArray, shaft: FloatArray, feet: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        return np.asarray(block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(feet.T.ravel())))
+        whole = np.zeros((p * (d + f), p * (d + f)), dtype=sides.dtype)
+        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]  # plane, unknown, plane, unknown
+        whole[: p * d, : p * d] = both.reshape(p * d, p * d)
+        np.fill_diagonal(whole[p * d :, p * d :], feet.T.ravel())
+        return whole
 
     along, none = np.eye(p), np.zeros((f, p))
     # What a support feels: motion of its node against the ground or the foot, in each plane.

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.matrices.lateral_planes import Planes, Quadratic, project
-from fem.solvers.full_band import Factored, WholeBand
+from fem.solvers.full_band import WholeBand
 from fem.solvers.quadratic import Solutions, polish, solve
 from fem.solvers.whirl_basis import Reference, enlarge, reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
@@ -244,19 +244,15 @@ def _true_vectors(
     out = []
     for i, (value, speed) in enumerate(zip(values, speeds, strict=True)):
         factored = band.factor(complex(value), float(speed))
-        columns = [_iterated(band, factored, Q.expand(X[i])).T]
+        left = Q.mirror(X[i])
         if not mirrored:
             reduced = value * value * Q.M + value * D[i] + stiffness[i]
-            start = np.linalg.svd(reduced.T)[2][-1].conj()
-            columns.append(_iterated(band, factored, Q.expand(start), transposed=True).T)
+            left = np.linalg.svd(reduced.T)[2][-1].conj()
+        # One step is enough: the value is known to more digits than the vector needs. Loads that do work on
+        # the left vector y, yᵀ M y*, excite the mode however damped it is; M x may not.
+        columns = [band.planes(factored.solve(band.inertia(Q.expand(left.conj())))).T]
+        if not mirrored:
+            loads = band.inertia(Q.expand(X[i].conj()))
+            columns.append(band.planes(factored.solve(loads, transposed=True)).T)
         out.append(np.hstack(columns))
     return out
-
-
-def _iterated(
-    band: WholeBand, factored: Factored, x: ComplexArray, *, transposed: bool = False
-) -> ComplexArray:
-    """Two steps of inverse iteration on the mass: one is not enough beside strongly damped modes."""
-    for _ in range(2):
-        x = band.planes(factored.solve(band.inertia(x / np.linalg.norm(x)), transposed=transposed))
-    return x
