@@ -1,30 +1,30 @@
 """Unbalance from influence coefficients: trial runs in, correction weights out."""
 
-from balancing.coefficients.combine import combine
-from balancing.coefficients.from_model import modal_shapes, model_influence
+from balancing.coefficients.coefficients_from_model import modal_shapes, model_influence
+from balancing.coefficients.combined_coefficients import combine
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence
-from balancing.correction.check import compare_check
-from balancing.correction.check_result import CheckComparison
+from balancing.correction.best_planes import Subsets, best_subsets
+from balancing.correction.check_run import compare_check
+from balancing.correction.check_run_result import CheckComparison
 from balancing.correction.correct import correct
 from balancing.correction.correction_result import Correction
 from balancing.correction.history import History, history
-from balancing.correction.refine import refine
-from balancing.correction.subsets import Subsets, best_subsets
+from balancing.correction.refine_coefficients import refine
 from balancing.correction.trade_off import TradeOff, trade_off
 from balancing.correction.verdict import Verdict, verdict_of_check, verdict_of_prediction
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors, Trials
 from balancing.iso21940 import Tolerance, tolerance
-from balancing.mounting.discrete import Discrete, solve_discrete
+from balancing.mounting.discrete_weights import Discrete, solve_discrete
 from balancing.mounting.holes import Holes, equal_holes, from_list
-from balancing.mounting.mounted import mount
-from balancing.mounting.mounted_result import Mounted
-from balancing.mounting.removal import Drill, drill_holes
+from balancing.mounting.material_removal import Drill, drill_holes
+from balancing.mounting.mount import mount
+from balancing.mounting.mount_result import Mounted
 from balancing.mounting.split import Split, split
 from balancing.solvers.conditioning import Conditioning, conditioning
-from balancing.solvers.solve import Solution, solve
+from balancing.solvers.least_squares_minmax import Solution, solve
 from balancing.trial_weight import trial_from_coefficients, trial_from_force
 from balancing.unbalance import estimate_unbalance, unbalance_of_run
 from balancing.unbalance_result import Unbalance

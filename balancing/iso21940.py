@@ -6,7 +6,7 @@ grade G in mm/s, the mass m in kg and the service speed ω in rad/s
     e_per = G/ω         (m with G in m/s; 1000 G/ω in µm, or g·mm per kg),
     U_per = m e_per     (kg·m; 1000 G m/ω in g·mm).
 
-How it is shared by two planes: `balancing.allocation`.
+How it is shared by two planes: `balancing.tolerance_allocation`.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.allocation import bearing_limits, safe_pair, transfer
+from balancing.tolerance_allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import rpm, rpm_text
 from rotorid.base.text import wrap
-from rotorid.base.units import rpm, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.coefficients.significance import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
+from balancing.coefficients.trial_effects import ENGINEERS_AMPLITUDE, ENGINEERS_PHASE
 from balancing.data.conventions import Labels
-from balancing.data.errors import reading_covariance
+from balancing.data.reading_errors import reading_covariance
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
-from balancing.trial_result import TrialWeight
+from balancing.trial_weight_result import TrialWeight
 from rotorid.base.arrays import ComplexArray
+from rotorid.base.rpm import rpm_text
 from rotorid.base.suggestions import did_you_mean
-from rotorid.base.units import rpm_text
 
 if TYPE_CHECKING:
     from balancing.coefficients.influence import Influence

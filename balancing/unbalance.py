@@ -35,7 +35,7 @@ from balancing.coefficients.influence import Influence
 from balancing.coefficients.repeatability import tail
 from balancing.coefficients.run_errors import marginal, passes_zero
 from balancing.data.conventions import Labels
-from balancing.data.errors import mean_variance, symmetric
+from balancing.data.reading_errors import mean_variance, symmetric
 from balancing.data.trials import Trials, check_names
 from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import (

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.data.columns import known, weight_columns
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import known, weight_columns
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text

@@ -71,7 +71,7 @@ def joint() -> tuple[np.ndarray, np.ndarray]:
 
 
 def run() -> list:
-    from balancing.mounting.discrete import solve_discrete
+    from balancing.mounting.discrete_weights import solve_discrete
     from balancing.mounting.holes import equal_holes, from_list
     from benchmarks.balancing_solvers import peer_python
     from benchmarks.timing import Row, best_of

@@ -89,7 +89,7 @@ def peer_python() -> Path:
 
 
 def run() -> list:
-    from balancing.solvers.solve import solve
+    from balancing.solvers.least_squares_minmax import solve
     from benchmarks.timing import Row, best_of
 
     problems = {N: problem(N, P) for N, P in SIZES}

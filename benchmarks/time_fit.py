@@ -34,7 +34,7 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.integration import taylor
-from rotorid.timedomain.models.model import OdeModel, ode_model
+from rotorid.timedomain.models.ode_model import OdeModel, ode_model
 from rotorid.timedomain.models.record import Record
 
 F_OPTIMUM = np.array([0.13999975, 11.99998962, 28.00000273])

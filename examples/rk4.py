@@ -22,7 +22,7 @@ from balancing.coefficients.run_errors import (
     run_columns,
     runs_of,
 )
-from balancing.data.errors import mean_covariance
+from balancing.data.reading_errors import mean_covariance
 from rotorid import read_job
 
 FOLDER = Path(__file__).parents[1] / "sample_data" / "rk4"

@@ -8,23 +8,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.following import followed_closely, runs_away, swings, went_above
+from fem.campbell_modes import followed_closely, runs_away, swings, went_above
 from fem.growth import Growing, growing, joined
 from fem.growth_check import growth_bound, judge
 from fem.model.rotor import Rotor, whole
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import crossings, off_synchronous
+from fem.solvers.mode_tracking import Followed
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
-from fem.solvers.tracking import Followed
 from fem.whirl import available_modes, checked_number, in_both_planes
 from fem.windows import Window, within
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import counted
-from rotorid.base.units import RPM, rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble, ignored_inertia
-from fem.matrices.pencil import TO_XY, whole_rotor
+from fem.matrices.banded_matrices import Matrices, assemble, ignored_inertia
+from fem.matrices.undamped_matrices import TO_XY, whole_rotor
 from fem.model.rotor import Rotor, whole
-from fem.modes import Modes
+from fem.modes_result import Modes
 from fem.solvers.eigen import fine_mesh_warning, finite_modes
 from fem.solvers.table_crossings import Found, TableSearch, positive_modes
 from rotorid.base.arrays import AnyArray, FloatArray

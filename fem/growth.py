@@ -10,13 +10,13 @@ import numpy as np
 
 from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.crossing import crossings, growth_rate
-from fem.solvers.quadratic import NONE
+from fem.solvers.quadratic_eigenvalues import NONE
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.whirl import in_both_planes
 from fem.windows import Window
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 
 @dataclass(frozen=True)

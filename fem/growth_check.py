@@ -7,8 +7,8 @@ import numpy as np
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
 from fem.orbits import whirl_direction
-from fem.solvers.quadratic import all_values, solve
-from fem.solvers.roots import bracketed_root
+from fem.solvers.bracketed_roots import bracketed_root
+from fem.solvers.quadratic_eigenvalues import all_values, solve
 from fem.solvers.stable_speeds import GROWTH, Bases, bases, growing_at, largest_growth, rates
 from fem.whirl import in_both_planes
 from fem.windows import Window

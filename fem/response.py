@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fem.api684_peaks import UNLIMITED, Peaks, find_peaks
 from fem.growth_check import judge
-from fem.matrices.bands import Matrices, assemble, ignored_inertia
+from fem.matrices.banded_matrices import Matrices, assemble, ignored_inertia
 from fem.model.rotor import Rotor
 from fem.model.sensors import SensorLike, as_sensor, as_sensors
-from fem.peaks import UNLIMITED, Peaks, find_peaks
-from fem.solvers.banded import rounding_warning
+from fem.response_result import BearingForces, InfluenceCoefficients, Response
 from fem.solvers.eigen import fine_mesh_warning
 from fem.solvers.receptance import Receptance, prepare
-from fem.vibration import BearingForces, InfluenceCoefficients, Response
+from fem.solvers.synchronous_banded import rounding_warning
 from rotorid.base.arrays import ComplexArray, FloatArray, read_only
 from rotorid.base.checks import checked_speeds
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from fem.critical import lowest_critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
-from fem.solvers.roots import bracketed_root
+from fem.solvers.bracketed_roots import bracketed_root
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.units import rpm_text
+from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     import pandas as pd

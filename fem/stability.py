@@ -17,7 +17,7 @@ from fem.whirl import available_modes, checked_number
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 SMALLEST = 1e-9
 """Re λ / |λ| above which a mode grows here: an undamped one has rounding there."""

@@ -30,8 +30,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fem.matrices.equations_of_motion import Motion
 from fem.matrices.massless import ZERO, eigenvalues, massive_first, scales, solved, split_by_damping
-from fem.matrices.motion import Motion
 from rotorid.base.arrays import ComplexArray, FloatArray
 
 _CHUNK = 2_000_000  # complex numbers at a time

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble, general, multiply
-from fem.matrices.pencil import whole_rotor
+from fem.matrices.banded_matrices import Matrices, assemble, general, multiply
+from fem.matrices.undamped_matrices import whole_rotor
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import number

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fem.matrices.bands import assemble
+from fem.matrices.banded_matrices import assemble
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor, whole
 from fem.orbits import DIRECTION_NAMES, whirl_direction
@@ -15,7 +15,7 @@ from fem.solvers.eigen import finite_modes
 from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -144,7 +144,7 @@ def whirl_modes(rotor: Rotor, speed: float, n: int | None = None) -> WhirlModes:
     values, x, y = in_both_planes(values, shapes)
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
     x, y = x.T / size, y.T / size
-    warnings = told(P.planes, real, still, values.size, n)
+    warnings = missing_modes(P.planes, real, still, values.size, n)
     return WhirlModes(float(speeds[0]), values, x, y, real, solution.error, rotor, warnings)
 
 
@@ -162,7 +162,7 @@ def in_both_planes(
     return np.where(values.imag < 0, values.conj(), values), x, y
 
 
-def told(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
+def missing_modes(planes: int, real: FloatArray, still: int, found: int, n: int) -> tuple[str, ...]:
     """What is not among the modes."""
     texts = []
     if found < n:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.units import RPM, speed_text
+from rotorid.base.rpm import RPM, speed_text
 
 
 @dataclass(frozen=True)

@@ -57,12 +57,12 @@ def _rotors() -> Pictures:
 
 def _balancing() -> Pictures:
     import balancing
-    from balancing.plots import polar, tolerances, trade_off_curve
+    from balancing.plots import correction_polar, tolerances, trade_off_curve
     from balancing.plots.unbalance_bars import unbalance_bars
-    from balancing.trial_result import TrialWeight
+    from balancing.trial_weight_result import TrialWeight
 
     return {
-        balancing.Correction: polar.draw_correction,
+        balancing.Correction: correction_polar.draw_correction,
         balancing.TradeOff: trade_off_curve.draw_trade_off,
         balancing.Verdict: tolerances.residuals,
         balancing.Tolerance: tolerances.tolerance_circles,
@@ -72,8 +72,8 @@ def _balancing() -> Pictures:
 
 
 def _reduction() -> Pictures:
-    from rotorid.reduction import placement_map, plots
-    from rotorid.reduction.dynamics import running, running_plots, stability
+    from rotorid.reduction import placement_plot, plots
+    from rotorid.reduction.dynamics import comparison_plots, response_comparison, stability_comparison
     from rotorid.reduction.methods_result import Methods
     from rotorid.reduction.placement_result import Placement
     from rotorid.reduction.result import Reduction
@@ -81,9 +81,9 @@ def _reduction() -> Pictures:
     return {
         Reduction: plots.plot_reduction,
         Methods: plots.plot_methods,
-        Placement: placement_map.plot_placement,
-        running.ResponseCost: running_plots.plot_running,
-        stability.StabilityCost: running_plots.plot_stability,
+        Placement: placement_plot.plot_placement,
+        response_comparison.ResponseCost: comparison_plots.plot_running,
+        stability_comparison.StabilityCost: comparison_plots.plot_stability,
     }
 
 

@@ -15,14 +15,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import hypothesis
 
-import balancing.solvers.methods
-import balancing.solvers.sampling
+import balancing.solvers.correction_methods
+import balancing.solvers.monte_carlo
 import rotorid.cli
 
 # typer makes the commands anew for every command line; once is enough for all those of a worker.
 typer.main.get_command = functools.cache(typer.main.get_command)
 
-FEWER_DRAWS = functools.partial(balancing.solvers.sampling.sampled_covariance, draws=100)
+FEWER_DRAWS = functools.partial(balancing.solvers.monte_carlo.sampled_covariance, draws=100)
 
 # The suite is the same on every machine; HYPOTHESIS_PROFILE=search looks at new examples every time.
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)
@@ -47,7 +47,7 @@ def cli(capsys, monkeypatch):
 
     Errors of weights that are drawn come from 100 draws instead of 400.
     """
-    monkeypatch.setattr(balancing.solvers.methods, "sampled_covariance", FEWER_DRAWS)
+    monkeypatch.setattr(balancing.solvers.correction_methods, "sampled_covariance", FEWER_DRAWS)
 
     def run(*args):
         monkeypatch.setattr(sys, "argv", ["rotorid", *map(str, args)])

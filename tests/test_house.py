@@ -73,7 +73,7 @@ def test_no_name_of_a_module_occurs_twice_in_a_package():
     "pattern",
     [
         r"^\s*\w+ = NDArray\[",  # array types: rotorid.base.arrays
-        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.units
+        r"\* 30(\.0)? / (np|math)\.pi|60 / \(2 \* (np|math)\.pi\)",  # rpm: rotorid.base.rpm
         r"float\(\w+\) if (np|math)\.isfinite\(\w+\) else None",  # JSON: rotorid.base.json
     ],
 )

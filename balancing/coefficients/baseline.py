@@ -16,10 +16,16 @@ from balancing.coefficients.run_errors import (
     runs_of,
 )
 from balancing.data.conventions import Labels
-from balancing.data.errors import ErrorModel, error_model, mean_covariance, reading_covariance, symmetric
+from balancing.data.reading_errors import (
+    ErrorModel,
+    error_model,
+    mean_covariance,
+    reading_covariance,
+    symmetric,
+)
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.base.units import RPM, rpm_text
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.regression import stretch
 
 SPEED_TOLERANCE = 0.005

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from balancing.coefficients.repeatability import tail
-from balancing.data.errors import error_model, mean_covariance, mean_variance
+from balancing.data.reading_errors import error_model, mean_covariance, mean_variance
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain
@@ -59,7 +59,7 @@ def convention_test(trials: Trials) -> ConventionTest:
 
     One reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other
     one fits (p > 0.01) and leaves less than half; or where the other one leaves less than a tenth, which
-    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.data.errors`; unknown ones
+    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.data.reading_errors`; unknown ones
     are taken as 2 % and 2°.
 
     Parameters

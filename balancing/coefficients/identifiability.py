@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.repeatability import tail
-from balancing.data.errors import hermitian
+from balancing.data.reading_errors import hermitian
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import RCOND, WORD_TOLERANCE
 

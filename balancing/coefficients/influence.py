@@ -15,6 +15,14 @@ from numpy.typing import NDArray
 
 from balancing.coefficients.identifiability import UndeterminedError, check_runs, refusal
 from balancing.coefficients.repeatability import describe, differences
+from balancing.coefficients.run_error_estimate import (
+    EXPLAINED,
+    corrected_row,
+    estimated,
+    given,
+    scatter,
+    spare_rows,
+)
 from balancing.coefficients.run_errors import (
     ASSUMED,
     RunColumns,
@@ -26,17 +34,9 @@ from balancing.coefficients.run_errors import (
     runs_of,
     shares_of,
 )
-from balancing.coefficients.run_likelihood import (
-    EXPLAINED,
-    corrected_row,
-    estimated,
-    given,
-    scatter,
-    spare_rows,
-)
-from balancing.coefficients.significance import check_consistency, check_effects, weak_trials
+from balancing.coefficients.trial_effects import check_consistency, check_effects, weak_trials
 from balancing.data.conventions import Labels
-from balancing.data.errors import (
+from balancing.data.reading_errors import (
     EQUAL,
     ErrorModel,
     Source,
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     import pandas as pd
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
-from rotorid.base.units import RPM
+from rotorid.base.rpm import RPM
 from rotorid.regression import gain, stretch
 
 
@@ -236,7 +236,7 @@ def estimate_influence(trials: Trials) -> Influence:
     Returns
     -------
     Influence
-        With the covariance of each channel where errors are known (rules in `balancing.data.errors`).
+        With the covariance of each channel where errors are known (rules in `balancing.data.reading_errors`).
 
     Raises
     ------

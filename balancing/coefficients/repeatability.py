@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.errors import ErrorModel, mean_variance, reading_covariance
+from balancing.data.reading_errors import ErrorModel, mean_variance, reading_covariance
 from balancing.data.trials import ReadingErrors, Trials
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.regression import stretch

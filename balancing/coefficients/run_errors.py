@@ -7,7 +7,7 @@ sensor; common to the sensors at a speed; common to the run. What is common chan
 (p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is
 common (`sample_data/rk4`): errors taken as independent then cover single planes, but not their sum.
 
-How large they are is estimated in `balancing.coefficients.run_likelihood`, which keeps what the data leave
+How large they are is estimated in `balancing.coefficients.run_error_estimate`, which keeps what the data leave
 open as points of a grid. A covariance of n numbers, with the eigenvalues λ relative to the one stated, is
 passed on with degrees of freedom ν:
 
@@ -22,7 +22,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from balancing.data.errors import inverse_root
+from balancing.data.reading_errors import inverse_root
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch
 

@@ -9,11 +9,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from balancing.coefficients.alike_planes import check_resolution
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import UndeterminedError, check_planes
 from balancing.coefficients.influence import Influence
-from balancing.correction.choice import plane_indices, rows_of
+from balancing.coefficients.unresolved_planes import check_resolution
+from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
 from balancing.correction.correction_warnings import (
     EMPTY,
@@ -23,14 +23,14 @@ from balancing.correction.correction_warnings import (
     notes,
     reading_names,
 )
-from balancing.correction.counsel import Stakes, coarse, judged, remedies
+from balancing.correction.mount_decision import Stakes, coarse, judged, remedies
 from balancing.correction.region_coverage import optimism, uncertain
-from balancing.correction.stack_errors import stack_errors
+from balancing.correction.selected_planes import plane_indices, rows_of
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.solvers.conditioning import conditioning
+from balancing.solvers.correction_methods import Fitted, Stack, fit_weights
 from balancing.solvers.error_propagation import region_radius as region_radius
-from balancing.solvers.methods import Fitted, Stack, fit_weights
 from rotorid.base.arrays import ComplexArray
 
 
@@ -92,7 +92,7 @@ def correct(  # noqa: PLR0913
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
         stated or measured errors by a χ² test at 95 % (`balancing.coefficients.identifiability`). Errors that
-        are assumed refuse nothing (`Correction.counsel` tells what they mean): the digits of the readings do,
+        are assumed refuse nothing (`Correction.decision` tells what they mean): the digits of the readings do,
         or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
@@ -175,13 +175,13 @@ def correct(  # noqa: PLR0913
     )
     std, factor = result.mass_std, result.coverage_factor
     widths = None if std is None or factor is None else factor * std
-    result = replace(result, counsel=judged(stakes, D, widths, soft=soft, remove=remove))
+    result = replace(result, decision=judged(stakes, D, widths, soft=soft, remove=remove))
     warnings, words = influence.warnings + start.warnings, influence.notes
-    if result.counsel.word == "mount":
+    if result.decision.word == "mount":
         warnings += unclear + unclear_regions + fitted.warnings + cautions(result, felt, alike=not unclear)
         warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
         words += notes(result) + coarse(influence)
-    else:  # the counsel says what these would
+    else:  # the decision says what these would
         warnings = tuple(w for w in warnings if w not in influence.contradictions)
         warnings += fitted.warnings + cautions(result, felt, alike=False, rising=False)
     return _with_words(result, warnings, words)

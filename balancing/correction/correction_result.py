@@ -10,10 +10,13 @@ import numpy as np
 
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
+from balancing.correction.convention_assumptions import OtherReading, assumptions, contradiction
 from balancing.correction.correction_words import error_document, error_words, method_words
-from balancing.correction.counsel import Counsel
-from balancing.correction.other_readings import OtherReading, assumptions, contradiction
-from balancing.data.columns import (
+from balancing.correction.mount_decision import MountDecision
+from balancing.data.conventions import Labels
+from balancing.data.limits import Limits
+from balancing.data.reading_errors import Source
+from balancing.data.result_columns import (
     covariance_column,
     degrees,
     known,
@@ -24,9 +27,6 @@ from balancing.data.columns import (
     weight_columns,
     weight_rows,
 )
-from balancing.data.conventions import Labels
-from balancing.data.errors import Source
-from balancing.data.limits import Limits
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-DUST = 1e-12
+ROUNDING = 1e-12
 """Predicted amplitudes below this share of the largest one before are rounding."""
 INVISIBLE = 1e-9
 """Those below this share are zero to a reader."""
@@ -77,7 +77,7 @@ class Correction:
     rank
         Number of planes whose weights the readings determine (all, or `correct` raises).
     method
-        Of `balancing.solvers.methods`: one of `METHODS` or `VARIANTS`.
+        Of `balancing.solvers.correction_methods`: one of `METHODS` or `VARIANTS`.
     mounted
         Run, planes and weights (all planes of the runs) mounted in the last run; None if there were none.
     labels
@@ -105,7 +105,7 @@ class Correction:
         What the runs say about the relation of phases to angles; None: they were not asked.
     others
         What the same numbers give if a convention that is assumed is otherwise.
-    counsel
+    decision
         Whether to mount the weights, and what to do instead.
     """
 
@@ -140,7 +140,7 @@ class Correction:
     remove: tuple[str, ...] = ()
     convention_test: ConventionTest | None = None
     others: tuple[OtherReading, ...] = ()
-    counsel: Counsel = field(default_factory=Counsel)
+    decision: MountDecision = field(default_factory=MountDecision)
 
     @property
     def plane_covariance(self) -> FloatArray | None:
@@ -222,7 +222,7 @@ class Correction:
         new = np.array(residuals[4].values)
         return plain(
             {
-                "judgement": self.counsel.to_dict(self.labels),
+                "judgement": self.decision.to_dict(self.labels),
                 "method": self.method,
                 "conventions": self.labels.conventions(),
                 "corrections_refer_to": "the bare rotor, with every weight of the runs removed",
@@ -281,7 +281,7 @@ class Correction:
         test = self.convention_test
         contradicted = 0 if test is None else len(contradiction(test, self.labels))
         blocks = [
-            "\n".join(wrap(line, "  ") for line in self.counsel.lines()),
+            "\n".join(wrap(line, "  ") for line in self.decision.lines()),
             *(wrap(f"Warning: {w}", "  ") for w in self.warnings[:contradicted]),
             wrap(" ".join(assumptions(self.labels, test, self.others))),
             *(wrap(f"Warning: {w}", "  ") for w in self.warnings[contradicted:]),
@@ -308,7 +308,7 @@ class Correction:
 
     def _residual_columns(self) -> tuple[Column, ...]:
         return (
-            *self.vibration_columns(DUST),
+            *self.vibration_columns(ROUNDING),
             covariance_column(self.labels, "after_covariance", self.after_covariance, self.before.size),
         )
 
@@ -448,7 +448,7 @@ class Correction:
         old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
         before = f"rms {three_figures(rms(old))}"
         checked = None if self.check_rms is None else figures(self.check_rms * scale, 2)
-        if new.max() <= DUST * old.max():
+        if new.max() <= ROUNDING * old.max():
             if checked is None:
                 return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
             return f"{before} → below {checked} in 95 of 100 check runs"

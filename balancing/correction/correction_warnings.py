@@ -11,11 +11,11 @@ from balancing.coefficients.influence import Influence
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.units import rpm_text
+from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
-    from balancing.solvers.methods import Fitted, Stack
+    from balancing.solvers.correction_methods import Fitted, Stack
 
 
 ILL_CONDITIONED = 30.0

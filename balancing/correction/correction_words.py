@@ -9,9 +9,9 @@ import numpy as np
 from balancing.coefficients.baseline import describe_errors
 from balancing.coefficients.run_errors import RunErrors
 from balancing.data.conventions import Labels
-from balancing.data.errors import Source
+from balancing.data.reading_errors import Source
 from balancing.data.trials import ReadingErrors
-from balancing.solvers.methods import METHODS, VARIANTS
+from balancing.solvers.correction_methods import METHODS, VARIANTS
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
 from rotorid.base.text import capital, figures
@@ -29,7 +29,7 @@ _SOURCES = {
 
 
 def method_words(name: str, *, weighted: bool) -> str:
-    """What a method of `balancing.solvers.methods` makes small; `weighted`: readings count differently."""
+    """What a method of `balancing.solvers.correction_methods` makes small; `weighted`: readings count differently."""
     every: tuple[Method[Any], ...] = (*METHODS, *VARIANTS)
     method = find(every, name, "method")
     about = method.about.replace("amplitude", "weighted amplitude") if weighted else method.about

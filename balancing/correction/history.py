@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.coefficients.baseline import match_speeds
-from balancing.correction.refine import runs_and_weights, sensors_in
-from balancing.data.columns import known, mounted_rows
+from balancing.correction.refine_coefficients import runs_and_weights, sensors_in
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
+from balancing.data.result_columns import known, mounted_rows
 from balancing.data.trials import Trials
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import figures, table, wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

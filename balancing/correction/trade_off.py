@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
-from balancing.correction.subsets import Criterion, criterion_words
-from balancing.data.columns import three_figures, weight_rows
+from balancing.correction.best_planes import Criterion, criterion_words
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import three_figures, weight_rows
 from balancing.solvers.conditioning import check_stack
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 KNEE = 3.0
 """A point is a knee where weight does on average at least so many times as much before it as behind it."""
-DUST = 1e-6
+ROUNDING = 1e-6
 """A weight below this share of the total is what the solver leaves of zero."""
 
 
@@ -196,7 +196,7 @@ def trade_off(
     while 1 < len(found) < points:
         place, budget = _longest([t for t, _, _ in found], [v for _, v, _ in found])
         D = solve_cone(problem(K, y, w, minmax=criterion == "max", budget=budget)).weights
-        D = np.where(np.abs(D) > DUST * budget, D, 0.0)
+        D = np.where(np.abs(D) > ROUNDING * budget, D, 0.0)
         found.insert(place, (budget, objective(D), D))
     return _result(planes, K, y, found, criterion, labels or Labels(), weighted=bool(np.ptp(w) > 0))
 

@@ -1,6 +1,6 @@
 """Verdict of a balance per plane and sensor: pass, fail, or not decidable with these readings.
 
-One value with errors against one limit: `balancing.correction.judgement`.
+One value with errors against one limit: `balancing.correction.limit_check`.
 
 Residual unbalance from a check run: with the coefficients W of the planes, the vibration Y that is left is
 that of the weights û with W û = Y in the least-squares sense, û = W⁺ Y; what would have to be added is −û.
@@ -20,20 +20,20 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.baseline import match_speeds, starting_point
 from balancing.coefficients.identifiability import check_planes
 from balancing.coefficients.influence import Influence
-from balancing.correction.choice import plane_indices
+from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
 from balancing.correction.correction_warnings import reading_names
-from balancing.correction.judgement import Judgement, Word, judge, judge_unbalance
-from balancing.correction.stack_errors import stack_errors
+from balancing.correction.limit_check import Judgement, Word, judge, judge_unbalance
+from balancing.correction.selected_planes import plane_indices
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
-from balancing.solvers.methods import Stack, fit_weights
+from balancing.solvers.correction_methods import Stack, fit_weights
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import rpm
 from rotorid.base.text import wrap
-from rotorid.base.units import rpm
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.units import RPM
+from rotorid.base.rpm import RPM
 
 
 @dataclass(frozen=True)

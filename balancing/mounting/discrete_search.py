@@ -1,6 +1,6 @@
 """Branch and bound over planes for the joint discrete problem (sphere decoding).
 
-The form q (`balancing.mounting.discrete_relax.Form`) is triangular: with the planes of the last columns
+The form q (`balancing.mounting.discrete_bounds.Form`) is triangular: with the planes of the last columns
 fixed, the next one adds |R_kk|² |D_k − c_k|² and its linear term, and the planes before it at least their m.
 So only vectors in a disc around a known point can lead to something better than what is known; they are
 looked up in rings around it, nearest first, and the disc shrinks with every better mounting. What time leaves
@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from balancing.mounting.attainable import MOST, Attainable, apart
-from balancing.mounting.discrete_relax import Form
+from balancing.mounting.discrete_bounds import Form
+from balancing.mounting.mountable_vectors import MOST, Attainable, apart
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
 __all__ = ["Found", "Squares", "polish", "search"]

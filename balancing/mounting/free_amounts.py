@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from balancing.mounting.attainable import (
+from balancing.mounting.holes import WIDEST, Holes, Mounting, mounting
+from balancing.mounting.mountable_vectors import (
     DIRECTIONS,
     NOTHING,
     SAME,
@@ -18,7 +19,6 @@ from balancing.mounting.attainable import (
     nearest_allowed,
     places,
 )
-from balancing.mounting.holes import WIDEST, Holes, Mounting, mounting
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 
 __all__ = ["FreeAmounts"]

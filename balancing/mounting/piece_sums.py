@@ -18,7 +18,8 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from balancing.mounting.attainable import (
+from balancing.mounting.holes import Holes, Mounting, mounting
+from balancing.mounting.mountable_vectors import (
     DIRECTIONS,
     SAME,
     apart,
@@ -28,7 +29,6 @@ from balancing.mounting.attainable import (
     nearest_allowed,
     places,
 )
-from balancing.mounting.holes import Holes, Mounting, mounting
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, IntArray
 
 __all__ = ["LONGEST", "PieceSums"]

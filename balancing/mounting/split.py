@@ -8,7 +8,7 @@ rounded answer of the continuous problem, and `bound`, the error with free amoun
 of each hole, says how much better anything could be.
 
 This minimises the error of one weight. What is left of the vibration is minimised over all planes together in
-`balancing.mounting.discrete`.
+`balancing.mounting.discrete_weights`.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from balancing.data.conventions import Labels
-from balancing.mounting.attainable import Attainable, nearest
 from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.mountable_vectors import Attainable, nearest
 from balancing.mounting.piece_sums import PieceSums
 from rotorid.base.text import percent
 

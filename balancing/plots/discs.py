@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.correction.correction_result import Correction
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
 
 _HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.66, 1.11, 1.25, 1.8, 1.6
 _LARGEST = 0.13

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from balancing.plots.polar import MARKERS, corrections, polar_axes
-from rotorid.base.style import COLORS
+from balancing.plots.correction_polar import MARKERS, corrections, polar_axes
+from rotorid.base.plot_style import COLORS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
     from balancing.correction.verdict import Verdict
     from balancing.iso21940 import Tolerance
-    from balancing.trial_result import TrialWeight
+    from balancing.trial_weight_result import TrialWeight
 
 _GRAM_MM = 1e6
 

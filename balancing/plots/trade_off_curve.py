@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from balancing.plots.polar import MARKERS
-from rotorid.base.style import COLORS
+from balancing.plots.correction_polar import MARKERS
+from rotorid.base.plot_style import COLORS
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:

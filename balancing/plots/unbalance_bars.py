@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.style import BLUE
+from rotorid.base.plot_style import BLUE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

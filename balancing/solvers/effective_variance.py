@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_planes
 from balancing.coefficients.repeatability import tail
-from balancing.data.errors import mean_variance
+from balancing.data.reading_errors import mean_variance
 from balancing.solvers.conditioning import check_channels, check_stack
 from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.likelihood import (

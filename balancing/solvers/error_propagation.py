@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from balancing.data.errors import hermitian, symmetric
+from balancing.data.reading_errors import hermitian, symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import gain, stretch
 

@@ -30,7 +30,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from balancing.data.errors import inverse_root, symmetric
+from balancing.data.reading_errors import inverse_root, symmetric
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.coefficients.identifiability import check_effect, scaled_columns, separation
-from balancing.data.errors import symmetric
+from balancing.data.reading_errors import symmetric
 from balancing.solvers.conditioning import check_channels, check_stack
 from balancing.solvers.error_propagation import error_form, real_jacobian
 from rotorid.base.arrays import ComplexArray, FloatArray

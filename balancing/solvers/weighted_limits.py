@@ -25,7 +25,7 @@ from balancing.solvers import likelihood
 from balancing.solvers.certificate import Problem
 from balancing.solvers.cone import problem
 from balancing.solvers.cone_program import InfeasibleError, quadratic_minimum
-from balancing.solvers.sectors import allowed_sectors, meets
+from balancing.solvers.forbidden_angles import allowed_sectors, meets
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.regression import stretch, unstretch
 

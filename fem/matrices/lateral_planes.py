@@ -1,6 +1,6 @@
 """The rotor in both planes: matrices of its equations of motion in any basis of the shaft.
 
-With single-plane matrices M, B, G, K of the shaft (see `fem.matrices.bands`) and the speed Ω,
+With single-plane matrices M, B, G, K of the shaft (see `fem.matrices.banded_matrices`) and the speed Ω,
 
     x:  M x'' + B x' + Ω G y' + K x + Ω B y + supports = 0
     y:  M y'' + B y' − Ω G x' + K y − Ω B x + supports = 0
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble, multiply
+from fem.matrices.banded_matrices import Matrices, assemble, multiply
 from fem.matrices.strain import strains
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray, IndexArray
@@ -37,7 +37,7 @@ class Planes:
         Unknown of the deflection at each support, from 0, shape (s,).
     feet
         Which supports stand on a pedestal, shape (f,).
-    foot_mass, foot_stiffness, foot_damping
+    pedestal_mass, pedestal_stiffness, pedestal_damping
         Of the pedestals, shapes (f, planes).
     tilting
         (unknown of a slope, N·m/rad) for each support that holds the slope.
@@ -48,9 +48,9 @@ class Planes:
     planes: int
     rows: IndexArray
     feet: IndexArray
-    foot_mass: FloatArray
-    foot_stiffness: FloatArray
-    foot_damping: FloatArray
+    pedestal_mass: FloatArray
+    pedestal_stiffness: FloatArray
+    pedestal_damping: FloatArray
     tilting: tuple[tuple[int, float], ...]
 
     def supports(self, speeds: FloatArray) -> tuple[AnyArray, AnyArray]:
@@ -129,7 +129,7 @@ class Quadratic:
         """Reduced vectors (…, R) with y reversed; a complex coordinate stays as it is."""
         if self.P.planes == 1:
             return vectors
-        d, f = self.basis.shape[1], len(self.P.feet)
+        d, f = self.basis.shape[1], len(self.P.pedestals)
         out = vectors.copy()
         out[..., d : 2 * d] *= -1
         out[..., 2 * d + f :] *= -1
@@ -162,9 +162,9 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
         planes=p,
         rows=np.array([A.stride * (s.node - 1) for s in supports], dtype=np.intp),
         feet=np.array([i for i, _ in stands], dtype=np.intp),
-        foot_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
-        foot_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
-        foot_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
+        pedestal_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
+        pedestal_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
+        pedestal_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
         tilting=tuple(
             (A.stride * (s.node - 1) + 1, s.tilting_stiffness) for s in supports if s.tilting_stiffness > 0
         ),
@@ -173,7 +173,7 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
 
 def project(P: Planes, basis: FloatArray) -> Quadratic:
     """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
-    d, p, f = basis.shape[1], P.planes, len(P.feet)
+    d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
     flat = strain.reshape(-1, d)
     damped = (np.sqrt(P.rotor.material_damping)[:, None] * strain).reshape(-1, d)
@@ -198,15 +198,15 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
     felt = np.zeros((len(P.rows), p, p * (d + f)))
     for plane in range(p):
         felt[:, plane, plane * d : (plane + 1) * d] = basis[P.rows]
-        felt[P.feet, plane, p * d + plane * f + np.arange(f)] = -1.0
+        felt[P.pedestals, plane, p * d + plane * f + np.arange(f)] = -1.0
     ties = np.einsum("sia,sjb->sijab", felt, felt).reshape(-1, felt.shape[2] ** 2)
     return Quadratic(
         P=P,
         basis=basis,
-        M=planes(along, M, P.foot_mass),
-        D0=planes(along, B, P.foot_damping),
+        M=planes(along, M, P.pedestal_mass),
+        D0=planes(along, B, P.pedestal_damping),
         D1=planes(across, G, none),
-        K0=planes(along, K, P.foot_stiffness),
+        K0=planes(along, K, P.pedestal_stiffness),
         K1=planes(across, B, none),
         ties=ties,
     )

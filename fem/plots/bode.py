@@ -12,7 +12,7 @@ from fem.model.sensors import label
 from fem.plots.drawing import draw_rotor
 from fem.windows import Window, within
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.style import (
+from rotorid.base.plot_style import (
     BOX,
     DARK,
     MARKERS,
@@ -26,7 +26,7 @@ from rotorid.base.style import (
     shade_operating,
     shade_unstable,
 )
-from rotorid.base.units import RPM
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.ticker import MultipleLocator
 
     from fem.model.rotor import Rotor
-    from fem.vibration import InfluenceCoefficients, Response
+    from fem.response_result import InfluenceCoefficients, Response
 
 
 def draw_response(

@@ -10,7 +10,7 @@ import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import (
+from rotorid.base.plot_style import (
     BOX,
     COLORS,
     QUIET,
@@ -24,7 +24,7 @@ from rotorid.base.style import (
     shade_operating,
     shade_unstable,
 )
-from rotorid.base.units import RPM
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from fem.model.rotor import Disc, Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.model.supports import KINDS
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, DARK, QUIET, legend_above, new_axes, note
+from rotorid.base.plot_style import COLORS, DARK, QUIET, legend_above, new_axes, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ import numpy as np
 
 from fem.plots.drawing import EDGE, draw_rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import legend_above, look, new_axes
-from rotorid.base.units import RPM
+from rotorid.base.plot_style import legend_above, look, new_axes
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from fem.modes import Modes
+    from fem.modes_result import Modes
 
 
 def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:

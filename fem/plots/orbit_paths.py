@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fem.orbits import DIRECTION_NAMES, orbits
-from rotorid.base.style import COLORS, STYLES, legend_above, new_axes, plain
+from rotorid.base.plot_style import COLORS, STYLES, legend_above, new_axes, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,15 +10,15 @@ import numpy as np
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.plots.bode import draw_bode, draw_polar
 from fem.plots.orbit_paths import draw_orbits
-from rotorid.base.style import on_figure
-from rotorid.base.units import RPM
+from rotorid.base.plot_style import on_figure
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fem.peaks import Peaks
-    from fem.vibration import Response
+    from fem.api684_peaks import Peaks
+    from fem.response_result import Response
 
 
 def bode_figure(

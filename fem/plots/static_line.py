@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.style import new_axes
+from rotorid.base.plot_style import new_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem.matrices.lateral_planes import Quadratic
-from fem.solvers.quadratic import polish, solve
+from fem.solvers.bracketed_roots import bracketed_root
+from fem.solvers.mode_tracking import likeness, mass_weight, plain
+from fem.solvers.quadratic_eigenvalues import polish, solve
 from fem.solvers.reduced_whirl import Whirl, enriched
-from fem.solvers.roots import bracketed_root
-from fem.solvers.tracking import likeness, mass_weight, plain
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray
 
 _ROUGH = 1e-8  # of a bracket: to which a root is known before its last digits

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, dense, multiply, rounding_error
-from fem.matrices.pencil import NO_MASS, Pencil, one_plane, orthonormal_rigid
+from fem.matrices.banded_matrices import Matrices, dense, multiply, rounding_error
+from fem.matrices.undamped_matrices import NO_MASS, Pencil, one_plane, orthonormal_rigid
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import AnyArray, FloatArray
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fem.matrices.bands import multiply
+from fem.matrices.banded_matrices import multiply
 from fem.matrices.lateral_planes import Planes
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
@@ -63,8 +63,10 @@ class WholeBand:
         P = self.P
         K, C = P.supports(np.array([speed]))
         k = K[0] + value * C[0]
-        for j, i in enumerate(P.feet):
-            stand = np.diag(P.foot_stiffness[j] + value * P.foot_damping[j] + value**2 * P.foot_mass[j])
+        for j, i in enumerate(P.pedestals):
+            stand = np.diag(
+                P.pedestal_stiffness[j] + value * P.pedestal_damping[j] + value**2 * P.pedestal_mass[j]
+            )
             k[i] = k[i] - k[i] @ np.linalg.solve(k[i] + stand, k[i])
         return np.asarray(k)
 

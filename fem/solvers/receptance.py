@@ -1,10 +1,10 @@
 """Response to forces that rotate with the rotor, per unit of force.
 
-The fast way takes the receptance of the conservative rotor on reference springs (`fem.matrices.pencil`) from
+The fast way takes the receptance of the conservative rotor on reference springs (`fem.matrices.undamped_matrices`) from
 its lowest modes, adds the static contribution of all others as a power series in ω², and brings in what the
 supports do besides as a change of low rank: one per supported node, two where forward and backward whirl are
 coupled. A bound on what the series leaves out decides how long it must be. The exact way is
-`fem.solvers.banded`; it takes over where the fast one loses digits.
+`fem.solvers.synchronous_banded`; it takes over where the fast one loses digits.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, multiply
-from fem.matrices.dynamic_stiffness import Supported, supported
-from fem.matrices.pencil import Pencil, one_plane
+from fem.matrices.banded_matrices import Matrices, multiply
+from fem.matrices.support_dynamic_stiffness import Supported, supported
+from fem.matrices.undamped_matrices import Pencil, one_plane
 from fem.model.rotor import Rotor
-from fem.solvers.banded import solve_banded
 from fem.solvers.eigen import DENSE, Spectrum, factor, finite_modes, lowest_modes, rigid_scale
+from fem.solvers.synchronous_banded import solve_banded
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
 TOLERANCE = 1e-10  # of the series, relative to the response

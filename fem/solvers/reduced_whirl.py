@@ -16,7 +16,7 @@ import numpy as np
 
 from fem.matrices.lateral_planes import Planes, Quadratic, project
 from fem.solvers.full_band import WholeBand
-from fem.solvers.quadratic import Solutions, polish, solve
+from fem.solvers.quadratic_eigenvalues import Solutions, polish, solve
 from fem.solvers.whirl_basis import Reference, enlarge, reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 
@@ -194,7 +194,7 @@ def _differ(all_found: ComplexArray, improved: ComplexArray) -> BoolArray:
 
 def _padded(Q: Quadratic, X: ComplexArray) -> ComplexArray:
     """Vectors of a basis in a larger one that begins with it."""
-    p, d, f = Q.P.planes, Q.basis.shape[1], len(Q.P.feet)
+    p, d, f = Q.P.planes, Q.basis.shape[1], len(Q.P.pedestals)
     old = X.shape[-1] // p - f
     if old == d:
         return X.copy()

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem.matrices.lateral_planes import Planes, Quadratic, project
-from fem.solvers.quadratic import all_values
+from fem.solvers.quadratic_eigenvalues import all_values
 from fem.solvers.whirl_basis import reference, starting_vectors, vectors
 from rotorid.base.arrays import AnyArray, BoolArray, ComplexArray, FloatArray, IndexArray
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.matrices.bands import Matrices, assemble
-from fem.matrices.pencil import Pencil, static_stiffness, whole_rotor
+from fem.matrices.banded_matrices import Matrices, assemble
+from fem.matrices.undamped_matrices import Pencil, static_stiffness, whole_rotor
 from fem.model.rotor import Rotor
+from fem.solvers.bracketed_roots import bracketed_root
 from fem.solvers.eigen import finite_modes, lowest_modes
-from fem.solvers.roots import bracketed_root
 from rotorid.base.arrays import AnyArray, FloatArray
 
 _STEP = 1e-5  # of an interval, for a slope

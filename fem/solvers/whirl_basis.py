@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.matrices.bands import assemble, multiply
+from fem.matrices.banded_matrices import assemble, multiply
 from fem.matrices.lateral_planes import Planes
 from fem.model.rotor import Rotor
 from fem.model.supports import Support
@@ -50,8 +50,8 @@ def reference(P: Planes, speeds: FloatArray, m: int) -> Reference:
         floor = 1e-6 * max(float(np.abs(direct).max()), np.finfo(float).tiny)
         direct = np.exp(np.log(np.maximum(direct, floor)).mean(axis=(0, 2)))
         direct[direct < 2 * floor] = 0.0
-        for j, i in enumerate(P.feet):
-            stand = P.foot_stiffness[j].mean()
+        for j, i in enumerate(P.pedestals):
+            stand = P.pedestal_stiffness[j].mean()
             direct[i] = direct[i] * stand / (direct[i] + stand)
     supports = [
         Support(s.node, float(k), tilting_stiffness=s.tilting_stiffness)

@@ -18,7 +18,7 @@ from rotorid.cli.progress import busy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from rotorid.workflows.outcome import Outcome
+    from rotorid.workflows.result_provenance import Outcome
 
 _R = TypeVar("_R", bound="Outcome")
 PICTURES = (".png", ".svg", ".pdf")
@@ -75,7 +75,7 @@ class Destination:
         """
         from rotorid.cli.verbose import note
         from rotorid.tables.reader.problems import printable
-        from rotorid.tables.reader.writing import table_bytes, write_files
+        from rotorid.tables.reader.table_writing import table_bytes, write_files
 
         plot, output = self.plot, self.output
         files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = [

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.identification import identify
-from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator_equations import harmonic_model
+from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.result import FoundCombination, Identification
 
 __all__ = [

@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.natural import mode_slopes, natural_modes, nearest_mode
+from rotorid.harmonic.natural_frequencies import mode_slopes, natural_modes, nearest_mode
+from rotorid.harmonic.operator_model import HarmonicModel
 
 THIN = 0.01
 """An error ellipse is at least this share as thin as long: no direction of a reading is exact."""

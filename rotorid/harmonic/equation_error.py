@@ -11,22 +11,22 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import listing
-from rotorid.harmonic.elimination import System
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import combination_words, ratio_words
-from rotorid.harmonic.influence import leave_one_out
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.leave_one_out import leave_one_out
+from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_error import output_error
-from rotorid.harmonic.plausibility import doubts, what_more_can_tell
-from rotorid.harmonic.polynomial import ONE, Polynomial
-from rotorid.harmonic.recovery import (
+from rotorid.harmonic.parameter_combinations import combination_words, ratio_words
+from rotorid.harmonic.parameter_recovery import (
     Recovery,
     only_determined,
     recover,
     undetermined_parameters,
 )
+from rotorid.harmonic.plausibility import doubts, what_more_can_tell
+from rotorid.harmonic.polynomial import ONE, Polynomial
+from rotorid.harmonic.polynomial_solutions import System
+from rotorid.harmonic.regression_rows import Rows, build_rows, row_covariance, whiten
 from rotorid.harmonic.result import FoundCombination, Identification
-from rotorid.harmonic.rows import Rows, build_rows, row_covariance, whiten
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate, echelon
 from rotorid.regression.nonlinear import NonlinearEstimate

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 
 @dataclass(frozen=True)

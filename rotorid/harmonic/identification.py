@@ -11,11 +11,11 @@ from rotorid.base.registry import Method, find
 from rotorid.base.text import listing
 from rotorid.harmonic.equation_error import Bounds, equation_error, limits
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.hidden import hidden_outputs, without
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_identification import identify_outputs
+from rotorid.harmonic.regression_rows import ask_about_case
 from rotorid.harmonic.result import Identification
-from rotorid.harmonic.rows import ask_about_case
+from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 
 Identify = Callable[
     [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None], Identification

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from rotorid.harmonic.features import CONSTANT, NAME, Feature, P, exact_number, split_features
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.operator_model import HarmonicModel
+from rotorid.harmonic.parameter_combinations import CONSTANT, NAME, Feature, P, exact_number, split_features
 from rotorid.harmonic.polynomial import Polynomial, difference
 
 

@@ -25,8 +25,8 @@ from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import counted
 from rotorid.harmonic.comparison import Comparison, compare
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.model import HarmonicModel
-from rotorid.harmonic.starting import starting_values
+from rotorid.harmonic.operator_model import HarmonicModel
+from rotorid.harmonic.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 

@@ -10,14 +10,14 @@ import numpy as np
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.equation_error import LinearFit, limits, linear_fit, reasons
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.hidden import hidden_outputs, without
-from rotorid.harmonic.influence import leave_one_out
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.leave_one_out import leave_one_out
+from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_error import OutputError, output_error
+from rotorid.harmonic.parameter_recovery import only_determined, why_several
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
-from rotorid.harmonic.recovery import only_determined, why_several
 from rotorid.harmonic.result import FoundCombination, Identification
-from rotorid.harmonic.starting import starting_values
+from rotorid.harmonic.starting_values import starting_values
+from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
 

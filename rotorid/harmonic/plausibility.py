@@ -10,8 +10,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.features import multipliers
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.operator_model import HarmonicModel
+from rotorid.harmonic.parameter_combinations import multipliers
 from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate

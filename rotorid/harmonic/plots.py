@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.style import COLORS
+from rotorid.base.plot_style import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.model import HarmonicModel
+from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict
 
 if TYPE_CHECKING:

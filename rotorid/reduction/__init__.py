@@ -1,22 +1,26 @@
 """A rotor as a few masses: equivalent masses by regression, and how well the small model behaves."""
 
-from rotorid.reduction.dynamics.running import ResponseCost, compare_response
-from rotorid.reduction.dynamics.small import SmallRotor, small_rotor
-from rotorid.reduction.dynamics.stability import StabilityCost, compare_stability
-from rotorid.reduction.dynamics.threshold import stability_threshold
-from rotorid.reduction.equivalent.masses import design, equivalent_masses
-from rotorid.reduction.equivalent.matching import matching_masses
-from rotorid.reduction.equivalent.sensitivity import InputErrors, mass_sensitivity
-from rotorid.reduction.equivalent.separated import Separated, separate, separated_compliance
-from rotorid.reduction.equivalent.shift import Shift
-from rotorid.reduction.equivalent.trading import TradeOff, trade_off
-from rotorid.reduction.equivalent.uncertainty import MassUncertainty, mass_uncertainty
-from rotorid.reduction.equivalent.vibration import mac, natural_frequencies
+from rotorid.reduction.dynamics.instability_threshold import stability_threshold
+from rotorid.reduction.dynamics.response_comparison import ResponseCost, compare_response
+from rotorid.reduction.dynamics.small_rotor import SmallRotor, small_rotor
+from rotorid.reduction.dynamics.stability_comparison import StabilityCost, compare_stability
+from rotorid.reduction.equivalent.changed_inputs import Shift
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design, equivalent_masses
+from rotorid.reduction.equivalent.frequency_matching import matching_masses
+from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff, trade_off
+from rotorid.reduction.equivalent.mass_sensitivity import InputErrors, mass_sensitivity
+from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty, mass_uncertainty
+from rotorid.reduction.equivalent.small_model_modes import mac, natural_frequencies
+from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
+    Separated,
+    separate,
+    separated_compliance,
+)
 from rotorid.reduction.methods import compare_methods, guyan, irs, serep
 from rotorid.reduction.methods_result import Method, Methods
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.reduction.placement_result import Placement
-from rotorid.reduction.reducing import reduce, reduce_measured
+from rotorid.reduction.reduce_rotor import reduce, reduce_measured
 from rotorid.reduction.result import Choices, Reduction
 
 __all__ = [

@@ -27,22 +27,22 @@ from typing import Any
 import numpy as np
 
 import fem
-from fem.matrices.bands import assemble, held, ignored_inertia, multiply
-from fem.matrices.pencil import Pencil, whole_rotor
+from fem.matrices.banded_matrices import assemble, held, ignored_inertia, multiply
+from fem.matrices.undamped_matrices import Pencil, whole_rotor
 from fem.solvers.eigen import Spectrum, lowest_modes
 from rotorid.base import registry
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.text import counted
-from rotorid.reduction.equivalent.masses import (
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
     Normalisation,
     RowWeights,
     equivalent_masses,
     normalised,
     row_factors,
 )
-from rotorid.reduction.equivalent.plane import mass_nodes, plane_at_rest
-from rotorid.reduction.equivalent.vibration import like, mac, natural_frequencies
+from rotorid.reduction.equivalent.plane_at_rest import mass_nodes, plane_at_rest
+from rotorid.reduction.equivalent.small_model_modes import like, mac, natural_frequencies
 from rotorid.reduction.methods_result import Method, Methods
 
 DEPENDENT = 1e-6

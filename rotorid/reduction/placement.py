@@ -13,8 +13,8 @@ import fem
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.checks import whole
 from rotorid.base.text import counted
-from rotorid.reduction.equivalent.masses import Normalisation, RowWeights, design
-from rotorid.reduction.equivalent.plane import plane_at_rest
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights, design
+from rotorid.reduction.equivalent.plane_at_rest import plane_at_rest
 from rotorid.reduction.placement_result import ALIKE, BADLY, Placement
 from rotorid.regression import RCOND
 
@@ -58,7 +58,7 @@ def rank_nodes(
     check
         How many of the first modes are compared, 1 … n; default n.
     normalise, rows
-        As in `rotorid.reduction.equivalent.masses.design`. With "first" the first mass is the leftmost one.
+        As in `rotorid.reduction.equivalent.equivalent_masses_formula_50.design`. With "first" the first mass is the leftmost one.
     speed
         Where tables of supports are read, rad/s; by default their lowest common speed.
 

@@ -9,8 +9,8 @@ import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
-from rotorid.base.style import COLORS, VERMILION
-from rotorid.base.units import RPM
+from rotorid.base.plot_style import COLORS, VERMILION
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     """
     from fem.plots import draw_rotor, new_axes
     from fem.plots.mode_shapes import smooth_shapes
-    from rotorid.base.style import MARKERS, STYLES
+    from rotorid.base.plot_style import MARKERS, STYLES
 
     axes = new_axes((10, 5.6)) if ax is None else ax
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.frequencies)
@@ -105,7 +105,7 @@ def _along(shape: FloatArray, reference: FloatArray) -> FloatArray:
 
 def _measured(reduction: Reduction, axes: Axes) -> Axes:
     """Measured shapes (hollow) and those of the model (full) at the masses."""
-    from rotorid.base.style import COLORS, MARKERS, legend_above, plain
+    from rotorid.base.plot_style import COLORS, MARKERS, legend_above, plain
 
     n, k = reduction.rotor_shapes.shape
     x = np.arange(n)
@@ -216,7 +216,7 @@ def _bars(
     ax: Axes, tops: FloatArray, bottoms: FloatArray, names: Sequence[str], texts: Sequence[Sequence[str]]
 ) -> None:
     """Groups of bars by mode, a colour per method, a text at the end of each."""
-    from rotorid.base.style import COLORS, plain
+    from rotorid.base.plot_style import COLORS, plain
 
     count, n = tops.shape
     width = 0.84 / count

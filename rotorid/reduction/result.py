@@ -11,18 +11,18 @@ import numpy as np
 import fem
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.units import RPM
-from rotorid.reduction.equivalent.masses import Normalisation, RowWeights
-from rotorid.reduction.equivalent.separated import Separated
-from rotorid.reduction.equivalent.shift import Shift
-from rotorid.reduction.equivalent.uncertainty import InputErrors, MassUncertainty, mass_uncertainty
-from rotorid.reduction.equivalent.vibration import mac
+from rotorid.base.rpm import RPM
+from rotorid.reduction.equivalent.changed_inputs import Shift
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
+from rotorid.reduction.equivalent.mass_uncertainty import InputErrors, MassUncertainty, mass_uncertainty
+from rotorid.reduction.equivalent.small_model_modes import mac
+from rotorid.reduction.equivalent.support_flexibility_formula_47 import Separated
 from rotorid.regression.estimate import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from rotorid.reduction.dynamics.small import SmallRotor
+    from rotorid.reduction.dynamics.small_rotor import SmallRotor
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +183,7 @@ class Reduction:
         ValueError
             Without a rotor, or with masses that are not positive.
         """
-        from rotorid.reduction.dynamics.small import small_rotor
+        from rotorid.reduction.dynamics.small_rotor import small_rotor
 
         if self.rotor is None:
             raise ValueError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from balancing.correction.correction_words import method_words
 from rotorid.base.text import sentence
-from rotorid.report import conventions
+from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
 from rotorid.report.page import inline_svg, render_report
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from balancing import Correction, Influence
     from balancing.correction.verdict import Verdict
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 
 RUNS_ABREAST = 4
@@ -77,9 +77,9 @@ def balance_report(
     runs = sheet["runs"]
     name = title or _name(job)
     text = {
-        "vibration": conventions.vibration_words(labels.vibration_unit),
-        "weight": conventions.weight_words(labels.weight_unit),
-        "seen": conventions.seen_from(labels),
+        "vibration": conventions_explained.vibration_words(labels.vibration_unit),
+        "weight": conventions_explained.weight_words(labels.weight_unit),
+        "seen": conventions_explained.seen_from(labels),
         "method": method_words(result.method, weighted=result.row_weights is not None),
         "errors": _SOURCES.get(result.error_source, result.error_source),
         "coefficients": _coefficients(influence, job, provenance),
@@ -90,17 +90,18 @@ def balance_report(
         whole,
         title=f"Balancing sheet: {name}",
         warnings=_warnings(document),
-        judgement=result.counsel.lines(),
+        judgement=result.decision.lines(),
         provenance=provenance,
         job_files=[path.name for path in job.files],
         text=text,
-        conventions=conventions.words(labels, places, key_phasor),
+        conventions=conventions_explained.words(labels, places, key_phasor),
         rotor_figure=inline_svg(
-            conventions.rotor_figure(labels, places, key_phasor),
+            conventions_explained.rotor_figure(labels, places, key_phasor),
             "The rotor from its end: rotation, mark, a weight at 60°, sensor and key phasor",
         ),
         phase_figure=inline_svg(
-            conventions.phase_figure(labels), f"A reading over time with a phase of 60° ({labels.phase})"
+            conventions_explained.phase_figure(labels),
+            f"A reading over time with a phase of 60° ({labels.phase})",
         ),
         discs=_discs(result, job, mounted, verdict, text["seen"]),
         residual_figure=inline_svg(

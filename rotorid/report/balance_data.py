@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.correction.correction_result import HELD, INVISIBLE
-from balancing.data.columns import known, mounted_rows, reading_columns, vector_columns
+from balancing.data.result_columns import known, mounted_rows, reading_columns, vector_columns
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
-from rotorid.base.units import rpm
+from rotorid.base.rpm import rpm
 from rotorid.regression import coverage_factor
 from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from balancing import Correction, Influence
     from balancing.data.trials import Trials
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
 
 

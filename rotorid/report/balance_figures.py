@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.report.conventions import plain, weight_words
+from rotorid.report.conventions_explained import plain, weight_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing import Correction
     from balancing.mounting.holes import Holes
-    from balancing.mounting.mounted_result import Mounted
+    from balancing.mounting.mount_result import Mounted
 
 ROWS_SHOWN = 60
 """Readings in one figure; beyond that the largest ones are shown."""
@@ -96,7 +96,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    from balancing.plots.polar import before_and_after
+    from balancing.plots.correction_polar import before_and_after
 
     if len(rows) > ROWS_SHOWN:
         largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))

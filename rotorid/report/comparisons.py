@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from rotorid.base.rpm import RPM
 from rotorid.base.text import listing
-from rotorid.base.units import RPM
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.grids import Grid, Part, below, numbered, words
-from rotorid.report.pictures import (
+from rotorid.report.number_tables import Grid, Part, below, numbered, words
+from rotorid.report.rotor_figures import (
     methods_picture,
     placement_picture,
     running_picture,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.rpm import RPM
 from rotorid.base.text import counted
-from rotorid.base.units import RPM
 from rotorid.report.comparisons import (
     methods_part,
     placement_part,
@@ -15,10 +15,10 @@ from rotorid.report.comparisons import (
     trade_off_part,
 )
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.grids import Grid, Part, below, every_warning, few, numbered, words
-from rotorid.report.inputs import rotor_sheet
+from rotorid.report.number_tables import Grid, Part, below, every_warning, few, numbered, words
 from rotorid.report.page import render_report
-from rotorid.report.pictures import reduction_picture
+from rotorid.report.rotor_description import rotor_sheet
+from rotorid.report.rotor_figures import reduction_picture
 
 if TYPE_CHECKING:
     from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fem.model.rotor import Rotor
-from rotorid.base.units import RPM, rpm_text
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.grids import Grid, Part, evenly, every_warning, figures, numbered, words
-from rotorid.report.inputs import place, rotor_sheet, unbalance_table
+from rotorid.report.number_tables import Grid, Part, evenly, every_warning, figures, numbered, words
 from rotorid.report.page import render_report
-from rotorid.report.pictures import bode_picture, map_picture, modes_picture
+from rotorid.report.rotor_description import place, rotor_sheet, unbalance_table
+from rotorid.report.rotor_figures import bode_picture, map_picture, modes_picture
 
 if TYPE_CHECKING:
     from fem import Modes, Peaks, Response, SpeedMap

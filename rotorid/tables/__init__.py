@@ -12,12 +12,12 @@ from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_mode
 from rotorid.tables.models.motion_file import read_motion
 from rotorid.tables.models.ode_file import read_ode_model
 from rotorid.tables.reader.problems import InputError, Problem, TableWarning
-from rotorid.tables.reader.writing import write_table
+from rotorid.tables.reader.table_writing import write_table
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 from rotorid.tables.rotor.rotor_writing import write_rotor
 from rotorid.tables.rotor.unbalance_table import read_unbalance
-from rotorid.tables.runs.conventions import Conventions, StatedErrors
 from rotorid.tables.runs.influence_table import influence_frame, read_influence, write_influence
+from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors
 from rotorid.tables.runs.trials import read_trials
 
 __all__ = [

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from rotorid.base.suggestions import one_of
-from rotorid.tables.job.keys import JOB
-from rotorid.tables.reader.key import Key, file_schema
+from rotorid.tables.job.job_keys import JOB
+from rotorid.tables.reader.settings_keys import Key, file_schema
 from rotorid.tables.rotor.rotor_file import ROTOR
 
 FILES: dict[str, tuple[str, Sequence[Key]]] = {

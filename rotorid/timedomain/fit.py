@@ -12,14 +12,14 @@ from rotorid.base.registry import find
 from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
-from rotorid.timedomain.methods.path import Path
-from rotorid.timedomain.methods.problem import RTOL, Problem
-from rotorid.timedomain.methods.search import METHODS, Search, Trajectories
-from rotorid.timedomain.methods.starts import Minimum, merge, spread_starts
-from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.methods.fit_methods import METHODS, Search, Trajectories
+from rotorid.timedomain.methods.iteration_history import Path
+from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
+from rotorid.timedomain.methods.multiple_starts import Minimum, merge, spread_starts
+from rotorid.timedomain.models.ode_model import OdeModel
 from rotorid.timedomain.models.record import Record
-from rotorid.timedomain.models.several import for_copies
-from rotorid.timedomain.residuals import output_errors, settled
+from rotorid.timedomain.models.several_records import for_copies
+from rotorid.timedomain.residual_tests import output_errors, settled
 from rotorid.timedomain.result import Fit
 
 SECONDS = 60.0
@@ -58,7 +58,7 @@ def fit(  # noqa: PLR0913
     records
         One, or several that share the parameters.
     method
-        One of `METHODS` in `rotorid.timedomain.methods.search`.
+        One of `METHODS` in `rotorid.timedomain.methods.fit_methods`.
     integrator
         Of `INTEGRATORS`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
     start

@@ -10,13 +10,13 @@ from rotorid.base.arrays import FloatArray
 from rotorid.regression import gain, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
-from rotorid.timedomain.causes import causes, known_initial
-from rotorid.timedomain.combinations import combined
 from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
-from rotorid.timedomain.methods.path import Path
-from rotorid.timedomain.methods.problem import RTOL, Problem
-from rotorid.timedomain.residuals import chance, correlation, misfit, unequal
+from rotorid.timedomain.methods.iteration_history import Path
+from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
+from rotorid.timedomain.nonlinear_combinations import combined
+from rotorid.timedomain.residual_causes import causes, known_initial
+from rotorid.timedomain.residual_tests import chance, correlation, misfit, unequal
 
 PROBES = 100_001
 """Times at which pulses are looked for."""

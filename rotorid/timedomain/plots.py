@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.style import COLORS
+from rotorid.base.plot_style import COLORS
 from rotorid.base.text import counted
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from rotorid.base.result import Column, frame
 from rotorid.base.text import counted
 from rotorid.regression.estimate import parameter_columns
 from rotorid.timedomain.integration.simulate import Trajectory
-from rotorid.timedomain.methods.path import Path
-from rotorid.timedomain.methods.starts import Minimum
-from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.methods.iteration_history import Path
+from rotorid.timedomain.methods.multiple_starts import Minimum
+from rotorid.timedomain.models.ode_model import OdeModel
 from rotorid.timedomain.models.record import Record
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.text import listing, sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
-from rotorid.workflows.outcome import Outcome, provenance
+from rotorid.workflows.result_provenance import Outcome, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -181,12 +181,12 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
             raise ValueError(
                 f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
             )
-    from rotorid.validation import balancing, lessons, masses, rotor, time_records
+    from rotorid.validation import balancing, formula_50, identification, rotor, time_records
 
     rows = {
         "rotor": rotor.rows,
-        "masses": masses.rows,
-        "lessons": lessons.rows,
+        "masses": formula_50.rows,
+        "lessons": identification.rows,
         "time_records": time_records.rows,
         "balancing": balancing.rows,
     }

@@ -10,10 +10,10 @@ from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
-from rotorid.workflows.outcome import Outcome
 from rotorid.workflows.reduce import ReduceOptions, reduce
-from rotorid.workflows.reduced_rotor import ReducedRotor
+from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
+from rotorid.workflows.result_provenance import Outcome
 from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
 from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
+from rotorid.workflows.balance_verdict import judge
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
-from rotorid.workflows.given import check_choices, file_of
-from rotorid.workflows.other_readings import with_contradiction, with_other_readings
-from rotorid.workflows.outcome import Parts, provenance, workflow
-from rotorid.workflows.parameters import Names, Speeds, names, number, one_of, speeds
-from rotorid.workflows.verdict import judge
+from rotorid.workflows.input_checks import check_choices, file_of
+from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
+from rotorid.workflows.other_conventions import with_contradiction, with_other_readings
+from rotorid.workflows.result_provenance import Parts, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     )
     from rotorid.base.registry import Method
     from rotorid.tables import Job
-    from rotorid.tables.job.source import JobSource
-    from rotorid.workflows.quantities import Amount, Amplitudes, Positions, Weights
+    from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
 
     JobGiven = Job | Path | str | Sequence[Path | str]
     """A job, its file, or a runs table and a weights table."""
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
     """What `method` chooses from."""
-    from balancing.solvers.methods import METHODS
+    from balancing.solvers.correction_methods import METHODS
 
     return {"method": METHODS}
 
@@ -196,13 +196,17 @@ class Balance(Parts):
 
     def figure(self) -> Figure:
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""
-        from balancing.plots import discs, polar, tolerances, trade_off_curve
+        from balancing.plots import correction_polar, discs, tolerances, trade_off_curve
 
         if self.mounted is not None:
             return discs.mounted_discs(self.mounted)
         if self.verdict is not None and any(row.kind == "plane" for row in self.verdict.rows):
             return tolerances.overview(self.result, self.verdict)
-        return polar.overview(self.result) if self.curve is None else trade_off_curve.overview(self.curve)
+        return (
+            correction_polar.overview(self.result)
+            if self.curve is None
+            else trade_off_curve.overview(self.curve)
+        )
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -257,7 +261,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         For a job or an option that cannot be; UndeterminedError, InputError.
     """
     from balancing import compare_check
-    from rotorid.tables.job.source import JobSource
+    from rotorid.tables.job.job_as_written import JobSource
 
     options = options or BalanceOptions()
     _check(options)
@@ -305,8 +309,8 @@ def _check(options: BalanceOptions) -> None:
 def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
     """A job that has been read, or what is to be read."""
     from rotorid.tables import Job
+    from rotorid.tables.job.job_as_written import JobSource
     from rotorid.tables.job.job_data import Overrides
-    from rotorid.tables.job.source import JobSource
 
     stored = None if options.influence is None else Path(options.influence)
     errors = options.amplitude_error, options.phase_error, options.run_error
@@ -321,8 +325,8 @@ def _source(job: JobGiven, options: BalanceOptions) -> Job | JobSource:
 
 def _read(source: Job | JobSource, options: BalanceOptions) -> Job:
     from rotorid.tables import job_from_files, read_job
-    from rotorid.tables.job.source import JobSource
-    from rotorid.workflows.quantities import limited
+    from rotorid.tables.job.job_as_written import JobSource
+    from rotorid.workflows.option_quantities import limited
 
     if isinstance(source, JobSource):
         files, said = source.files, asdict(source.overrides)
@@ -340,7 +344,7 @@ def _choose(job: Job, options: BalanceOptions) -> Known:
 
 def _planes(job: Job, known: Known, options: BalanceOptions) -> tuple[Sequence[str], Subsets | None]:
     """Those to use, and the choices among which they are the best."""
-    from balancing.correction.subsets import compare_planes
+    from balancing.correction.best_planes import compare_planes
 
     planes = names(options.planes) or used_planes(job, known[0])
     if options.best_planes is None:
@@ -398,7 +402,7 @@ def _again(
 
 
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
-    from balancing.mounting.mounted import mount
+    from balancing.mounting.mount import mount
 
     return mount(
         result,
@@ -412,7 +416,7 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
 
 def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | None:
     """Tolerance of one or two planes; None where no grade is given."""
-    from rotorid.workflows.quantities import positions
+    from rotorid.workflows.option_quantities import positions
     from rotorid.workflows.tolerance import permissible
 
     grade, weight, speed = options.grade, options.rotor_mass, options.service_speed
@@ -436,7 +440,7 @@ def _tolerance(planes: Sequence[str], options: BalanceOptions) -> Tolerance | No
 def _trade_off(result: Correction, influence: Influence, job: Job) -> TradeOff:
     """Residual against total weight, in the planes and at the speeds used."""
     from balancing.coefficients.baseline import match_speeds
-    from balancing.correction.choice import plane_indices
+    from balancing.correction.selected_planes import plane_indices
     from balancing.correction.trade_off import trade_off
 
     at = match_speeds(result.speeds, influence.speeds)
@@ -466,7 +470,7 @@ def _history(result: Correction, influence: Influence, job: Job) -> History:
 
 def _with_limits(source: JobSource, job: Job, options: BalanceOptions) -> JobSource:
     """What the job was read from, with the limits put in place of its own."""
-    from rotorid.workflows.quantities import largest_amplitudes, largest_weights
+    from rotorid.workflows.option_quantities import largest_amplitudes, largest_weights
 
     return replace(
         source,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
 from rotorid.workflows.critical import Separation
-from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Band, Speeds, band, rising_speeds
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Band, Speeds, band, rising_speeds
+from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -39,7 +39,7 @@ def choose(
         Where the runs do not determine the coefficients.
     """
     from balancing import estimate_influence
-    from balancing.coefficients.combine import combine
+    from balancing.coefficients.combined_coefficients import combine
 
     has_trials = bool(job.trials.weights.any())
     if kind is None:
@@ -68,7 +68,7 @@ def used_planes(job: Job, influence: Influence) -> list[str]:
 def _refined(job: Job, kind: str) -> Influence:
     """From trial runs and check runs together."""
     from balancing import correct, estimate_influence
-    from balancing.correction.refine import refine
+    from balancing.correction.refine_coefficients import refine
 
     if job.check is None:
         raise ValueError('there are no check runs to refine with: check = "check.csv" in the job file')
@@ -88,7 +88,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     """
     from dataclasses import replace
 
-    from balancing.coefficients.from_model import model_influence
+    from balancing.coefficients.coefficients_from_model import model_influence
     from rotorid.tables.reader.units import weight
 
     if job.rotor is None:

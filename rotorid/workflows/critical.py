@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Band, band
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Band, band
+from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,13 +50,13 @@ class Separation:
 
     def to_dict(self) -> dict[str, Any]:
         """Distances as JSON types."""
-        from fem.separation import separation
+        from fem.api684_separation import separation
 
         return separation(self.speeds, self.operating)
 
     def summary(self) -> str:
         """In words."""
-        from fem.separation import separation_text
+        from fem.api684_separation import separation_text
 
         return separation_text(self.to_dict())
 
@@ -83,7 +83,7 @@ class CriticalSpeeds(Parts):
     def figure(self) -> Figure:
         """The mode shapes, or the map."""
         from fem.plots import draw_modes, draw_speed_map
-        from rotorid.base.style import on_figure
+        from rotorid.base.plot_style import on_figure
 
         if self.chart is None:
             return on_figure(lambda ax: draw_modes(self.modes, ax), 10.0, 5.0)

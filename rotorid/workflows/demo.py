@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import one_of
 from rotorid.workflows.demo_samples import SAMPLES, Sample
-from rotorid.workflows.given import file_of
-from rotorid.workflows.outcome import Outcome, provenance, workflow
+from rotorid.workflows.input_checks import file_of
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,7 +153,7 @@ def demo(folder: Path | str, options: DemoOptions | None = None) -> Demo:
 def _copy(folder: Path, sample: Sample) -> list[Path]:
     """Write the files of a sample; refuse before anything is written."""
     from rotorid.samples import sample_data
-    from rotorid.tables.reader.writing import write_files
+    from rotorid.tables.reader.table_writing import write_files
 
     samples = sample_data()
     sources: list[Path] = []

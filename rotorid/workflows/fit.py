@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
-from rotorid.workflows.given import check_choices, file_of, refuse
-from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
-from rotorid.workflows.parameters import number, pairs
+from rotorid.workflows.input_checks import check_choices, file_of, refuse
+from rotorid.workflows.option_values import number, pairs
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,7 +83,7 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
     """What the options of these names choose from."""
     from rotorid.regression.robust import LOSSES
     from rotorid.timedomain.integration.simulate import INTEGRATORS
-    from rotorid.timedomain.methods.search import METHODS
+    from rotorid.timedomain.methods.fit_methods import METHODS
 
     return {"method": METHODS, "integrator": INTEGRATORS, "loss": LOSSES}
 
@@ -131,7 +131,7 @@ def fit(
     from rotorid.tables import read_ode_model
     from rotorid.timedomain import OdeModel
     from rotorid.timedomain.fit import fit as estimate
-    from rotorid.timedomain.methods.problem import RTOL
+    from rotorid.timedomain.methods.least_squares_problem import RTOL
 
     options = options or FitOptions()
     _check(options)
@@ -230,7 +230,7 @@ def _read(
 
 def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
     """Starting values inside their bounds; x0_2 is that of the second record, where each has its own."""
-    from rotorid.timedomain.models.several import models_of
+    from rotorid.timedomain.models.several_records import models_of
 
     copy = models_of(model, count)[0]
     limits = {
@@ -257,7 +257,7 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
 
 def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
-    from rotorid.tables.reader.number import NotANumber, check_size
+    from rotorid.tables.reader.decimal_numbers import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
         if name not in outputs:

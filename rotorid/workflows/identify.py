@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, file_of, refuse
-from rotorid.workflows.outcome import Parts, log, phase, provenance, workflow
-from rotorid.workflows.parameters import Speeds, speeds
+from rotorid.workflows.input_checks import check_choices, file_of, refuse
+from rotorid.workflows.option_values import Speeds, speeds
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rotorid.base.registry import Method
     from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, Identification
-    from rotorid.harmonic.design import Design
+    from rotorid.harmonic.experiment_design import Design
     from rotorid.tables import HarmonicFile
 
 MOST_CANDIDATES = 2000
@@ -174,7 +174,7 @@ def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, 
     Its `[start]` guesses what is not identified. The excitation is that of the experiments; without them
     every input has the amplitude 1.
     """
-    from rotorid.harmonic.design import design
+    from rotorid.harmonic.experiment_design import design
 
     frequencies = speeds(candidates, what="--design")
     if len(frequencies) > MOST_CANDIDATES:

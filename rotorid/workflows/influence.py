@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
-from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import Parts, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import Nodes, Sensor, Speeds, nodes, rising_speeds, sensors
+from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.text import counted
-from rotorid.workflows.given import rotor_source
-from rotorid.workflows.outcome import log, provenance, workflow
-from rotorid.workflows.parameters import (
+from rotorid.workflows.input_checks import rotor_source
+from rotorid.workflows.option_values import (
     Band,
     Nodes,
     Speeds,
@@ -23,13 +22,14 @@ from rotorid.workflows.parameters import (
     option_name,
     rising_speeds,
 )
+from rotorid.workflows.result_provenance import log, provenance, workflow
 
 if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.registry import Method
     from rotorid.reduction import Placement, Reduction
     from rotorid.tables.data.modes_table import MeasuredModes
-    from rotorid.workflows.reduced_rotor import ReducedRotor
+    from rotorid.workflows.reduce_result import ReducedRotor
 
 Place = Literal["best", "compromise", "mac", "book"]
 """Which of all places of the masses is taken."""
@@ -150,7 +150,7 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
     from rotorid.workflows.reduce_inputs import shares
-    from rotorid.workflows.reduced_rotor import ReducedRotor
+    from rotorid.workflows.reduce_result import ReducedRotor
 
     options = options or ReduceOptions()
     how = {"normalise": options.normalise, "rows": options.rows, "nonnegative": options.nonnegative}
@@ -201,7 +201,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
     from rotorid.workflows import reduce_inputs as given
-    from rotorid.workflows.reduced_rotor import ReducedRotor
+    from rotorid.workflows.reduce_result import ReducedRotor
 
     machine, files = rotor_source(rotor)
     at = None if options.speed is None else one_speed(options.speed, "--speed")

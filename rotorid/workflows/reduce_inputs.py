@@ -12,7 +12,7 @@ import numpy as np
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
-from rotorid.workflows.parameters import number, numbers
+from rotorid.workflows.option_values import number, numbers
 
 if TYPE_CHECKING:
     import fem

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from rotorid.base.rpm import RPM, phase_deg
 from rotorid.base.text import counted
-from rotorid.base.units import RPM, phase_deg
-from rotorid.workflows.given import file_of, rotor_source
-from rotorid.workflows.outcome import Outcome, log_rotor, phase, provenance, workflow
-from rotorid.workflows.parameters import (
+from rotorid.workflows.input_checks import file_of, rotor_source
+from rotorid.workflows.option_values import (
     Band,
     Sensor,
     Speeds,
@@ -22,6 +21,7 @@ from rotorid.workflows.parameters import (
     rising_speeds,
     sensors,
 )
+from rotorid.workflows.result_provenance import Outcome, log_rotor, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -186,13 +186,13 @@ class RotorResponse(Outcome):
 
     def _largest(self, size: FloatArray) -> tuple[float | None, float | None]:
         """The largest of a size over speed where a steady response exists, and its speed, rad/s."""
-        from fem.vibration import largest_at
+        from fem.response_result import largest_at
 
         k = largest_at(size, self.finer.steady)
         return (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k]))
 
     def _speed_of_orbits(self) -> int:
-        from fem.vibration import largest_at
+        from fem.response_result import largest_at
 
         sizes = abs(self.finer.readings(self.sensors)).max(axis=1)
         k = largest_at(sizes, self.finer.steady) if self.orbits_at is None else self.orbits_at

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import changed, refuse
-from rotorid.workflows.outcome import Outcome, provenance, workflow
-from rotorid.workflows.parameters import degrees, option_name, pairs
+from rotorid.workflows.input_checks import changed, refuse
+from rotorid.workflows.option_values import degrees, option_name, pairs
+from rotorid.workflows.result_provenance import Outcome, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from balancing.data.conventions import Labels
-    from balancing.mounting.hand_mounting import Rounded, TwoPositions
+    from balancing.mounting.combine_trim_round import Rounded, TwoPositions
     from balancing.mounting.holes import Holes
-    from balancing.mounting.removal import Drilling, Grinding
+    from balancing.mounting.material_removal import Drilling, Grinding
     from balancing.mounting.split import OnHoles
-    from rotorid.workflows.quantities import Amount, Vector
+    from rotorid.workflows.option_quantities import Amount, Vector
 
     Found = OnHoles | TwoPositions | Drilling | Grinding | Rounded
     Mount = Callable[[complex, Labels, float | None, "SplitOptions"], Found]
@@ -139,8 +139,8 @@ class SplitWeight(Outcome):
 
     def figure(self) -> Figure:
         """A disc for each solution."""
-        from balancing.mounting.hand_mounting import Rounded, TwoPositions
-        from balancing.mounting.removal import Drilling
+        from balancing.mounting.combine_trim_round import Rounded, TwoPositions
+        from balancing.mounting.material_removal import Drilling
         from balancing.mounting.split import OnHoles
         from balancing.plots.discs import placed
 
@@ -171,8 +171,8 @@ def split(weight: Vector, options: SplitOptions | None = None) -> SplitWeight:
     ValueError
         For a weight or an option that cannot be, or that means nothing with the way that was chosen.
     """
-    from balancing.mounting.hand_mounting import combine, trim
-    from rotorid.workflows.quantities import size, vectors
+    from balancing.mounting.combine_trim_round import combine, trim
+    from rotorid.workflows.option_quantities import size, vectors
 
     options = options or SplitOptions()
     labels, weights = vectors(weight, options.angles)
@@ -236,8 +236,8 @@ def _on_holes(target: complex, labels: Labels, radius: float | None, options: Sp
 def _at_two_angles(
     target: complex, labels: Labels, radius: float | None, options: SplitOptions
 ) -> TwoPositions:
-    from balancing.mounting.hand_mounting import two_positions
-    from rotorid.workflows.quantities import weights
+    from balancing.mounting.combine_trim_round import two_positions
+    from rotorid.workflows.option_quantities import weights
 
     assert options.two is not None
     masses = weights(options.two, "--two", labels, radius)
@@ -263,8 +263,8 @@ def _unbalance(target: complex, labels: Labels, radius: float | None, why: str) 
 def _drilled(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Drilling:
     import numpy as np
 
-    from balancing.mounting.removal import Drill, drill_holes
-    from rotorid.workflows.quantities import size
+    from balancing.mounting.material_removal import Drill, drill_holes
+    from rotorid.workflows.option_quantities import size
 
     unbalance, at = _unbalance(target, labels, radius, "--drill")
     assert options.drill is not None
@@ -284,7 +284,7 @@ def _drilled(target: complex, labels: Labels, radius: float | None, options: Spl
 
 
 def _ground(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Grinding:
-    from balancing.mounting.removal import grind
+    from balancing.mounting.material_removal import grind
 
     return grind(*_unbalance(target, labels, radius, "--grind"))
 
@@ -292,8 +292,8 @@ def _ground(target: complex, labels: Labels, radius: float | None, options: Spli
 def _rounded(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> Rounded:
     import numpy as np
 
-    from balancing.mounting.hand_mounting import rounded
-    from rotorid.workflows.quantities import weight
+    from balancing.mounting.combine_trim_round import rounded
+    from rotorid.workflows.option_quantities import weight
 
     angle = options.angle_step or 0.0
     if not 0 <= angle <= 360:
@@ -314,7 +314,7 @@ def _holes(labels: Labels, radius: float | None, options: SplitOptions) -> Holes
     import numpy as np
 
     from balancing.mounting.holes import equal_holes, from_list
-    from rotorid.workflows.quantities import weight, weights
+    from rotorid.workflows.option_quantities import weight, weights
 
     given = options.holes
     if given is None or isinstance(given, int) or (isinstance(given, str) and "," not in given):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotorid.workflows.outcome import Found, provenance, workflow
+from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from balancing.iso21940 import Tolerance
-    from rotorid.workflows.quantities import Amount, Positions
+    from rotorid.workflows.option_quantities import Amount, Positions
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def permissible(
         For a quantity or a grade that cannot be.
     """
     from balancing.iso21940 import tolerance as of_numbers
-    from rotorid.workflows.quantities import length, mass, positions, speed_with_unit, two_positions
+    from rotorid.workflows.option_quantities import length, mass, positions, speed_with_unit, two_positions
 
     return of_numbers(
         mass(rotor_mass, names[0]),

@@ -8,18 +8,18 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from rotorid.workflows.given import job_source, refuse
-from rotorid.workflows.outcome import Outcome, log, provenance, workflow
-from rotorid.workflows.parameters import Names, degrees, names, number, one_of
+from rotorid.workflows.input_checks import job_source, refuse
+from rotorid.workflows.option_values import Names, degrees, names, number, one_of
+from rotorid.workflows.result_provenance import Outcome, log, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from balancing.trial_angle import Lag, Quantity
-    from balancing.trial_result import TrialWeight
+    from balancing.trial_weight_result import TrialWeight
     from rotorid.tables import Job
-    from rotorid.workflows.quantities import Amount
+    from rotorid.workflows.option_quantities import Amount
 
 MEASURES = ("displacement", "velocity", "acceleration")
 _WITH_JOB = ("plane", "mass", "share")
@@ -148,7 +148,7 @@ def trial_weight(
     """
     from balancing.trial_weight import plane_load
     from rotorid.tables.reader.units import FORCE
-    from rotorid.workflows.quantities import mass, quantity
+    from rotorid.workflows.option_quantities import mass, quantity
 
     options = options or TrialWeightOptions()
     rotor, load = options.rotor_mass, options.bearing_load
@@ -178,8 +178,8 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     from balancing.data.conventions import Labels
     from balancing.trial_weight import trial_from_force
     from rotorid.tables.reader import units
-    from rotorid.tables.runs.conventions import as_angles, as_phase
-    from rotorid.workflows.quantities import mass, size, speed_with_unit
+    from rotorid.tables.runs.stated_conventions import as_angles, as_phase
+    from rotorid.workflows.option_quantities import mass, size, speed_with_unit
 
     missing = [name for name in ("speed", "radius") if getattr(options, name) is None]
     if load is None:
@@ -216,7 +216,7 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
     from balancing.trial_weight import trial_from_coefficients
     from rotorid.tables.reader.units import MASS, UNBALANCE
     from rotorid.workflows.coefficients import choose, used_planes
-    from rotorid.workflows.quantities import limited, quantity, size
+    from rotorid.workflows.option_quantities import limited, quantity, size
 
     job = limited(job, options.max_mass, ())
     influence, baseline = choose(job)
@@ -255,7 +255,7 @@ def _from_job(job: Job, options: TrialWeightOptions, load: float | None) -> list
 
 def _lag(options: TrialWeightOptions, speed: float) -> Lag | None:
     from balancing.trial_angle import expected_lag
-    from rotorid.workflows.quantities import speed_with_unit
+    from rotorid.workflows.option_quantities import speed_with_unit
 
     lag, critical = options.lag, options.critical
     if lag is not None and critical is not None:

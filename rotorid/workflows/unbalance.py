@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.workflows.given import check_choices, job_source, refuse
-from rotorid.workflows.outcome import Found, provenance, workflow
-from rotorid.workflows.parameters import Nodes, nodes
+from rotorid.workflows.input_checks import check_choices, job_source, refuse
+from rotorid.workflows.option_values import Nodes, nodes
+from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
     from balancing.unbalance_result import Unbalance
@@ -72,7 +72,7 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> UnbalanceAtSt
     ValueError
         For a job without a rotor, and an option that cannot be.
     """
-    from balancing.coefficients.from_model import modal_shapes
+    from balancing.coefficients.coefficients_from_model import modal_shapes
     from balancing.unbalance import unbalance_of_run
     from rotorid.workflows.coefficients import computed
 

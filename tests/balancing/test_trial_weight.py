@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import Influence, Labels, ReadingErrors
-from balancing.coefficients.from_model import model_influence
+from balancing.coefficients.coefficients_from_model import model_influence
 from balancing.trial_angle import expected_lag, opposing_angle
 from balancing.trial_weight import force_amount, trial_from_coefficients, trial_from_force
 from rotorid.plots import plot

@@ -11,8 +11,8 @@ from fem_rotors import rotor23
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, UndeterminedError, correct
-from balancing.coefficients.from_model import modal_shapes, model_influence
-from balancing.data.errors import reading_covariance
+from balancing.coefficients.coefficients_from_model import modal_shapes, model_influence
+from balancing.data.reading_errors import reading_covariance
 from balancing.unbalance import estimate_unbalance, unbalance_of_run
 from rotorid.plots import plot
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from whirl_rotors import FULL, machine, whirling_rotors
 
 import fem
-from fem.following import went_above
+from fem.campbell_modes import went_above
 from rotorid.plots import plot
 
 mpl.use("Agg")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem.matrices.lateral_planes import Planes, project
-from fem.solvers.quadratic import solve
+from fem.solvers.quadratic_eigenvalues import solve
 from fem.solvers.whirl_basis import reference
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 
@@ -46,7 +46,7 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
 def _arnoldi(
     P: Planes, speed: float, n: int, scale: float
 ) -> tuple[ComplexArray, ComplexArray, FloatArray, int]:
-    """Largest μ of the inverse form (`fem.solvers.quadratic`) by Arnoldi's method, with sparse factors."""
+    """Largest μ of the inverse form (`fem.solvers.quadratic_eigenvalues`) by Arnoldi's method, with sparse factors."""
     from scipy.sparse import coo_array, csc_array
     from scipy.sparse.linalg import LinearOperator, eigs, splu
 
@@ -89,10 +89,10 @@ def _sparse(P: Planes, speed: float) -> tuple[Any, Any, Any]:
     """M, D and K of the full model."""
     from scipy.sparse import block_array, coo_array
 
-    A, p, f, n = P.A, P.planes, len(P.feet), P.A.size
+    A, p, f, n = P.A, P.planes, len(P.pedestals), P.A.size
 
     M, G, B, K = (_full(band) for band in (A.mass, A.gyroscopic, A.material, A.shaft))
-    feet = P.foot_mass, P.foot_damping, P.foot_stiffness
+    feet = P.pedestal_mass, P.pedestal_damping, P.pedestal_stiffness
     across = [D * speed for D in (0 * M, G, B)]
     out = []
     k, c = (matrix[0] for matrix in P.supports(np.array([speed])))
@@ -100,7 +100,7 @@ def _sparse(P: Planes, speed: float) -> tuple[Any, Any, Any]:
         blocks = [[along, cross], [-cross, along]] if p == 2 else [[along - 1j * cross]]
         shaft = block_array(blocks)
         entries: list[tuple[int, int, complex]] = []
-        standing = {int(i): j for j, i in enumerate(P.feet)}
+        standing = {int(i): j for j, i in enumerate(P.pedestals)}
         for i, node in enumerate(P.rows):
             # Motion of the node, and against it that of the foot.
             ends = [(1.0, [plane * n + int(node) for plane in range(p)])]

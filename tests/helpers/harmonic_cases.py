@@ -4,8 +4,8 @@ import numpy as np
 
 from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.experiments import experiments as gather
-from rotorid.harmonic.model import HarmonicModel
 from rotorid.harmonic.operator_equations import harmonic_model
+from rotorid.harmonic.operator_model import HarmonicModel
 
 STATED = AmplitudeErrors(relative=0.02, phase=np.deg2rad(1.0))
 

@@ -5,7 +5,7 @@ import re
 from rotorid.samples import sample_data
 from rotorid.tables.job import keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys
-from rotorid.tables.reader.key import key_lines
+from rotorid.tables.reader.settings_keys import key_lines
 from rotorid.tables.rotor import bearing, rotor_file
 
 PAGE = sample_data().parent / "docs" / "files.md"

@@ -9,9 +9,9 @@ from scipy.optimize import minimize
 
 from balancing import Limits
 from balancing.solvers import likelihood
+from balancing.solvers.correction_methods import Stack
 from balancing.solvers.effective_variance import effective_variance
-from balancing.solvers.methods import Stack
-from balancing.solvers.sectors import allowed_sectors
+from balancing.solvers.forbidden_angles import allowed_sectors
 
 
 def drawn(seed):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rotorid.timedomain.integration.simulate import simulate
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 CHAIN_STATES = {

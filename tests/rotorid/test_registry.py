@@ -6,7 +6,7 @@ from rotorid.base.registry import Method, described, find, names
 from rotorid.harmonic.identification import METHODS as IDENTIFICATIONS
 from rotorid.regression.robust import LOSSES
 from rotorid.timedomain.integration.simulate import INTEGRATORS
-from rotorid.timedomain.methods.search import METHODS
+from rotorid.timedomain.methods.fit_methods import METHODS
 
 KINDS = (METHODS, INTEGRATORS, LOSSES, IDENTIFICATIONS)
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import WITH_REPORT, command
+from rotorid.cli.common_options import WITH_REPORT, command
 from rotorid.cli.output import TABLES, Destination, check_targets
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
@@ -87,7 +87,7 @@ def _write_template(path: Path, files: Sequence[Path]) -> None:
         filled in already.
     """
     from rotorid.tables.job.workbook_template import template_bytes
-    from rotorid.tables.reader.writing import write_bytes
+    from rotorid.tables.reader.table_writing import write_bytes
 
     if files:
         raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.cli.common import RotorArgument, command
+from rotorid.cli.common_options import RotorArgument, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.campbell import CampbellOptions
 from rotorid.workflows.campbell import campbell as work

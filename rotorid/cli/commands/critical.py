@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rotorid.cli.common import WITH_REPORT, RotorArgument, command
+from rotorid.cli.common_options import WITH_REPORT, RotorArgument, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.critical import CriticalOptions
 from rotorid.workflows.critical import critical as work

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rotorid.cli.common import command
+from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work

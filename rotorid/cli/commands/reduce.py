@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rotorid.cli.common import WITH_REPORT, command
+from rotorid.cli.common_options import WITH_REPORT, command
 from rotorid.cli.output import STATE_SPACES, Destination
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
 
 if TYPE_CHECKING:
-    from rotorid.workflows.reduced_rotor import ReducedRotor
+    from rotorid.workflows.reduce_result import ReducedRotor
 
 
 @command(ReduceOptions, least={"masses": 1, "modes": 1}, to=WITH_REPORT)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import WITH_REPORT, RotorArgument, command
+from rotorid.cli.common_options import WITH_REPORT, RotorArgument, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.response import ResponseOptions, View
 from rotorid.workflows.response import response as work

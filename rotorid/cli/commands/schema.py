@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common import command
+from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination, json_text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from rotorid.cli.common import command
+from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination
 from rotorid.validation import ValidateOptions
 from rotorid.validation import validate as work

@@ -12,17 +12,17 @@ from balancing.data.conventions import polar
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.data.repeats import FREQUENCIES, merge_repeats
+from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
-from rotorid.tables.runs.conventions import FULL_TURN
+from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import Experiments
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 
 _SPEED = one_of(units.SPEED)

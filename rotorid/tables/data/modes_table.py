@@ -12,7 +12,7 @@ import numpy as np
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
-from rotorid.tables.data.repeats import FREQUENCIES
+from rotorid.tables.data.repeated_readings import FREQUENCIES
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems

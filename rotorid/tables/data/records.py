@@ -18,7 +18,7 @@ from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, one_of
 
 if TYPE_CHECKING:
-    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.models.ode_model import OdeModel
     from rotorid.timedomain.models.record import Record
 
 TIME = {

@@ -18,7 +18,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Source, source_name
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.runs.slow_roll import subtract_slow_roll
-from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
 from rotorid.tables.runs.trials import make_trials
 
 

@@ -13,7 +13,7 @@ from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.mounting.holes import Holes
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.tables.runs.conventions import Conventions, StatedErrors, as_phase, check_angles
+from rotorid.tables.runs.stated_conventions import Conventions, StatedErrors, as_phase, check_angles
 
 if TYPE_CHECKING:
     from fem.model.rotor import Rotor

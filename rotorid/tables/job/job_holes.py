@@ -16,9 +16,9 @@ from balancing.data.conventions import Labels
 from balancing.data.limits import Arc, Limits
 from balancing.mounting.holes import Holes, from_list
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.job.keys import FORBIDDEN, HOLES, SAME_DEG
-from rotorid.tables.reader.key import Said
-from rotorid.tables.reader.quantity import in_job_units, other_kind
+from rotorid.tables.job.job_keys import FORBIDDEN, HOLES, SAME_DEG
+from rotorid.tables.reader.settings_keys import Said
+from rotorid.tables.reader.weights_with_units import in_job_units, other_kind
 
 
 def read_holes(

@@ -11,8 +11,8 @@ from balancing.data.conventions import Labels
 from fem.model.sensors import Sensor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.tables.reader.settings_keys import Said
 
 if TYPE_CHECKING:
     from fem.model.rotor import Rotor

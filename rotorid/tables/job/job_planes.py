@@ -13,8 +13,8 @@ from rotorid.base.text import listing
 from rotorid.tables.job.job_model import Model
 from rotorid.tables.job.readings import Readings
 from rotorid.tables.reader import units
-from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Said
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,18 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from balancing.data.conventions import Labels
-from rotorid.tables.job.assumed import with_assumed
+from rotorid.tables.job.assumed_conventions import with_assumed
 from rotorid.tables.job.check_runs import read_check
 from rotorid.tables.job.job_data import Job, Overrides
 from rotorid.tables.job.job_holes import read_holes
+from rotorid.tables.job.job_keys import JOB, TABLES
 from rotorid.tables.job.job_limits import read_limits
 from rotorid.tables.job.job_model import read_model
 from rotorid.tables.job.job_planes import read_planes
-from rotorid.tables.job.keys import JOB, TABLES
 from rotorid.tables.job.readings import read_readings
 from rotorid.tables.reader.columns import Source
-from rotorid.tables.reader.key import take
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import take
 from rotorid.tables.reader.toml_file import Section
 
 

@@ -12,9 +12,11 @@ from balancing.data.trials import Trials
 from rotorid.base.text import listing
 from rotorid.tables.job.job_data import Overrides
 from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.runs.conventions import (
+from rotorid.tables.reader.settings_keys import Said
+from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
+from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
+from rotorid.tables.runs.stated_conventions import (
     ANGLES,
     ROTATIONS,
     Conventions,
@@ -23,8 +25,6 @@ from rotorid.tables.runs.conventions import (
     as_phase,
     resolve_angles,
 )
-from rotorid.tables.runs.influence_table import Stored, fit_to_readings, load_influence
-from rotorid.tables.runs.slow_roll import SlowRoll, make_slow_roll, subtract_slow_roll
 from rotorid.tables.runs.trials import make_trials
 
 

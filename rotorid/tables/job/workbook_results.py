@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 from balancing.coefficients.influence import Influence
-from rotorid.tables.job.workbook_reading import RESULTS
+from rotorid.tables.job.job_from_excel import RESULTS
+from rotorid.tables.reader.excel_pages import Line
 from rotorid.tables.reader.grid import Cell
-from rotorid.tables.reader.pages import Line
 from rotorid.tables.runs.influence_comments import PHASE_MEANING
 from rotorid.tables.runs.influence_table import influence_frame, labels_of
 

@@ -15,12 +15,12 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
-from rotorid.tables.job.keys import CELLS, FORBIDDEN, TABLES
-from rotorid.tables.job.source import JobTables
+from rotorid.tables.job.job_as_written import JobTables
+from rotorid.tables.job.job_keys import CELLS, FORBIDDEN, TABLES
 from rotorid.tables.reader.columns import REMARKS
+from rotorid.tables.reader.decimal_numbers import decimal_comma, parse_number
+from rotorid.tables.reader.excel_pages import Line
 from rotorid.tables.reader.grid import Cell, Grid, Row, Shown, show
-from rotorid.tables.reader.number import decimal_comma, parse_number
-from rotorid.tables.reader.pages import Line
 
 TEXT_COLUMNS = ("run", "sensor", "plane", "repeat", "key")
 """Columns of names, in which `1` is text."""

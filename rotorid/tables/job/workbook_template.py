@@ -6,56 +6,62 @@ import math
 from dataclasses import replace
 
 from rotorid.base.text import sentence
-from rotorid.tables.job.keys import ERRORS, JOB, PLANE, SENSOR
-from rotorid.tables.job.workbook_reading import OPTIONAL
+from rotorid.tables.job.job_from_excel import OPTIONAL
+from rotorid.tables.job.job_keys import ERRORS, JOB, PLANE, SENSOR
 from rotorid.tables.job.workbook_sheets import NAMES
-from rotorid.tables.reader import kinds, units
-from rotorid.tables.reader.key import Key, Kind
-from rotorid.tables.reader.pages import Choice, Line, Page, book_bytes
+from rotorid.tables.reader import units, value_kinds
+from rotorid.tables.reader.excel_pages import Choice, Line, Page, book_bytes
+from rotorid.tables.reader.settings_keys import Key, Kind
 
-_NOTE = Key("note", Kind(kinds.TEXT.read, allowed="anything"), "remarks; nobody computes with them")
+_NOTE = Key("note", Kind(value_kinds.TEXT.read, allowed="anything"), "remarks; nobody computes with them")
 _RARE = ("holes_deg", "hole_names", "step_g", "node", "angle_deg")
 """Keys of planes and sensors for which the form has no column; one may be added."""
-_RUN = Key("run", kinds.TEXT, "name of the run: one start of the machine with the same weights on it")
+_RUN = Key("run", value_kinds.TEXT, "name of the run: one start of the machine with the same weights on it")
 _TABLES = {
     "runs": (
         _RUN,
-        Key("speed_rpm", kinds.ABOVE_ZERO, "speed", units.SPEED),
-        Key("sensor", kinds.TEXT, "name of the sensor; every run needs every sensor at every speed"),
+        Key("speed_rpm", value_kinds.ABOVE_ZERO, "speed", units.SPEED),
+        Key("sensor", value_kinds.TEXT, "name of the sensor; every run needs every sensor at every speed"),
         Key(
             "amplitude_um_pp amplitude_mm_s_rms amplitude_g_rms amplitude",
-            kinds.number(0.0),
+            value_kinds.number(0.0),
             "amplitude at the running speed (1x): the end of the name is the unit, _pp is peak to peak, _rms "
             "root mean square, neither is peak; the name amplitude alone is for readings without a unit",
             units.VIBRATION,
         ),
-        Key("phase_deg", kinds.TURN, "phase; the sheet settings says whether it leads or lags"),
+        Key("phase_deg", value_kinds.TURN, "phase; the sheet settings says whether it leads or lags"),
         _NOTE,
     ),
     "weights": (
         _RUN,
-        Key("plane", kinds.TEXT, "name of the plane in which the weight was during this run"),
+        Key("plane", value_kinds.TEXT, "name of the plane in which the weight was during this run"),
         Key(
             "mass_g unbalance_g_mm",
-            kinds.ABOVE_ZERO,
+            value_kinds.ABOVE_ZERO,
             "the weight; every weight that is mounted during a run has a row, also one that stays in from an "
             "earlier run, and a run without weights has none",
             units.WEIGHT,
         ),
         Key(
             "angle_deg",
-            kinds.TURN,
+            value_kinds.TURN,
             "angle from the mark on the rotor; the sheet settings says in which direction it counts",
         ),
         _NOTE,
     ),
     "planes": (
-        Key("plane", kinds.TEXT, "name of a plane of the sheet weights; without settings it needs no row"),
+        Key(
+            "plane",
+            value_kinds.TEXT,
+            "name of a plane of the sheet weights; without settings it needs no row",
+        ),
         *(key for key in PLANE if key.names[0] not in _RARE),
         _NOTE,
     ),
     "sensors": (
-        Key("sensor", kinds.TEXT, "name of a sensor of the sheet runs; without settings it needs no row"),
+        Key(
+            "sensor", value_kinds.TEXT, "name of a sensor of the sheet runs; without settings it needs no row"
+        ),
         *(key for key in SENSOR if key.names[0] not in _RARE),
         _NOTE,
     ),

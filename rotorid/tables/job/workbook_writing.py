@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from rotorid.tables.job.job_as_written import JobSource, job_tables
 from rotorid.tables.job.job_data import Job
-from rotorid.tables.job.keys import JOB
-from rotorid.tables.job.source import JobSource, job_tables
-from rotorid.tables.job.workbook_reading import job_in_sheets
+from rotorid.tables.job.job_from_excel import job_in_sheets
+from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.job.workbook_results import Results, result_sheets
 from rotorid.tables.job.workbook_sheets import NAMES, job_sheets
+from rotorid.tables.reader.excel_pages import Line, Page, book_bytes
 from rotorid.tables.reader.grid import BadCell, Cell, clean
-from rotorid.tables.reader.key import take
-from rotorid.tables.reader.pages import Line, Page, book_bytes
 from rotorid.tables.reader.problems import InputError, Problems
+from rotorid.tables.reader.settings_keys import take
 from rotorid.tables.reader.toml_file import Section
 
 _NAMED = 3

@@ -23,13 +23,13 @@ from rotorid.tables.models.shared_keys import (
     unlike,
     unlike_a_name,
 )
-from rotorid.tables.reader.key import Key, Kind, take
 from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.settings_keys import Key, Kind, take
 from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.harmonic.model import HarmonicModel
+    from rotorid.harmonic.operator_model import HarmonicModel
 
 _IN_TIME = ("M", "C", "K", "states")
 """Keys of models in time; such a file is read by `read_ode_model`, too."""
@@ -149,8 +149,8 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
 
     form = read_time_form(section, problems, initial=False)
     problems.stop()
-    from rotorid.harmonic.hidden import without
     from rotorid.harmonic.operator_equations import harmonic_model
+    from rotorid.harmonic.unmeasured_amplitudes import without
 
     try:
         operators = operator_form(form)

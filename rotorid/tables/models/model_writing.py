@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.arrays import BoolArray
 
 if TYPE_CHECKING:
-    from fem.matrices.motion import Motion
+    from fem.matrices.equations_of_motion import Motion
 
 
 def ode_model_bytes(

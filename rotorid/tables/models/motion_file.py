@@ -17,7 +17,7 @@ from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
-    from fem.matrices.motion import Motion
+    from fem.matrices.equations_of_motion import Motion
 
 
 def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> Motion:
@@ -67,7 +67,7 @@ def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> 
                 )
     problems.stop()
     matrices = problems.need(form.matrices)
-    from fem.matrices.motion import Motion
+    from fem.matrices.equations_of_motion import Motion
 
     return Motion(**found, coordinates=matrices.coordinates, speed=form.speed)
 

@@ -23,14 +23,14 @@ from rotorid.tables.models.shared_keys import (
     unlike,
     unlike_a_name,
 )
-from rotorid.tables.reader.key import Key, Kind, Said, take
-from rotorid.tables.reader.kinds import FLAG, number, table
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
-    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.models.ode_model import OdeModel
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,9 @@ def read_ode_model(path: str | Path) -> OdeModel:
     problems.stop()
     form = read_time_form(section, problems)
     problems.stop()
-    from rotorid.timedomain.models.model import ode_model
-    from rotorid.timedomain.models.nuisance import with_nuisance
+    from rotorid.timedomain.models.ode_model import ode_model
     from rotorid.timedomain.models.second_order import second_order
+    from rotorid.timedomain.models.sensor_offset_drift import with_nuisance
 
     names = form.states if form.matrices is None else form.matrices.coordinates
     outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)

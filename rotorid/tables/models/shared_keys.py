@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from rotorid.base.suggestions import did_you_mean
 from rotorid.expressions import is_name
 from rotorid.tables.reader import kinds
-from rotorid.tables.reader.key import Key, Kind, Said, take
-from rotorid.tables.reader.number import LARGEST
+from rotorid.tables.reader.decimal_numbers import LARGEST
+from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.tables.reader.number import LARGEST
+from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import read_bytes
 

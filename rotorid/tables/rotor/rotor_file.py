@@ -10,12 +10,12 @@ from pathlib import Path
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.model.supports import KINDS
 from rotorid.base.suggestions import did_you_mean
-from rotorid.tables.reader.key import Key, take
-from rotorid.tables.reader.kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, take
 from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
-from rotorid.tables.rotor.plausible import warn_of_value
+from rotorid.tables.rotor.rotor_plausibility import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
 
 

@@ -15,7 +15,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.rotor.plausible import warn_of_rotor, warn_of_table
+from rotorid.tables.rotor.rotor_plausibility import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)
 _INERTIA = one_of(units.INERTIA)

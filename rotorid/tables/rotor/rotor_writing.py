@@ -12,9 +12,9 @@ from fem.model.rotor import Disc, Model, Rotor, Support
 from fem.model.supports import KINDS, Coefficient
 from rotorid.base.registry import names
 from rotorid.base.text import listing
-from rotorid.tables.reader.number import LARGEST, SMALLEST
+from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
-from rotorid.tables.reader.writing import Value, csv_bytes, write_files
+from rotorid.tables.reader.table_writing import Value, csv_bytes, write_files
 from rotorid.tables.rotor.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
 from rotorid.tables.rotor.rotor_file import INERTIA, MODEL
 from rotorid.tables.rotor.rotor_table import ATTACHED, OF_ELEMENTS, Material

@@ -13,7 +13,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs.conventions import FULL_TURN
+from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 COLUMNS = (
     Column("plane", required=False),

@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike
 from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import Origin, RunErrors
 from balancing.data.conventions import Labels
-from balancing.data.errors import Source
+from balancing.data.reading_errors import Source
 from balancing.data.trials import ReadingErrors
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.number import NotANumber, parse_number
+from rotorid.tables.reader.decimal_numbers import NotANumber, parse_number
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit
-from rotorid.tables.runs.conventions import ANGLES, PHASES, StatedErrors
+from rotorid.tables.runs.stated_conventions import ANGLES, PHASES, StatedErrors
 
 _ALLOWED = {"phase": PHASES, "angles": ANGLES}
 _CONVENTION = re.compile(r"(phase|angles)\s*=\s*(.*)")

@@ -25,8 +25,8 @@ from balancing.coefficients.run_errors import marginal
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
 from rotorid.tables.reader.columns import Column, Table
+from rotorid.tables.reader.decimal_numbers import SMALLEST
 from rotorid.tables.reader.grid import Grid, show
-from rotorid.tables.reader.number import SMALLEST
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader, ratio, spelt
 

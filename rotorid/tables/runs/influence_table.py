@@ -18,9 +18,8 @@ from rotorid.base.text import listing
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.table_writing import table_bytes, write_bytes
 from rotorid.tables.reader.units import Unit, UnitError
-from rotorid.tables.reader.writing import table_bytes, write_bytes
-from rotorid.tables.runs.conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 from rotorid.tables.runs.influence_comments import (
     PHASE_MEANING,
     check_notes,
@@ -30,7 +29,8 @@ from rotorid.tables.runs.influence_comments import (
 )
 from rotorid.tables.runs.influence_errors import BASELINE, error_columns, error_values, read_covariance
 from rotorid.tables.runs.runs_table import PHASE, SPEED
-from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
+from rotorid.tables.runs.stated_conventions import FULL_TURN, Angles, Phase, as_angles, as_phase
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

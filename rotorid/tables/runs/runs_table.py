@@ -13,8 +13,8 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
-from rotorid.tables.runs.conventions import FULL_TURN, Conventions
-from rotorid.tables.runs.speeds import merge_speeds, same_speed, show_speed
+from rotorid.tables.runs.speed_merging import merge_speeds, same_speed, show_speed
+from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
 SPEED = Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz"))
 PHASE = Column("phase", one_of(units.ANGLE), ("phase_deg",))

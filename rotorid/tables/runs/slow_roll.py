@@ -26,10 +26,10 @@ from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted, listing
 from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Source, source_name
-from rotorid.tables.reader.key import Said
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.runs.conventions import Conventions
-from rotorid.tables.runs.speeds import nearest_speed, show_speed, show_speeds
+from rotorid.tables.reader.settings_keys import Said
+from rotorid.tables.runs.speed_merging import nearest_speed, show_speed, show_speeds
+from rotorid.tables.runs.stated_conventions import Conventions
 from rotorid.tables.runs.trials import make_trials
 
 SLOW = 0.5

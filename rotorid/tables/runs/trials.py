@@ -9,8 +9,8 @@ from balancing.data.conventions import Labels
 from balancing.data.trials import ReadingErrors, Trials, off_axis
 from rotorid.tables.reader.columns import Source
 from rotorid.tables.reader.problems import Problems
-from rotorid.tables.runs.conventions import DEFAULT_TOLERANCE, Angles, Conventions, Phase, StatedErrors
 from rotorid.tables.runs.runs_table import read_runs
+from rotorid.tables.runs.stated_conventions import DEFAULT_TOLERANCE, Angles, Conventions, Phase, StatedErrors
 from rotorid.tables.runs.weights_table import read_weights
 
 

@@ -13,7 +13,7 @@ from rotorid.tables.reader import units
 from rotorid.tables.reader.columns import Column, Source, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, one_of
-from rotorid.tables.runs.conventions import FULL_TURN, Conventions
+from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
 
 COLUMNS = (
     Column("run"),

@@ -9,8 +9,8 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.integration import taylor
-from rotorid.timedomain.integration.system import Augmented
-from rotorid.timedomain.models.errors import LARGEST, SimulationError, diverged
+from rotorid.timedomain.integration.sensitivity_equations import Augmented
+from rotorid.timedomain.models.simulation_errors import LARGEST, SimulationError, diverged
 
 MAX_STEPS = {"dop853": 10_000, "lsoda": 30_000}
 """Steps between the first and the last time (more samples than a tenth of this allow ten each)."""

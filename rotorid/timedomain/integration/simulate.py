@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method, find
-from rotorid.timedomain.integration import adaptive, propagation
-from rotorid.timedomain.integration.system import Augmented
-from rotorid.timedomain.models.errors import SimulationError, check_finite
-from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.integration import adaptive, matrix_exponential
+from rotorid.timedomain.integration.sensitivity_equations import Augmented
+from rotorid.timedomain.models.ode_model import OdeModel
 from rotorid.timedomain.models.record import Record, from_t0
+from rotorid.timedomain.models.simulation_errors import SimulationError, check_finite
 
 __all__ = ["INTEGRATORS", "SimulationError", "Trajectory", "inputs_of", "simulate"]
 
@@ -170,7 +170,7 @@ def _exact(
     matrix[0, n + 1 : n + 1 + nu, n + 1 + nu :] = np.eye(nu)
     growth = np.diff(u[:, :nu], axis=0) / np.diff(t)[:, None]
     drive = np.concatenate([np.ones((len(t) - 1, 1)), u[:-1, :nu], growth], axis=1)
-    return *propagation.propagate(t, x0, s0, matrix[0], matrix[1:], drive), "expm"
+    return *matrix_exponential.propagate(t, x0, s0, matrix[0], matrix[1:], drive), "expm"
 
 
 def _heun(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:

@@ -15,8 +15,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from rotorid.timedomain.integration.system import Augmented
-    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.integration.sensitivity_equations import Augmented
+    from rotorid.timedomain.models.ode_model import OdeModel
 
 WORK = 20_000
 """Steps of the ordinary way after which a model is compiled."""

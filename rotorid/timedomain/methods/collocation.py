@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.models.errors import SimulationError
+from rotorid.timedomain.models.simulation_errors import SimulationError
 
 Curve = Callable[[FloatArray], FloatArray]
 """Values (*B, …) at times (*B,)."""

@@ -7,8 +7,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.timedomain.integration.simulate import SimulationError
-from rotorid.timedomain.methods.path import Path, at, half_square, negligible
-from rotorid.timedomain.methods.problem import Problem
+from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
+from rotorid.timedomain.methods.least_squares_problem import Problem
 
 
 def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, tolerance: float) -> Path:

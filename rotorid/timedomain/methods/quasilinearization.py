@@ -17,10 +17,10 @@ from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
-from rotorid.timedomain.methods.path import Path, at, half_square, negligible
-from rotorid.timedomain.methods.problem import LARGEST, Problem
+from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
+from rotorid.timedomain.methods.least_squares_problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
-from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.ode_model import OdeModel
 from rotorid.timedomain.models.record import Record
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.regression.search import Search, drive
 from rotorid.timedomain.integration.simulate import SimulationError, simulate
-from rotorid.timedomain.methods.problem import OutOfTime, Problem
+from rotorid.timedomain.methods.least_squares_problem import OutOfTime, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.record import Record
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import gain
 from rotorid.timedomain.integration.simulate import inputs_of, simulate
-from rotorid.timedomain.methods.problem import Problem
-from rotorid.timedomain.models.model import OdeModel, ode_model
+from rotorid.timedomain.methods.least_squares_problem import Problem
+from rotorid.timedomain.models.ode_model import OdeModel, ode_model
 from rotorid.timedomain.models.record import Record
 
 Curve = Callable[[FloatArray], FloatArray]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rotorid import expressions
 from rotorid.timedomain.models.compiled import signs
-from rotorid.timedomain.models.model import OdeModel
+from rotorid.timedomain.models.ode_model import OdeModel
 
 if TYPE_CHECKING:
     from fem.state_space import StateSpace

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from rotorid.timedomain.models.model import OdeModel
+    from rotorid.timedomain.models.ode_model import OdeModel
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.timedomain.models.compiled import Compiled
-from rotorid.timedomain.models.errors import SimulationError
-from rotorid.timedomain.models.model import OdeModel, ode_model
-from rotorid.timedomain.models.reading import Reader
+from rotorid.timedomain.models.model_text import Reader
+from rotorid.timedomain.models.ode_model import OdeModel, ode_model
+from rotorid.timedomain.models.simulation_errors import SimulationError
 
 Matrix = Sequence[Sequence[float | str]] | FloatArray
 """Numbers or expressions of parameters, (n, n)."""

@@ -6,12 +6,7 @@ from repetitions import highest_share, lowest_share, repetitions
 from scipy.special import fdtri
 from scipy.stats import kstest
 
-from balancing.coefficients.run_errors import (
-    RunErrors,
-    run_columns,
-    runs_of,
-)
-from balancing.coefficients.run_likelihood import (
+from balancing.coefficients.run_error_estimate import (
     _grid,
     corrected_row,
     estimated,
@@ -19,6 +14,11 @@ from balancing.coefficients.run_likelihood import (
     scatter,
     spare_rows,
     spectrum,
+)
+from balancing.coefficients.run_errors import (
+    RunErrors,
+    run_columns,
+    runs_of,
 )
 
 

@@ -8,7 +8,7 @@ from balancing_data import GRAM, bruel_kjaer, complex_normal, job, noisy, synthe
 from repetitions import of_a_spread, repetitions
 
 from balancing import Influence, Labels, ReadingErrors, correct, estimate_influence
-from balancing.data.errors import ASSUMED, error_model, reading_covariance
+from balancing.data.reading_errors import ASSUMED, error_model, reading_covariance
 from balancing.data.trials import RunScatter
 from balancing.solvers.error_propagation import correction_jacobian, prediction_covariance
 from rotorid.regression import stretch

@@ -77,7 +77,7 @@ def test_assumed_errors_that_are_not_too_small(example):
 
 def test_errors_in_common_taken_as_independent_are_noticed(example, monkeypatch):
     """The bounds refuse the wrong model: every error between runs its own."""
-    import balancing.coefficients.run_likelihood as run_likelihood
+    import balancing.coefficients.run_error_estimate as run_likelihood
 
     monkeypatch.setattr(run_likelihood, "SHARES", (1.0,))
     n = repetitions(500)

@@ -8,7 +8,7 @@ import pytest
 from balancing_data import complex_normal, synthetic
 
 from balancing import Labels, ReadingErrors, correct, estimate_influence
-from balancing.correction.judgement import judge, judge_unbalance
+from balancing.correction.limit_check import judge, judge_unbalance
 from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
 from balancing.data.limits import Limits
 from balancing.iso21940 import tolerance

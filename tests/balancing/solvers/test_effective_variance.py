@@ -7,7 +7,7 @@ from scipy.optimize import least_squares as optimise
 from scipy.optimize import minimize
 
 from balancing import UndeterminedError
-from balancing.data.errors import ReadingErrors, reading_covariance
+from balancing.data.reading_errors import ReadingErrors, reading_covariance
 from balancing.solvers.effective_variance import FLOOR, effective_variance
 from balancing.solvers.error_propagation import prediction_covariance
 from balancing.solvers.likelihood import evaluate, gradient, hessian, problem_of

@@ -5,7 +5,7 @@ import pytest
 from balancing_data import complex_normal
 
 from balancing import ReadingErrors, UndeterminedError
-from balancing.data.errors import reading_covariance
+from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.regularised import BIAS, STRENGTHS, cross_validated, harmless, ridge, truncated
 from rotorid.regression import stretch, unstretch
 

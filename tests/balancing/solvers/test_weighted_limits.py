@@ -7,7 +7,7 @@ import pytest
 
 from balancing import Limits
 from balancing.solvers import likelihood, methods, weighted_limits
-from balancing.solvers.methods import fit_weights
+from balancing.solvers.correction_methods import fit_weights
 from rotorid.regression import stretch
 from tests.helpers.limited_problems import global_search, problem
 from tests.helpers.repetitions import FULL

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.bands import assemble, dense, shaft_energy
+from fem.matrices.banded_matrices import assemble, dense, shaft_energy
 
 # E = 2.1e11 Pa, ρ = 7850 kg/m³, D = 0.1 m, L = 1 m, rad/s.
 SIMPLY = [1276.18775, 5104.75102, 11485.68979]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fem
-from fem.matrices.bands import assemble, dense
+from fem.matrices.banded_matrices import assemble, dense
 
 FULL = fem.Model(shear=True, rotary_inertia=True, gyroscopic=True)
 MASS, EI = 12.0, 2.1e11 * math.pi * 0.04**4 / 64

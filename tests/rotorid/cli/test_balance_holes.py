@@ -8,7 +8,7 @@ import pytest
 from cases import each_of
 
 from balancing import correct, estimate_influence
-from balancing.mounting.mounted import mount
+from balancing.mounting.mount import mount
 from balancing.plots.discs import mounted_discs
 from rotorid.samples import sample_data
 from rotorid.tables import read_job

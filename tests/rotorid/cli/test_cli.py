@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rotorid.samples import sample_data
-from rotorid.workflows.parameters import speeds
+from rotorid.workflows.option_values import speeds
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"

@@ -15,7 +15,7 @@ import fem
 from rotorid.cli import progress
 from rotorid.samples import sample_data
 from rotorid.tables import read_influence, read_rotor, read_unbalance, write_rotor
-from rotorid.workflows.parameters import band, nodes, sensors
+from rotorid.workflows.option_values import band, nodes, sensors
 
 ROTOR23 = sample_data() / "rotor23.csv"
 COMPRESSOR = sample_data() / "compressor" / "rotor.toml"

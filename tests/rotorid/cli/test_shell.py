@@ -12,7 +12,7 @@ import sys
 import pytest
 
 from rotorid.samples import sample_data
-from rotorid.tables.reader.writing import write_files
+from rotorid.tables.reader.table_writing import write_files
 
 ROTOR = sample_data() / "rotor23.csv"
 BK = sample_data() / "bk_two_plane"
@@ -199,7 +199,7 @@ def test_extreme_options_are_answered_or_refused(cli):
 
 
 def test_speeds_are_bounded():
-    from rotorid.workflows.parameters import FASTEST, band, speeds
+    from rotorid.workflows.option_values import FASTEST, band, speeds
 
     for text, unit in itertools.product(("1e9", "9e9", "1e300"), ("rpm", "Hz", "")):
         if float(text) * {"rpm": 0.105, "Hz": 6.28, "": 1.0}[unit] > FASTEST:

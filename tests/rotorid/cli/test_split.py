@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from rotorid.cli.commands.split import split
-from rotorid.workflows.quantities import vectors
+from rotorid.workflows.option_quantities import vectors
 from rotorid.workflows.split import SplitOptions
 from rotorid.workflows.split import split as work
 

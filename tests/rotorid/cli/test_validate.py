@@ -52,7 +52,7 @@ def test_text_ends_with_the_counts(cli, some):
 def test_numbers_that_differ_end_with_status_1_and_are_named(cli, some, monkeypatch, tmp_path):
     right = masses.equivalent_masses
     monkeypatch.setattr(
-        "rotorid.validation.masses.equivalent_masses", lambda a, *more: right(a * 1.01, *more)
+        "rotorid.validation.formula_50.equivalent_masses", lambda a, *more: right(a * 1.01, *more)
     )
     table = tmp_path / "numbers.csv"
     outcome = cli("validate", "--output", table)

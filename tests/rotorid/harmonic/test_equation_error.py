@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import Experiments, experiments
-from rotorid.harmonic.rows import build_rows, row_covariance
+from rotorid.harmonic.regression_rows import build_rows, row_covariance
 from rotorid.regression import least_squares, stack
 
 MASS = ["(m*p**2 + alpha*p + c)*X = F"]

@@ -12,9 +12,9 @@ from fem_rotors import rotor23, uniform
 import fem
 from rotorid.plots import plot
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.running_plots import plot_running, plot_stability
+from rotorid.reduction.dynamics.comparison_plots import plot_running, plot_stability
 from rotorid.reduction.methods import compare_methods
-from rotorid.reduction.placement_map import plot_placement
+from rotorid.reduction.placement_plot import plot_placement
 from rotorid.reduction.plots import plot_methods, plot_reduction
 
 mpl.use("Agg")

@@ -9,9 +9,9 @@ from sheets import COMMANDS, Shown, disagreement, disagreements, make, read_shee
 
 import fem
 from rotorid.report.document import Document
-from rotorid.report.grids import evenly, every_warning
-from rotorid.report.inputs import rotor_sheet, unbalance_table
+from rotorid.report.number_tables import evenly, every_warning
 from rotorid.report.rotor import critical_report
+from rotorid.report.rotor_description import rotor_sheet, unbalance_table
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
 

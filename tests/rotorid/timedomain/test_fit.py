@@ -17,8 +17,8 @@ from timedomain_cases import (
 
 from rotorid.base.registry import names
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.methods.search import METHODS
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.methods.fit_methods import METHODS
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 

@@ -6,8 +6,8 @@ from repetitions import FULL
 
 from rotorid.base.registry import names
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.methods.search import METHODS
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.methods.fit_methods import METHODS
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 RATES = ("-a*x", "a*x", "exp(a*x) - b", "-a*x**3 + b", "b/(x - a)", "a*sinh(b*x)", "-x**a", "log(x)*a + t*b")

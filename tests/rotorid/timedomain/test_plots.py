@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 from rotorid.timedomain.plots import (
     draw_iterations,

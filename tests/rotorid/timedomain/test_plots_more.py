@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 from rotorid.timedomain.plots import FAR, draw_iterations, figure_fit
 

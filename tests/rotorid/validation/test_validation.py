@@ -254,11 +254,16 @@ def unstretched(function):
         ("fem.matrices.elements._MASS", lambda form: form * 1.001, "rotor", 3),
         ("fem.matrices.elements._MASS", lambda form: form * 1.03, "rotor", 60),
         ("fem.matrices.elements._BENDING", lambda form: form * 1.01, "masses", 10),
-        ("rotorid.reduction.equivalent.masses.design", lambda f: scaled(f, 1.0001), "masses", 8),
-        ("rotorid.validation.masses.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
-        ("rotorid.harmonic.rows.Rows.real_rows", unstretched, "lessons", 15),
-        ("rotorid.harmonic.model.HarmonicModel.predict", conjugate, "lessons", 8),
-        ("rotorid.validation.lessons.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
+        (
+            "rotorid.reduction.equivalent.equivalent_masses_formula_50.design",
+            lambda f: scaled(f, 1.0001),
+            "masses",
+            8,
+        ),
+        ("rotorid.validation.formula_50.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
+        ("rotorid.harmonic.regression_rows.Rows.real_rows", unstretched, "lessons", 15),
+        ("rotorid.harmonic.operator_model.HarmonicModel.predict", conjugate, "lessons", 8),
+        ("rotorid.validation.identification.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),
         (
             "rotorid.timedomain.methods.quasilinearization._heun",
             lambda f: times(f, 1.01),
@@ -266,13 +271,18 @@ def unstretched(function):
             100,
         ),
         (
-            "rotorid.timedomain.integration.propagation.expm_and_derivatives",
+            "rotorid.timedomain.integration.matrix_exponential.expm_and_derivatives",
             lambda f: scaled(f, 1.0001),
             "time_records",
             50,
         ),
         ("balancing.coefficients.influence.gain", lambda f: times(f, np.exp(0.05j)), "balancing", 4),
-        ("balancing.solvers.solve._closed_form", lambda f: times(f, np.exp(0.05j)), "balancing", 8),
+        (
+            "balancing.solvers.least_squares_minmax._closed_form",
+            lambda f: times(f, np.exp(0.05j)),
+            "balancing",
+            8,
+        ),
     ],
 )
 def test_a_wrong_formula_makes_numbers_differ(monkeypatch, target, wrong, name, least):

@@ -8,7 +8,7 @@ import pytest
 
 import balancing.coefficients.influence
 import balancing.correction.correct
-import rotorid.timedomain.integration.propagation
+import rotorid.timedomain.integration.matrix_exponential
 import rotorid.timedomain.methods.quasilinearization
 from rotorid.validation import balancing as published
 from rotorid.validation import time_records
@@ -269,12 +269,12 @@ def test_a_wrong_step_of_quasilinearization_is_noticed(monkeypatch):
 
 def test_a_wrong_solution_in_time_is_noticed(monkeypatch):
     """A matrix exponential with time running 0.1 % fast."""
-    right = rotorid.timedomain.integration.propagation.expm_and_derivatives
+    right = rotorid.timedomain.integration.matrix_exponential.expm_and_derivatives
 
     def fast(matrices, derivatives):
         return right(1.001 * matrices, 1.001 * derivatives)
 
-    monkeypatch.setattr(rotorid.timedomain.integration.propagation, "expm_and_derivatives", fast)
+    monkeypatch.setattr(rotorid.timedomain.integration.matrix_exponential, "expm_and_derivatives", fast)
     found = [r for r in time_records.rows() if r.source.startswith("[F]")]
     differs = [r for r in found if r.status == "differs"]
     assert len(differs) > 150

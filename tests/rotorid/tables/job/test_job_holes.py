@@ -9,7 +9,7 @@ from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_c
 
 from balancing import correct, estimate_influence
 from rotorid.tables import read_job
-from rotorid.workflows.quantities import limited
+from rotorid.workflows.option_quantities import limited
 
 HEAD = 'runs = "runs.csv"\nweights = "weights.csv"\n'
 AGAINST = 'angles = "against rotation"\n'

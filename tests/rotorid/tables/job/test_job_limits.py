@@ -10,7 +10,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_boo
 
 from balancing import Labels
 from rotorid.tables import job_from_files, read_job
-from rotorid.workflows.quantities import limited
+from rotorid.workflows.option_quantities import limited
 
 FAST = [[*row[:1], 2000, *row[2:]] for row in RUNS[1:]]
 TWO_SPEEDS = [*RUNS, *FAST]

@@ -7,7 +7,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_book, write_csv
 
 from balancing import correct, estimate_influence
-from balancing.correction.check import compare_check
+from balancing.correction.check_run import compare_check
 from fem.model.sensors import Sensor
 from rotorid.tables import read_job, read_rotor, read_trials, write_influence
 

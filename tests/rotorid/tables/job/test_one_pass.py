@@ -12,7 +12,7 @@ from cases import each_of
 import rotorid.tables.job
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 ROOM = str(Path(rotorid.tables.job.__file__).parent)

@@ -10,7 +10,7 @@ import pytest
 from cases import each_of
 
 from rotorid.samples import sample_data
-from rotorid.tables.job.keys import JOB, PLANE
+from rotorid.tables.job.job_keys import JOB, PLANE
 from rotorid.tables.schema import FILES, schema
 
 FILES_OF = {

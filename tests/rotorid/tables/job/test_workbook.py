@@ -16,9 +16,9 @@ from workbook_jobs import CHECK, HEAD, PARTS, ROTOR, SAMPLES, SLOW, differences
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, job_from_files, read_job, write_influence
+from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.job_data import Overrides
-from rotorid.tables.job.source import JobSource
-from rotorid.tables.job.workbook_reading import key_parts
+from rotorid.tables.job.job_from_excel import key_parts
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 
 DATA = sample_data()
@@ -228,7 +228,7 @@ def test_tables_without_a_job_file_and_what_the_caller_says(folder, tmp_path):
 
 
 def test_limits_of_the_command_line_come_back(folder, tmp_path):
-    from rotorid.workflows.quantities import largest_amplitudes, largest_weights, limited
+    from rotorid.workflows.option_quantities import largest_amplitudes, largest_weights, limited
 
     path = write_job(folder, PARTS["limits"])
     for max_mass, limit in (("2.2g", ["0.3mil_pp"]), ("1=0.07oz,2=3", ["A=7.7", "B=0.012"])):
@@ -316,6 +316,6 @@ def test_the_comparison_sees_every_part(folder):
 
 def test_too_much_for_a_workbook_is_refused(folder, tmp_path, monkeypatch):
     path = write_job(folder, "")
-    monkeypatch.setattr("rotorid.tables.reader.pages.MOST_ROWS", 6)
+    monkeypatch.setattr("rotorid.tables.reader.excel_pages.MOST_ROWS", 6)
     with pytest.raises(ValueError, match="'runs' would have 7 rows, and a workbook holds 6"):
         job_workbook_bytes(read_job(path), JobSource((path,)), tmp_path / "sheet.xlsx")

@@ -16,7 +16,7 @@ from workbook_jobs import differences
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
 from rotorid.tables import read_job
-from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_template import template_bytes
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 

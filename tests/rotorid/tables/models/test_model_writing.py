@@ -16,7 +16,7 @@ import fem
 from rotorid.harmonic import identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.small import small_rotor
+from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes

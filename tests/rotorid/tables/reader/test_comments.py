@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, complaints, csv_text, write_book, write_csv
 
 from rotorid.tables import read_rotor, read_trials
+from rotorid.tables.reader.excel_workbook import read_workbook
 from rotorid.tables.reader.grid import make_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.text_file import parse_text
-from rotorid.tables.reader.workbook import read_workbook
 
 HEADER = ("run", "value", "text")
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from tables_data import RUNS, WEIGHTS, csv_text, replaced, write_book, write_csv
 
 from balancing import estimate_influence
-from balancing.correction.refine import refine
+from balancing.correction.refine_coefficients import refine
 from balancing.data.trials import ReadingErrors
 from rotorid.tables import read_job, read_trials
-from rotorid.tables.job.source import JobSource
+from rotorid.tables.job.job_as_written import JobSource
 from rotorid.tables.job.workbook_writing import job_workbook_bytes
 from rotorid.tables.reader.digits import written_steps
 from rotorid.tables.reader.grid import Shown
@@ -158,7 +158,7 @@ def test_check_runs_keep_theirs(trials, monkeypatch):
         seen.append(trials)
         return estimate_influence(replace(trials, steps=None))  # these hide every effect
 
-    monkeypatch.setattr("balancing.correction.refine.estimate_influence", fit)
+    monkeypatch.setattr("balancing.correction.refine_coefficients.estimate_influence", fit)
     check = replace(
         trials,
         runs=("check",),

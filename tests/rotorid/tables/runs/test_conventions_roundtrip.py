@@ -17,8 +17,8 @@ from whirl_rotors import machine
 
 import fem
 from balancing import correct, estimate_influence
-from balancing.coefficients.from_model import model_influence
-from balancing.correction.check import compare_check
+from balancing.coefficients.coefficients_from_model import model_influence
+from balancing.correction.check_run import compare_check
 from rotorid.tables import read_job, write_rotor
 
 SPEEDS_RPM = (1500, 4200)

@@ -9,7 +9,7 @@ from tables_data import complaints, replaced, the_only, write_csv
 
 import fem
 from balancing import Labels, ReadingErrors, Trials, correct, estimate_influence
-from balancing.coefficients.from_model import model_influence
+from balancing.coefficients.coefficients_from_model import model_influence
 from balancing.coefficients.run_errors import marginal
 from balancing.data.trials import RunScatter
 from rotorid.tables import (

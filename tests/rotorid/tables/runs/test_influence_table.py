@@ -15,7 +15,7 @@ from tables_data import RUNS, WEIGHTS, complaints, replaced, the_only, write_csv
 import fem
 from balancing import estimate_influence
 from rotorid.tables import influence_frame, read_influence, read_trials, write_influence, write_table
-from rotorid.tables.reader.writing import write_bytes
+from rotorid.tables.reader.table_writing import write_bytes
 
 HEADER = ["speed_rpm", "sensor", "plane", "influence_um_pp_per_g", "phase_deg"]
 TABLE = [

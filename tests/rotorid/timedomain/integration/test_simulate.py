@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rotorid.timedomain import Record, SimulationError, ode_model, simulate
-from rotorid.timedomain.integration.propagation import expm_and_derivatives
+from rotorid.timedomain.integration.matrix_exponential import expm_and_derivatives
 
 CHAIN_START = {"y1": 0.5, "v1": 0.1, "y2": -0.2, "v2": -0.1, "y3": 0.3, "v3": 0.1}
 
@@ -246,7 +246,7 @@ def test_long_records_are_solved_in_pieces(rate, monkeypatch):
         {"x": "v", "v": rate}, initial={"x": 1, "v": 0}, estimate={"k": 4.0, "c": 0.3}, inputs=["u"]
     )
     whole = simulate(model, model.start, record)
-    monkeypatch.setattr("rotorid.timedomain.integration.propagation.BATCH", 400)
+    monkeypatch.setattr("rotorid.timedomain.integration.matrix_exponential.BATCH", 400)
     pieces = simulate(model, model.start, record)
     np.testing.assert_allclose(pieces.x, whole.x, rtol=0, atol=1e-13)
     np.testing.assert_allclose(pieces.S, whole.S, rtol=0, atol=1e-13)

@@ -7,7 +7,7 @@ from repetitions import FULL
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.integration import taylor
 from rotorid.timedomain.integration.simulate import SimulationError, simulate
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 pytest.importorskip("heyoka", reason="the extra rotorid[fast] (heyoka) is not installed")

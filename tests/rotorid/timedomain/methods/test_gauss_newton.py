@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 

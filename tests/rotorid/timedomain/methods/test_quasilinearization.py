@@ -7,7 +7,7 @@ import pytest
 from timedomain_cases import book_model, book_record, decay, decay_record
 
 from rotorid.timedomain.fit import fit
-from rotorid.timedomain.models.model import ode_model
+from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
 
 DATA = Path(__file__).parents[3] / "data"

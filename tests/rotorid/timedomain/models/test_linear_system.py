@@ -9,7 +9,7 @@ from cases import each_of
 import fem
 from fem.state_space import state_space as of_motion
 from rotorid.reduction import reduce
-from rotorid.reduction.dynamics.small import small_rotor
+from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes

@@ -1,0 +1,99 @@
+"""Columns that tables of vibrations and weights are made of, in the job's own units and conventions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from balancing.data.conventions import Labels
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.result import Column, rows
+from rotorid.base.rpm import rpm
+from rotorid.base.text import figures
+
+
+def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
+    """The values, or NaN where nothing is known."""
+    return np.full(shape, np.nan) if values is None else values
+
+
+def rms(values: ArrayLike) -> float:
+    """Root mean square of real or complex numbers."""
+    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
+
+
+def degrees(angle: float, places: int = 1) -> str:
+    """An angle as text, 0 ≤ angle < 360."""
+    return f"{round(angle, places) % 360:.{places}f}°"
+
+
+def three_figures(value: float) -> str:
+    """An amplitude as text."""
+    return figures(value, 3)
+
+
+def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> tuple[Column, ...]:
+    """plane, mass, unit and angle_deg of weights (P,), kg or kg·m."""
+    mass, angle = labels.weight(weights)
+    return (
+        Column("plane", planes, str),
+        Column("mass", mass, figures, labels.weight_unit),
+        Column("unit", (labels.weight_unit,) * len(planes)),
+        Column("angle_deg", angle, degrees, "angle"),
+    )
+
+
+def weight_rows(labels: Labels, planes: Sequence[str], weights: ArrayLike) -> list[dict[str, Any]]:
+    """The same as JSON rows."""
+    return rows(weight_columns(labels, planes, weights))
+
+
+def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -> list[dict[str, Any]]:
+    """JSON rows of the planes in which there is something."""
+    there = np.flatnonzero(weights).tolist()
+    return weight_rows(labels, [planes[p] for p in there], weights[there])
+
+
+def reading_columns(speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
+    """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
+    turns = [rpm(speed) for speed in speeds]
+    return (
+        Column("speed_rpm", np.repeat(turns, len(sensors)), "{:.6g}".format, "rpm"),
+        Column("sensor", tuple(sensors) * len(turns), str),
+    )
+
+
+def covariance_column(labels: Labels, name: str, covariance: FloatArray | None, count: int) -> Column:
+    """Covariance (2, 2) of each of so many readings; None: not known."""
+    if covariance is None:
+        return Column(name, [None] * count)
+    return Column(name, labels.vibration_covariance(covariance).reshape(-1, 2, 2))
+
+
+def vector_columns(
+    labels: Labels, name: str, readings: ComplexArray, nothing: float | None = None
+) -> tuple[Column, Column]:
+    """NAME and NAME_phase_deg of readings of any shape, one row a reading.
+
+    Parameters
+    ----------
+    labels
+        Units and conventions.
+    name
+        Of the amplitude.
+    readings
+        Inside (SI, lead).
+    nothing
+        Amplitudes up to this one, in the job's unit, are rounding: 0, and their direction means nothing.
+    """
+    size, phase = (part.ravel() for part in labels.vibration(readings))
+    if nothing is not None:
+        phase = np.where(size > nothing, phase, np.nan)
+        size = np.where(size > nothing, size, 0.0)
+    return (
+        Column(name, size, three_figures),
+        Column(f"{name}_phase_deg", phase, lambda angle: degrees(angle, 0), "phase"),
+    )

@@ -1,0 +1,192 @@
+"""Pieces in holes: result, text, and JSON types in the job's units and conventions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from balancing.correction.correction_result import Correction, small
+from balancing.data.result_columns import (
+    covariance_column,
+    reading_columns,
+    rms,
+    vector_columns,
+    weight_columns,
+)
+from balancing.mounting.discrete_weights import Discrete
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import figures, wrap
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from balancing.mounting.holes import Holes, Mounting
+
+AGAINST = 3.0
+"""Pieces that weigh more than this times what they make are said to act against each other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mounted:
+    """Pieces in holes that leave the least vibration.
+
+    Attributes
+    ----------
+    correction
+        The continuous one, in the same planes.
+    holes
+        Of each plane; None: any weight at any angle.
+    found
+        Pieces of each plane, and how near the optimum they are known to be.
+    after
+        Predicted vibration with them, (S, C).
+    after_covariance
+        Of a reading in a check run around it, (S, C, 2, 2); None where errors are unknown.
+    on_top_of
+        Run whose weights stay mounted; None: everything is removed before.
+    """
+
+    correction: Correction
+    holes: tuple[Holes | None, ...]
+    found: Discrete
+    after: ComplexArray
+    after_covariance: FloatArray | None
+    on_top_of: str | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Planes in which pieces act mostly against each other, for a gain that may be nothing."""
+        labels, said = self.correction.labels, []
+        for plane, chosen in zip(self.correction.planes, self.found.mountings, strict=True):
+            if chosen is None:
+                continue
+            total, made = float(chosen.amounts.sum()), abs(chosen.vector)
+            if total > AGAINST * made:
+                said.append(
+                    f"plane {plane}: pieces of {labels.weight_words(total)} together make "
+                    f"{labels.weight_words(made)}, they act against each other: state a "
+                    "stock, or fewer pieces per hole, if fewer would do"
+                )
+        return tuple(said)
+
+    @property
+    def weights(self) -> ComplexArray:
+        """What the pieces of each plane add up to, (P,)."""
+        return self.found.weights
+
+    @property
+    def plane_by_plane(self) -> float:
+        """How many times as much the nearest pieces of each plane by itself leave; not finite: unknown."""
+        found = self.found
+        known = found.objective > 0 and all(h is not None for h in self.holes)
+        return found.rounded_objective / found.objective if known else np.nan
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, in the job's units and conventions."""
+        c, labels = self.correction, self.correction.labels
+        actions = Column("action", [_action(c, plane) for plane in c.planes])
+        residuals = (
+            *reading_columns(c.speeds, c.sensors),
+            *vector_columns(labels, "after", self.after),
+            covariance_column(labels, "after_covariance", self.after_covariance, self.after.size),
+        )
+        after = labels.vibration(self.after)[0]
+        return plain(
+            {
+                "planes": rows((*weight_columns(labels, c.planes, self.weights), actions)),
+                "on_top_of": self.on_top_of,
+                "warnings": self.warnings,
+                "holes": rows(_columns(self)),
+                "residuals": rows(residuals),
+                "rms_after": rms(after),
+                "max_after": after.max(),
+                "proven": self.found.proven,
+                "gap": self.found.gap,
+                "plane_by_plane": self.plane_by_plane,
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
+        return frame(_columns(self))
+
+    def summary(self) -> str:
+        """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""
+        c, labels = self.correction, self.correction.labels
+        columns = _columns(self)
+        used = columns[0].values
+        head = "What to mount, all planes together" if not c.remove else "What to mount or to remove"
+        stays = (
+            "" if self.on_top_of is None else f", in addition to what is mounted in run {self.on_top_of!r}"
+        )
+        lines = [*(f"Warning: {words}" for words in self.warnings), head + stays]
+        if labels.assumed:
+            said = " and ".join(labels.assumed)
+            lines.append(
+                wrap(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
+            )
+        lines.append(text(columns, left=2) if used else "  nothing: every piece would make it worse")
+        scale = float(labels.vibration(c.before)[0].max())
+        left = []
+        for z in (self.after, c.after):
+            size = labels.vibration(z)[0]
+            left.append(f"rms {small(rms(size), scale)}, largest {small(size.max(), scale)}")
+        lines.append(f"{labels.vibration_unit} left: {left[0]}; with any weights {left[1]}".strip())
+        lines += [
+            f"Plane {plane}: nothing; no pieces that it can take make it better."
+            for plane in c.planes
+            if plane not in used
+        ]
+        if np.isfinite(self.plane_by_plane):
+            lines.append(
+                f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
+            )
+        lines.append(
+            "No other choice of pieces is better (proven)."
+            if self.found.proven
+            else f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
+        )
+        return "\n".join(lines)
+
+
+def _action(correction: Correction, plane: str) -> str:
+    return "remove" if plane in correction.remove else "add"
+
+
+def _columns(m: Mounted) -> tuple[Column, ...]:
+    """A row for each hole that gets something; one without hole for a plane where any angle is possible."""
+    c, labels = m.correction, m.correction.labels
+    places: list[tuple[str, str, complex, str]] = []
+    for plane, holes, mounting, weight in zip(c.planes, m.holes, m.found.mountings, m.weights, strict=True):
+        if holes is None or mounting is None:
+            places.append((plane, "any", complex(weight), ""))
+            continue
+        for h in np.flatnonzero(mounting.amounts > 0):
+            vector = mounting.amounts[h] * np.exp(1j * holes.angles[h])
+            words = _pieces(holes, mounting, int(h), labels.weight_scale)
+            places.append((plane, holes.names[h], vector, words))
+    planes = [place[0] for place in places]
+    actions = [_action(c, plane) for plane in planes]
+    size, angle = labels.weight([place[2] for place in places])
+    gone = np.where(np.array(actions) == "remove", 180.0, 0.0)
+    return (
+        Column("plane", planes, lambda plane: f"{plane} (remove)" if plane in c.remove else plane),
+        Column("action", actions),
+        Column("hole", [place[1] for place in places], str),
+        Column("angle_deg", np.mod(angle + gone, 360), "{:.1f}°".format, "angle"),
+        Column("mass", size, figures, labels.weight_unit),
+        Column("unit", [labels.weight_unit] * len(places)),
+        Column("pieces", [place[3] for place in places], str),
+    )
+
+
+def _pieces(holes: Holes, mounting: Mounting, h: int, scale: float) -> str:
+    return " + ".join(
+        f"{int(count)} × {figures(float(piece) * scale)}" if count > 1 else figures(float(piece) * scale)
+        for piece, count in zip(holes.pieces, mounting.counts[h], strict=True)
+        if count
+    )

@@ -1,0 +1,101 @@
+"""Critical speeds and mode shapes: the result; they are found in `fem.critical`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fem.model.rotor import Rotor
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, numbered
+from rotorid.base.rpm import RPM
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The lowest critical speeds of a rotor, and its shapes there.
+
+    Attributes
+    ----------
+    frequencies
+        Critical speeds: where the frequency of free whirl equals the speed of rotation, rad/s, ascending,
+        shape (n,); 0 for a rigid-body motion.
+    shapes
+        Lateral deflection of each node in each mode, shape (N, n), scaled to 1 at the first node, or to
+        the largest value 1 where the first node is a node of the mode. On supports that differ in x and y
+        this is the deflection in the direction (x or y) in which the rotor moves more.
+    slopes
+        Slopes of these shapes at the nodes, 1/m per unit of deflection in m, shape (N, n); with shear, the
+        tilt of the cross-section.
+    rotor
+        The rotor.
+    direction
+        Of each mode: "forward" (with the rotation), "backward", or "mixed" where the orbits of different
+        nodes turn in different directions or are straight lines. On rotationally symmetric supports
+        only forward critical speeds are listed: unbalance does not excite the others.
+    x, y
+        Complex amplitudes of both lateral directions, shape (N, n), in the scale of `shapes`.
+    warnings
+        What the reader must know.
+    cut
+        Which critical speeds the bearing tables hold beyond the n asked for; else empty.
+    """
+
+    frequencies: FloatArray
+    shapes: FloatArray
+    slopes: FloatArray
+    rotor: Rotor
+    direction: tuple[str, ...]
+    x: ComplexArray
+    y: ComplexArray
+    warnings: tuple[str, ...] = ()
+    cut: str = ""
+
+    @property
+    def positions(self) -> FloatArray:
+        """Axial position of each node, m, shape (N,)."""
+        return self.rotor.positions
+
+    @property
+    def rpm(self) -> FloatArray:
+        """Critical speeds in revolutions per minute, shape (n,)."""
+        return self.frequencies * RPM
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid critical`."""
+        return plain(
+            {
+                "critical_speeds_rad_s": self.frequencies,
+                "critical_speeds_rpm": self.rpm,
+                "positions_m": self.positions,
+                "mode_shapes": self.shapes.T,
+                "direction": self.direction,
+                "critical_speeds_cut": self.cut or None,
+                "warnings": self.warnings,
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per node: number, position and the deflection in each mode."""
+        nodes = (Column("node", range(1, self.rotor.n_nodes + 1)), Column("position_m", self.positions))
+        return frame((*nodes, *numbered("mode_{}", self.shapes)))
+
+    def summary(self) -> str:
+        """Critical speeds as text."""
+        mixed = any(word != "forward" for word in self.direction)
+        lines = ["mode       rad/s           rpm            Hz"]
+        for k, omega in enumerate(self.frequencies, start=1):
+            note = "  rigid body" if omega == 0 else ""
+            if mixed:
+                note += f"  {self.direction[k - 1]}"
+            lines.append(
+                f"{k:4d} {omega:11.4f} {omega * RPM:13.2f} {omega / (2 * np.pi):13.4f}{note}",
+            )
+        lines += [self.cut] if self.cut else []
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])

@@ -1,0 +1,74 @@
+"""Undamped critical speed map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.plot_style import DARK, MARKERS, legend_above, look, new_axes, plain, scale_beside
+from rotorid.base.rpm import RPM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def draw_speed_map(
+    stiffness: ArrayLike,
+    speeds: ArrayLike,
+    ax: Axes | None = None,
+    *,
+    supports: Sequence[tuple[str, ArrayLike, ArrayLike]] = (),
+    operating: tuple[float, float] | None = None,
+) -> Axes:
+    """Draw critical speeds over the stiffness of the supports, both logarithmic.
+
+    Parameters
+    ----------
+    stiffness
+        N/m, shape (K,).
+    speeds
+        Critical speeds, rad/s, shape (K, n); what is not positive is left out.
+    ax
+        Axes to draw into; new ones if None.
+    supports
+        What the machine has: label, stiffness in N/m and the speeds in rad/s at which it has it; no speeds
+        mean all.
+    operating
+        Range of operating speeds, rad/s, shaded.
+    """
+    ax = new_axes((9, 6)) if ax is None else ax
+    k, omega = np.asarray(stiffness, float), np.asarray(speeds, float)
+    for mode, curve in enumerate(omega.T):
+        seen = curve > 0
+        ax.plot(k[seen], curve[seen] * RPM, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
+    ax.set(xscale="log", yscale="log")
+    low, high = ax.get_ylim()
+    for i, (label, own, at) in enumerate(supports):
+        own, at = np.atleast_1d(np.asarray(own, float)), np.atleast_1d(np.asarray(at, float))
+        x, y = (own, at * RPM) if at.size else (np.repeat(own[:1], 2), np.array([low, high]))
+        marker = MARKERS[i % len(MARKERS)] if at.size else ""
+        ax.plot(x, y, color=DARK, linestyle=(0, (1, 1.5)), linewidth=1.3, marker=marker, markersize=5,
+                markerfacecolor="white", label=label)  # fmt: skip
+    ax.set_ylim(low, high)
+    if operating is not None:
+        ax.axhspan(operating[0] * RPM, operating[1] * RPM, color="#000000", alpha=0.07, linewidth=0,
+                   label="operating range")  # fmt: skip
+    ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm")
+    plain(ax)
+    ax.grid(which="minor", color="#f0f2f5", linewidth=0.5)
+    scale_beside(ax, RPM, "rad/s")
+    _plain_numbers(ax)
+    legend_above(ax)
+    return ax
+
+
+def _plain_numbers(ax: Axes) -> None:
+    """2000 instead of 2 × 10³ on the axis of speeds."""
+    from matplotlib.ticker import FuncFormatter, LogLocator
+
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))

@@ -1,0 +1,325 @@
+"""Results of the synchronous response: vibration, bearing forces, influence coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fem.model.rotor import Rotor, Support
+from fem.model.sensors import SensorLike, as_sensor, label
+from fem.windows import Window, within
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, read_only
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows
+from rotorid.base.rpm import phase_deg, speed_text
+from rotorid.base.text import counted
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
+
+    On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
+    others they are ellipses: x = Re X e^{iωt} with X = F + b, y = Re Y e^{iωt} with Y = −i (F − b).
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    amplitudes
+        Forward complex amplitudes F, m, of the K nodes kept, shape (S, K); positive phase = lead.
+    unbalance
+        What was mounted, `{node: m r e^{iφ}}`, kg·m.
+    rotor
+        The rotor.
+    warnings
+        What the reader must know.
+    backward
+        Complex amplitudes b, m, shape (S, K).
+    largest, largest_node
+        Longest half axis of all nodes' orbits, m, and the number of that node, shape (S,).
+    nodes
+        Numbers of the nodes kept, by default all, shape (K,).
+    solve
+        The same at other speeds of the range, rad/s, ascending; not judged for stability.
+    windows
+        Ranges of speed in which no steady response exists: amplitudes there are never reached.
+    """
+
+    speeds: FloatArray
+    amplitudes: ComplexArray
+    unbalance: Mapping[int, complex]
+    rotor: Rotor
+    warnings: tuple[str, ...]
+    backward: ComplexArray
+    largest: FloatArray
+    largest_node: IndexArray
+    nodes: IndexArray
+    solve: Callable[[FloatArray], Response] = field(repr=False)
+    windows: tuple[Window, ...] = ()
+
+    @property
+    def steady(self) -> BoolArray:
+        """At which speeds a steady response exists, shape (S,)."""
+        return ~within(self.windows, self.speeds)
+
+    @property
+    def x(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in x, m, shape (S, K)."""
+        return np.asarray(self.amplitudes + self.backward)
+
+    @property
+    def y(self) -> ComplexArray:
+        """Complex amplitudes of the deflection in y, m, shape (S, K)."""
+        return np.asarray(-1j * (self.amplitudes - self.backward))
+
+    @property
+    def major(self) -> FloatArray:
+        """Longer half axis of each orbit, m, shape (S, K)."""
+        return np.asarray(np.abs(self.amplitudes) + np.abs(self.backward))
+
+    @property
+    def minor(self) -> FloatArray:
+        """Shorter half axis, m, shape (S, K); negative where the orbit runs against the rotation."""
+        return np.asarray(np.abs(self.amplitudes) - np.abs(self.backward))
+
+    def column(self, node: str | int) -> int:
+        """Which column of the amplitudes belongs to a node.
+
+        Raises
+        ------
+        ValueError
+            If there is no such node, or it was not kept.
+        """
+        number = self.rotor.node(node)
+        found = np.flatnonzero(self.nodes == number)
+        if not found.size:
+            raise ValueError(f"node {number} was not kept: name it in nodes=…")
+        return int(found[0])
+
+    def at(self, sensor: SensorLike) -> ComplexArray:
+        """Complex amplitude that a sensor reads over speed, m, shape (S,).
+
+        A node or station means the direction x; (node, angle) or a `Sensor` any other.
+        """
+        sensor = as_sensor(sensor, self.rotor)
+        i, turn = self.column(sensor.node), np.exp(1j * sensor.radians)
+        return np.asarray(self.amplitudes[:, i] * turn.conj() + self.backward[:, i] * turn)
+
+    def readings(self, sensors: Sequence[SensorLike]) -> ComplexArray:
+        """`at` for each sensor, shape (S, C)."""
+        return np.stack([self.at(sensor) for sensor in sensors], axis=1)
+
+    def bearing_forces(self) -> BearingForces:
+        """Forces that the rotor exerts on its supports, in the order of `rotor.supports`."""
+        X, Y = self.x, self.y
+        forces = np.empty((2, self.speeds.size, len(self.rotor.supports)), dtype=complex)
+        for k, support in enumerate(self.rotor.supports):
+            i = self.column(support.node)
+            motion = np.stack((X[:, i], Y[:, i]), axis=1)
+            D = support.dynamic_stiffness(self.speeds)
+            forces[:, :, k] = np.einsum("sij,sj->is", D, motion)
+        read_only(forces)
+        return BearingForces(self.speeds, self.rotor.supports, forces[0], forces[1], self.steady)
+
+    def to_dict(self, sensors: Sequence[SensorLike] | None = None) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid response`; all nodes in x by default."""
+        sensors = self.nodes.tolist() if sensors is None else sensors
+        Z = np.array([self.at(sensor) for sensor in sensors]).reshape(len(sensors), -1)
+        return plain(
+            {
+                "speeds_rad_s": self.speeds,
+                "sensors": [label(sensor) for sensor in sensors],
+                "amplitude_m": np.abs(Z),
+                "phase_deg": phase_deg(Z),
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and node: the reading in x; where x and y differ, also y and the orbit."""
+        S, K = self.amplitudes.shape
+        columns = [
+            Column("speed_rad_s", np.repeat(self.speeds, K)),
+            Column("node", np.tile(self.nodes, S)),
+            *polar("amplitude_m", "phase_deg", self.x),
+        ]
+        if not self.rotor.symmetric:
+            columns += [
+                *polar("amplitude_y_m", "phase_y_deg", self.y),
+                Column("major_axis_m", self.major.ravel()),
+                Column("minor_axis_m", self.minor.ravel()),
+            ]
+        return frame(columns)
+
+    def summary(self) -> str:
+        """The highest peak of a steady response and where it is, as text."""
+        k = largest_at(self.largest, self.steady)
+        lines = [
+            f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
+            "no steady response at any of these speeds"
+            if k is None
+            else f"largest amplitude {1e6 * self.largest[k]:.4g} µm at node {self.largest_node[k]}, "
+            f"{speed_text(self.speeds[k])}",
+        ]
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+
+
+@dataclass(frozen=True, eq=False)
+class BearingForces:
+    """Forces of the rotor on its supports, Re (x, y) e^{iωt}.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    supports
+        What is loaded, length B.
+    x, y
+        Complex amplitudes, N, shape (S, B).
+    steady
+        At which speeds they exist, shape (S,).
+    """
+
+    speeds: FloatArray
+    supports: Sequence[Support]
+    x: ComplexArray
+    y: ComplexArray
+    steady: BoolArray
+
+    @property
+    def largest(self) -> FloatArray:
+        """Largest force during a turn, N, shape (S, B)."""
+        F, b = (self.x + 1j * self.y) / 2, (self.x - 1j * self.y) / 2
+        return np.asarray(np.abs(F) + np.abs(b))
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed and support."""
+        S, B = self.x.shape
+        return frame(
+            (
+                Column("speed_rad_s", np.repeat(self.speeds, B)),
+                Column("node", [support.node for support in self.supports] * S),
+                Column("support", [support.name for support in self.supports] * S),
+                *self._forces(),
+                Column("largest_N", self.largest.ravel()),
+            )
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: one list over speed for each support."""
+        forces = {column.name: np.asarray(column.values).reshape(self.x.shape).T for column in self._forces()}
+        nodes = [support.node for support in self.supports]
+        return plain({"speeds_rad_s": self.speeds, "nodes": nodes, **forces})
+
+    def _forces(self) -> tuple[Column, ...]:
+        return (*polar("force_x_N", "phase_x_deg", self.x), *polar("force_y_N", "phase_y_deg", self.y))
+
+    def summary(self) -> str:
+        """The largest force on each support, as text."""
+        lines = [f"{'support':>16}{'largest force, N':>18}{'at rad/s':>12}"]
+        for support, force in zip(self.supports, self.largest.T, strict=True):
+            k = largest_at(force, self.steady)
+            name = support.name or f"node {support.node}"
+            values = f"{'none':>18}{'-':>12}" if k is None else f"{force[k]:18.6g}{self.speeds[k]:12.6g}"
+            lines.append(f"{name:>16}{values}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class InfluenceCoefficients:
+    """Vibration at sensors per unit of unbalance in planes.
+
+    Attributes
+    ----------
+    speeds
+        rad/s, shape (S,).
+    sensors, planes
+        Sensors and planes as they were asked for, lengths C and P.
+    W
+        Complex, m per kg·m, shape (S, C, P); Z = W U, positive phase = lead.
+    warnings
+        What the reader must know.
+    windows
+        As in `Response`.
+    """
+
+    speeds: FloatArray
+    sensors: tuple[SensorLike, ...]
+    planes: tuple[str | int, ...]
+    W: ComplexArray
+    warnings: tuple[str, ...] = ()
+    windows: tuple[Window, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per speed, sensor and plane: the influence table of INTERFACE.md."""
+        return frame(self._columns("speed_rad_s", "influence_m_per_kg_m", "phase_deg"))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON, keys as in INTERFACE.md, `rotorid influence`; the units stand once."""
+        return plain(
+            {
+                "rows": rows(self._columns("speed", "influence", "phase")),
+                "units": {"speed": "rad/s", "influence": "m/(kg·m)", "phase": "deg, lead"},
+                "unstable_speeds": [window.to_dict() for window in self.windows],
+                "warnings": self.warnings,
+            }
+        )
+
+    def _columns(self, speed: str, influence: str, phase: str) -> tuple[Column, ...]:
+        S, C, P = self.W.shape
+        return (
+            Column(speed, np.repeat(self.speeds, C * P)),
+            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.planes] * S),
+            Column("plane", list(self.planes) * (S * C)),
+            *polar(influence, phase, self.W),
+        )
+
+    def summary(self) -> str:
+        """A table at one speed, or the range of sizes over many, as text."""
+        lines = [
+            f"Influence coefficients at {speed_range(self.speeds)}: {counted(len(self.sensors), 'sensor')}, "
+            f"{counted(len(self.planes), 'plane')}",
+            f"{'sensor':>12}{'plane':>12}{'µm per g·mm':>14}{'phase lead, deg':>17}",
+        ]
+        if self.speeds.size > 1:
+            lines[1] = f"{'sensor':>12}{'plane':>12}{'µm per g·mm, least':>20}{'largest':>12}{'at rad/s':>12}"
+        steady = ~within(self.windows, self.speeds)
+        for c, sensor in enumerate(self.sensors):
+            for p, plane in enumerate(self.planes):
+                size = np.abs(self.W[:, c, p])
+                k = largest_at(size, steady)
+                line = f"{label(sensor)!s:>12}{plane!s:>12}"
+                if k is None:
+                    line += f"{'none: unstable':>20}"
+                elif self.speeds.size > 1:
+                    size = np.where(steady, size, size[k])
+                    line += f"{size.min():20.4g}{size[k]:12.4g}{self.speeds[k]:12.6g}"
+                else:
+                    line += f"{size[0]:14.4g}{phase_deg(self.W[0, c, p]):17.2f}"
+                lines.append(line)
+        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+
+
+def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
+    """Where a size is largest of all that exist, both of shape (S,); None if none does."""
+    return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
+
+
+def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
+    """Two columns of a table: size, and phase as lead, 0 ≤ phase < 360 degrees."""
+    return Column(size, np.abs(Z).ravel()), Column(phase, phase_deg(Z).ravel())
+
+
+def speed_range(speeds: FloatArray) -> str:
+    """A speed, or how many from where to where, as text."""
+    if speeds.size == 1:
+        return f"{speeds[0]:.6g} rad/s"
+    return f"{speeds.size} speeds from {speeds.min():.6g} to {speeds.max():.6g} rad/s"

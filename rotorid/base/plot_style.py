@@ -1,0 +1,128 @@
+"""What the pictures share: colours, line styles, axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.rpm import RPM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito: told apart by every eye.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BLUE, VERMILION = COLORS[:2]
+STYLES = ("-", "--", "-.", ":")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
+BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
+"""Behind words that stand on curves."""
+WARNING = "#8a3d00"
+_ACROSS = ("data", "axes fraction")
+
+
+def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
+    """Make axes of a new figure, size in inches."""
+    from matplotlib import pyplot as plt
+
+    _, ax = plt.subplots(figsize=size, layout="constrained")
+    return ax
+
+
+def on_figure(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Figure:
+    """A new figure, size in inches, with what a function draws on its axes; it needs no screen."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    draw(figure.add_subplot())
+    return figure
+
+
+def look(k: int, of: int = 1) -> dict[str, Any]:
+    """Colour and style of curve k of so many: a few differ by their style too, in black and white."""
+    style = k if of <= len(STYLES) else k // len(COLORS)
+    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[style % len(STYLES)]}
+
+
+def note(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    shift: tuple[float, float] = (0.0, 0.0),
+    **options: Any,  # noqa: ANN401  of matplotlib
+) -> None:
+    """Small words at a place of the data, moved by so many points; options as for `annotate`."""
+    ax.annotate(text, at, xytext=shift, textcoords="offset points", **{"fontsize": "small", **options})
+
+
+def legend_above(
+    ax: Axes,
+    columns: int = 3,
+    marker_scale: float = 1.0,
+    height: float = 1.0,
+    **options: Any,  # noqa: ANN401  of matplotlib
+) -> None:
+    """A legend that hides nothing, above the axes; below them where its height is negative."""
+    ax.legend(
+        loc="upper center" if height < 0 else "lower center",
+        bbox_to_anchor=(0.5, height),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        markerscale=marker_scale,
+        **options,
+    )
+
+
+def legend_beside(ax: Axes) -> None:
+    """A legend that hides nothing, right of the axes."""
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize="small")
+
+
+def plain(ax: Axes) -> None:
+    """A grid behind the curves, no box."""
+    ax.grid(color=GRID, linewidth=0.8)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def shade_unstable(
+    ax: Axes, ranges: Iterable[tuple[float, float]], word: str = "no steady state", top: float = 0.98
+) -> None:
+    """Hatch ranges of speed in which the rotor is unstable; the word ends at this part of the axes."""
+    for first, last in ranges:
+        ax.axvspan(
+            first, last, facecolor=VERMILION, alpha=0.12, hatch="///", edgecolor=VERMILION, linewidth=0.6
+        )
+        middle = ((first + last) / 2, top)
+        note(ax, word, middle, xycoords=_ACROSS, rotation=90, ha="center", va="top", color=WARNING)
+
+
+def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
+    """Shade the range of operating speeds, if there is one."""
+    if operating is not None:
+        ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+
+
+def rpm_above(ax: Axes) -> None:
+    """A second scale, revolutions per minute, above one in rad/s."""
+    top = ax.secondary_xaxis("top", functions=(times(RPM), times(1 / RPM)))
+    top.set_xlabel("speed, rpm", fontsize="small")
+    top.tick_params(labelsize="small")
+
+
+def scale_beside(ax: Axes, unit: float, label: str) -> None:
+    """A second scale right of the first: of values in this unit."""
+    right = ax.secondary_yaxis("right", functions=(times(1 / unit), times(unit)))
+    right.set_ylabel(label, fontsize="small")
+    right.tick_params(labelsize="small")
+
+
+def times(factor: float) -> Callable[[ArrayLike], ArrayLike]:
+    """A change of units, for a second scale."""
+    return lambda value: np.asarray(value, float) * factor

@@ -1,0 +1,240 @@
+"""Pictures of what a reduction costs in running: response and stability of both models over speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.base.plot_style import BLUE, VERMILION
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from rotorid.reduction.dynamics.response_comparison import ResponseCost
+    from rotorid.reduction.dynamics.stability_comparison import StabilityCost
+
+
+CLOSE = 8.0
+"""Difference, %, up to which the small model follows the rotor well."""
+LEAST = 1e-4
+"""Smallest difference, %, that the picture shows."""
+DARK, LINE = "#2f3640", "#6b7480"
+FULL, SMALL = BLUE, VERMILION
+DASHED = (0, (4, 2))
+
+
+def plot_running(
+    running: ResponseCost,
+    ax: Axes | Sequence[Axes] | None = None,
+    *,
+    sensor: int | None = None,
+    plane: int | None = None,
+) -> Axes:
+    """Draw the unbalance response of full rotor and small model over speed, and below it their difference.
+
+    Parameters
+    ----------
+    running
+        What to draw: the largest influence coefficient at each speed.
+    ax
+        Where to draw the response alone, or two axes for it and the difference; default two new ones.
+    sensor, plane
+        Draw one influence coefficient instead: the number of the reading in `running.sensors`, from 0, and
+        the plane's node.
+
+    Returns
+    -------
+    The axes of the response.
+
+    Raises
+    ------
+    ValueError
+        For a sensor or plane that does not exist, or one without the other.
+    """
+    from rotorid.base.plot_style import plain, rpm_above
+
+    full, small, difference, words = _chosen(running, sensor, plane)
+    above: Axes
+    below: Axes | None = None
+    if ax is None:
+        from matplotlib import pyplot as plt
+
+        _, (above, below) = plt.subplots(
+            2, figsize=(10, 6.8), sharex=True, layout="constrained", height_ratios=(3, 2)
+        )
+    elif isinstance(ax, Sequence):
+        above, below = ax
+    else:
+        above = ax
+    moving = running.speeds > 0
+    speeds = running.speeds[moving]
+    above.plot(speeds, full[moving], color=FULL, linewidth=2.4, label="full rotor")
+    above.plot(
+        speeds,
+        small[moving],
+        color=SMALL,
+        linestyle=DASHED,
+        linewidth=1.7,
+        label=f"{len(running.nodes)}-mass model",
+    )
+    sizes = np.concatenate((full[moving], small[moving]))
+    sizes = sizes[np.isfinite(sizes) & (sizes > 0)]
+    if sizes.size:
+        above.set_yscale("log")
+        above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
+    # 1 m per kg·m is 1 µm per g·mm.
+    above.set(ylabel=f"{words}, µm per g·mm", xlabel="speed, rad/s")
+    panels = [above] if below is None else [above, below]
+    for panel in panels:
+        plain(panel)
+        panel.margins(x=0.01)
+        _bands(running, panel)
+    rpm_above(above)
+    above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.14), ncols=3, frameon=False, fontsize="small")
+    if below is None:
+        return above
+    above.set_xlabel("")
+    above.tick_params(labelbottom=False)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        percent = 100 * difference / np.abs(running.full).max(axis=(1, 2))
+    percent = np.maximum(percent, LEAST)
+    below.plot(running.speeds[moving], percent[moving], color=DARK, linewidth=1.6)
+    below.set_yscale("log")
+    shown = percent[moving & ~running.excluded & np.isfinite(percent)]
+    top = float(np.nanmax(percent[moving], initial=CLOSE))
+    below.set_ylim(max(LEAST, float(shown.min(initial=CLOSE)) / 2), 2 * top)
+    below.axhline(CLOSE, color=SMALL, linewidth=1.0, linestyle=":", zorder=1)
+    below.annotate(
+        f"{CLOSE:g} %",
+        (0.0, CLOSE),
+        xycoords=("axes fraction", "data"),
+        xytext=(4, 2),
+        textcoords="offset points",
+        fontsize="small",
+        color=SMALL,
+    )
+    below.set(xlabel="speed, rad/s", ylabel="difference, % of the rotor's\nlargest entry at this speed")
+    return above
+
+
+def _chosen(
+    running: ResponseCost, sensor: int | None, plane: int | None
+) -> tuple[FloatArray, FloatArray, FloatArray, str]:
+    """Size of the response of both models and of their difference, each (S,), and what it is."""
+    full, small = np.abs(running.full), np.abs(running.small)
+    difference = np.abs(running.small - running.full)
+    if sensor is None and plane is None:
+        sizes = (values.max(axis=(1, 2)) for values in (full, small, difference))
+        return *sizes, "largest influence coefficient,\nof all readings and planes"
+    if sensor is None or plane is None:
+        raise ValueError("give both a sensor and a plane, or neither")
+    if not 0 <= sensor < full.shape[1]:
+        raise ValueError(f"sensor {sensor} does not exist: they are numbered 0 to {full.shape[1] - 1}")
+    if plane not in running.nodes:
+        known = ", ".join(map(str, running.nodes))
+        raise ValueError(f"plane {plane} does not exist: the masses stand at nodes {known}")
+    from fem.model.sensors import label
+
+    p = running.nodes.index(plane)
+    words = f"reading at node {label(running.sensors[sensor])},\nunbalance at node {plane}"
+    return full[:, sensor, p], small[:, sensor, p], difference[:, sensor, p], words
+
+
+def _bands(running: ResponseCost, ax: Axes) -> None:
+    """Shade what is left out around critical speeds, and mark these."""
+    low, high = float(running.speeds[0]), float(running.speeds[-1])
+    bands: list[tuple[float, float]] = []
+    for start, end in sorted(running.left_out):
+        if bands and start <= bands[-1][1]:  # one shade where bands overlap
+            bands[-1] = bands[-1][0], max(end, bands[-1][1])
+        else:
+            bands.append((start, end))
+    inside = [(max(a, low), min(b, high)) for a, b in bands if b > low and a < high]
+    for k, (a, b) in enumerate(inside):
+        words = None if k else f"left out, ±{100 * running.bands:.3g} % of a critical speed"
+        ax.axvspan(a, b, color="#000000", alpha=0.08, linewidth=0, label=words)
+    for critical in running.criticals.tolist():
+        if low <= critical <= high:
+            ax.axvline(critical, color=LINE, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
+
+
+def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
+    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows.
+
+    Parameters
+    ----------
+    cost
+        What to draw.
+    ax
+        Where; default new axes.
+    """
+    from rotorid.base.plot_style import new_axes, plain, rpm_above
+
+    axes = new_axes((10, 5.2)) if ax is None else ax
+    plain(axes)
+    models = (
+        ("full rotor", cost.full_decrement, cost.full_threshold, FULL, "-", 2.4),
+        (f"{len(cost.nodes)}-mass model", cost.small_decrement, cost.small_threshold, SMALL, DASHED, 1.7),
+    )
+    known = np.concatenate([decrement[np.isfinite(decrement)] for _, decrement, *_ in models])
+    if known.size == 0:
+        axes.text(0.5, 0.5, "nothing oscillates", transform=axes.transAxes, ha="center", color=LINE)
+    for name, decrement, threshold, color, style, width in models:
+        text = f"{name}, unstable from {threshold:.6g} rad/s" if threshold is not None else name
+        axes.plot(
+            cost.speeds,
+            np.where(np.isfinite(decrement), decrement, np.nan),
+            color=color,
+            linestyle=style,
+            linewidth=width,
+            marker="o" if cost.speeds.size < 12 else None,
+            label=text,
+        )
+        if threshold is not None:
+            axes.axvline(threshold, color=color, linewidth=1.0, linestyle=(0, (2, 2)), zorder=1)
+            axes.plot([threshold], [0.0], "o", color=color, markeredgecolor="white", markersize=9, zorder=6)
+    low, high = _limits(known)
+    axes.set_ylim(low, high)
+    for name, decrement, _, color, *_ in models:
+        gone = np.isneginf(decrement)
+        if gone.any():
+            axes.plot(
+                cost.speeds[gone],
+                np.full(np.count_nonzero(gone), low),
+                "v",
+                color=color,
+                markersize=5,
+                clip_on=False,
+                label=f"{name} runs away without oscillating",
+            )
+    axes.axhspan(low, 0.0, color=SMALL, alpha=0.07, linewidth=0, zorder=0)
+    axes.axhline(0.0, color=DARK, linewidth=0.9)
+    axes.annotate(
+        "below 0: a motion grows",
+        (0.0, 0.0),
+        xycoords="axes fraction",
+        xytext=(6, 6),
+        textcoords="offset points",
+        fontsize="small",
+        color=DARK,
+    )
+    axes.set(xlabel="speed, rad/s", ylabel="smallest logarithmic decrement")
+    axes.margins(x=0.01)
+    rpm_above(axes)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.14), ncols=2, frameon=False, fontsize="small")
+    return axes
+
+
+def _limits(known: FloatArray) -> tuple[float, float]:
+    """Limits of the axis: 0 is in sight with room below; far above the usual size nothing is of interest."""
+    if known.size == 0:
+        return -1.0, 1.0
+    far = 20 * float(np.median(np.abs(known)))
+    bottom, top = min(0.0, float(known.min())), max(0.0, float(known.max()))
+    if far > 0:
+        bottom, top = max(bottom, -far), min(top, far)
+    span = max(top - bottom, 1e-9)
+    return bottom - 0.14 * span, top + 0.08 * span

@@ -1,0 +1,50 @@
+"""Where the small model loses stability, found as `fem.stability_threshold` finds it of the full rotor."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import fem
+from fem.solvers.reduced_whirl import Whirl
+from fem.solvers.stable_speeds import Bases, growing_at
+from fem.stability import SMALLEST, range_of_speeds, searched
+from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
+
+if TYPE_CHECKING:
+    from rotorid.reduction.dynamics.small_rotor import SmallRotor
+
+STEPS = 40
+"""Into how many steps a range of speeds is divided."""
+
+
+def stability_threshold(
+    small: SmallRotor, highest: float, *, lowest: float = 0.0, steps: int = STEPS
+) -> fem.Stability:
+    """Find the first speed at which a mode of the small model stops decaying.
+
+    What `fem.stability_threshold` asks of the full rotor, over all motions of the small one.
+
+    Parameters
+    ----------
+    small
+        The small model.
+    highest, lowest
+        Range of speeds, rad/s: within the tables of all supports.
+    steps
+        Into how many steps the range is divided; a mode that is unstable only between two neighbouring
+        speeds is not seen. The threshold itself is found by iteration, to 1e-10 of it or better.
+
+    Raises
+    ------
+    ValueError
+        For an impossible range, or outside the table of a support.
+    """
+    return threshold_of(whirl_of(small, range_of_speeds(lowest, highest, steps)))
+
+
+def threshold_of(whirl: Whirl) -> fem.Stability:
+    """The same in the range of speeds of `whirl`, which holds all modes of the small model."""
+    found = Bases(whirl.Q, whirl.Q, whirl.scale, np.inf, np.inf)
+    return searched(found, growing_at(found, whirl.speeds, SMALLEST), whirl)

@@ -1,0 +1,51 @@
+"""The small model's modes at many speeds, in the form in which `fem` holds the full rotor's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fem.matrices.lateral_planes import Quadratic, both_planes, project
+from fem.solvers.quadratic_eigenvalues import solve
+from fem.solvers.reduced_whirl import Whirl
+from fem.solvers.whirl_basis import reference
+from rotorid.base.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from rotorid.reduction.dynamics.small_rotor import SmallRotor
+
+
+def equations(small: SmallRotor) -> Quadratic:
+    """λ² M + λ D(Ω) + K(Ω) of a small rotor: of z = x + i y if the rotor is symmetric, else of both planes.
+
+    In this form `fem.solvers.quadratic_eigenvalues`, `fem.solvers.mode_tracking` and `fem.solvers.crossing` take it for the
+    full rotor's equations in a basis of the shaft, and both models are solved in the same way. Modal damping
+    is the same in both planes and does not couple them, so that its block of one plane damps z, too.
+    """
+    Q = small.quadratic
+    if not small.rotor.symmetric:
+        return replace(Q, D0=Q.D0 + small.external)
+    d, feet = Q.basis.shape[1], len(Q.P.pedestals)
+    in_x = np.concatenate((np.arange(d), 2 * d + np.arange(feet)))
+    pick = np.ix_(in_x, in_x)
+    one = project(both_planes(small.rotor), Q.basis)
+    return replace(one, M=Q.M[pick], D0=one.D0 + small.external[pick])
+
+
+def whirl_of(small: SmallRotor, speeds: FloatArray) -> Whirl:
+    """All modes of a small rotor that oscillate, at each speed.
+
+    Raises
+    ------
+    ValueError
+        For a speed outside the table of a support.
+    """
+    Q = equations(small)
+    # All: gyroscopic moments make also coordinates without mass oscillate, at high frequency.
+    n = Q.size if Q.P.planes == 2 else 2 * Q.size
+    ref = reference(Q.P, speeds, 2)
+    # The basis is the whole space: nothing of the small model is left out.
+    whole = np.eye(Q.basis.shape[1])
+    return Whirl(Q, speeds, solve(Q, speeds, n, ref.scale), ref.scale, 0.0, ref, whole)

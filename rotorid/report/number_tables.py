@@ -1,0 +1,133 @@
+"""Sections and tables of a sheet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rotorid.report.document import Cells
+
+if TYPE_CHECKING:
+    from rotorid.report.rotor_figures import Drawing
+
+NARROW = 6
+"""Columns that a telephone shows side by side; rows of wider tables become blocks there."""
+
+
+def words(head: str, cells: Iterable[object]) -> Cells:
+    """A column of words; markup stays markup."""
+    return Cells(head, tuple(cell if isinstance(cell, str) else str(cell) for cell in cells), words=True)
+
+
+def figures(head: str, values: Iterable[object]) -> Cells:
+    """A column of numbers that are not from the document, with up to six digits, without trailing zeros."""
+    shown = (f"{v:.6g}".replace("-", "−") if isinstance(v, float) else str(v) for v in values)
+    return Cells(head, tuple(shown))
+
+
+def numbered(head: str, count: int) -> Cells:
+    """A column of the numbers from 1."""
+    return figures(head, range(1, count + 1))
+
+
+def below(*tables: Sequence[Cells]) -> tuple[Cells, ...]:
+    """Columns of tables with the same heads, one table below the other."""
+    return tuple(
+        replace(column[0], cells=tuple(cell for part in column for cell in part.cells))
+        for column in zip(*tables, strict=True)
+    )
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table.
+
+    Attributes
+    ----------
+    caption
+        What it shows, in a few words.
+    columns
+        One at least, all of one length.
+    note
+        What the reader must know about it; may be empty.
+    """
+
+    caption: str
+    columns: tuple[Cells, ...]
+    note: str = ""
+
+    @property
+    def heads(self) -> tuple[str, ...]:
+        """Of the columns."""
+        return tuple(column.head for column in self.columns)
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """Cells row by row."""
+        return tuple(zip(*(column.cells for column in self.columns), strict=True))
+
+    @property
+    def texts(self) -> tuple[int, ...]:
+        """Which columns hold words, from 0."""
+        return tuple(i for i, column in enumerate(self.columns) if column.words)
+
+    @property
+    def wide(self) -> bool:
+        """Whether it has more columns than a telephone shows side by side."""
+        return len(self.columns) > NARROW
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is short enough to stand on one page."""
+        return len(self.rows) <= 12
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section of a sheet: a heading, sentences, tables, drawings.
+
+    Attributes
+    ----------
+    heading
+        Short.
+    said
+        Sentences before the tables; texts, or markup with numbers of the document.
+    tables, drawings
+        In this order.
+    """
+
+    heading: str
+    said: tuple[str, ...] = ()
+    tables: tuple[Grid, ...] = ()
+    drawings: tuple[Drawing, ...] = ()
+
+
+def every_warning(document: Mapping[str, Any]) -> list[str]:
+    """All warnings of a document and its parts, in the order of the document, each once."""
+    found: list[str] = []
+    for key, value in document.items():
+        if key == "warnings":
+            found += map(str, value)
+        elif isinstance(value, Mapping):
+            found += every_warning(value)
+    return list(dict.fromkeys(found))
+
+
+def evenly(n: int, most: int) -> list[int]:
+    """At most so many of n indices, evenly spread, the first and the last among them.
+
+    Examples
+    --------
+    >>> evenly(4, 12), evenly(281, 6)
+    ([0, 1, 2, 3], [0, 56, 112, 168, 224, 280])
+    """
+    if n <= most:
+        return list(range(n))
+    return [round(i * (n - 1) / (most - 1)) for i in range(most)]
+
+
+def few(names: Sequence[object]) -> str:
+    """Print a list in words: "7, 12 and 18"."""
+    words = [str(name) for name in names]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"

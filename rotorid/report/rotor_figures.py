@@ -1,0 +1,176 @@
+"""Figures of the sheets of rotors: wide as a page, legible on a telephone, told apart without colour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from rotorid.base.plot_style import legend_above
+from rotorid.plots import plot
+from rotorid.report.page import inline_svg
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from fem import Modes, Peaks, Response, Rotor, SpeedMap
+    from fem.model.sensors import SensorLike
+    from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost
+
+WIDTH, LETTERS = 6.0, 9.0
+"""Inches and points."""
+MARKED = 4
+"""Sensors whose names have room below a rotor."""
+HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
+"""Bars that differ without colour."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of a sheet: its element, and the words below it."""
+
+    svg: Markup
+    caption: str
+
+
+def sketch(height: float, draw: Callable[[Figure], object], caption: str) -> Drawing:
+    """Make a figure of this height in inches, let it be drawn on, and put it into a sheet."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"font.size": LETTERS, "hatch.linewidth": 0.6}):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        draw(figure)
+        return Drawing(inline_svg(figure, caption), caption)
+
+
+def whole(height: float, result: StabilityCost | Placement, caption: str) -> Drawing:
+    """A result as its own plot draws it."""
+    return sketch(height, lambda figure: plot(result, figure.add_subplot()), caption)
+
+
+def rotor_picture(
+    rotor: Rotor, planes: Sequence[str | int], sensors: Sequence[SensorLike], meaning: str
+) -> Drawing:
+    """The rotor to scale, with a few sensors; `meaning` says what stands at the planes."""
+
+    def draw(figure: Figure) -> None:
+        from fem.plots import draw_rotor
+
+        marked = sensors if len(sensors) <= MARKED else ()
+        axes = draw_rotor(rotor, figure.add_subplot(), planes=planes, sensors=marked)
+        legend = axes.get_legend()
+        for text in () if legend is None else legend.get_texts():
+            if text.get_text().startswith("correction plane"):
+                text.set_text(meaning)
+
+    return sketch(2.9, draw, "The rotor, lengths and radii to scale (the two axes differ).")
+
+
+def modes_picture(modes: Modes) -> Drawing:
+    """Mode shapes over the rotor."""
+
+    def draw(figure: Figure) -> None:
+        _curves_only(plot(modes, figure.add_subplot()), 2)
+
+    return sketch(3.7, draw, "Mode shapes, each to its largest value 1, over the rotor.")
+
+
+def map_picture(chart: SpeedMap, operating: tuple[float, float] | None) -> Drawing:
+    """Critical speeds over the stiffness of the supports."""
+
+    def draw(figure: Figure) -> None:
+        from fem.plots import draw_speed_map
+
+        axes = figure.add_subplot()
+        draw_speed_map(chart.stiffness, chart.speeds, axes, supports=chart.own, operating=operating)
+
+    caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
+    return sketch(4.2, draw, caption)
+
+
+def bode_picture(
+    response: Response,
+    places: Sequence[SensorLike],
+    peaks: Sequence[Peaks],
+    operating: tuple[float, float] | None,
+) -> Drawing:
+    """Amplitude and phase over speed, marked where the sensor with the largest reading has its peaks."""
+
+    def draw(figure: Figure) -> None:
+        from fem.plots.readings import draw_readings
+
+        above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+        draw_readings(response, places, peaks, (above, below), operating=operating, factors=False)
+        legend_above(above, 3 if len(places) > 4 else 2, 0.75, 1.16)
+
+    caption = "Amplitude and phase over speed; a positive phase leads. Dotted: peaks of the largest reading."
+    return sketch(5.0, draw, caption)
+
+
+def reduction_picture(result: Reduction, words: str) -> Drawing:
+    """Shapes of the small model over those it was made from."""
+
+    def draw(figure: Figure) -> None:
+        axes = plot(result, figure.add_subplot())
+        _curves_only(axes, 1, below=result.rotor is not None)
+        axes.set_ylabel("mode shape, largest = 1")
+
+    return sketch(3.9, draw, f"Mode shapes of {words}.")
+
+
+def methods_picture(methods: Methods) -> Drawing:
+    """What methods of reduction lose, as hatched bars."""
+
+    def draw(figure: Figure) -> None:
+        from rotorid.reduction.plots import plot_methods
+
+        above, below = plot_methods(methods, list(figure.subplots(2, sharex=True)))
+        for axes in (above, below):
+            for container, hatch in zip(axes.containers, HATCHES, strict=False):
+                for bar in container:
+                    bar.set(hatch=hatch, edgecolor="white", linewidth=0)
+            for text in axes.texts:
+                if not text.get_text().startswith("MAC"):  # numbers at the ends of narrow bars
+                    text.set_rotation(90)
+        legend_above(above, 4, 0.75)
+
+    return sketch(5.2, draw, "What each method loses: errors of the frequencies, and 1 − MAC of the shapes.")
+
+
+def running_picture(response: ResponseCost) -> Drawing:
+    """Response of both models, and their difference."""
+
+    def draw(figure: Figure) -> None:
+        from rotorid.reduction.dynamics.comparison_plots import plot_running
+
+        above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+        plot_running(response, [above, below])
+        above.set_ylabel("largest influence\ncoefficient, µm per g·mm")
+        below.set_ylabel("difference, %")
+
+    return sketch(4.8, draw, "Response of both models, and their difference in % of the rotor's.")
+
+
+def stability_picture(stability: StabilityCost) -> Drawing:
+    """Smallest logarithmic decrement of both models over speed."""
+    return whole(3.6, stability, "Smallest logarithmic decrement over speed; below 0 a motion grows.")
+
+
+def placement_picture(placement: Placement) -> Drawing:
+    """All ranked choices of nodes."""
+    caption = "All ranked choices: largest error of a frequency over the largest 1 − MAC."
+    return whole(4.4, placement, caption)
+
+
+def _curves_only(axes: Axes, columns: int, below: bool = False) -> None:
+    """A legend of the curves alone: what the rotor is made of is told by its own drawing."""
+    from matplotlib.lines import Line2D
+
+    pairs = [
+        pair for pair in zip(*axes.get_legend_handles_labels(), strict=True) if isinstance(pair[0], Line2D)
+    ]
+    handles, labels = zip(*pairs, strict=True)
+    legend_above(axes, columns, 0.75, -0.14 if below else 1.0, handles=handles, labels=labels)

@@ -1,0 +1,235 @@
+"""Options as people write them, one reader for each kind: speeds, ranges, nodes, sensors, names, pairs.
+
+Each takes a text of the command line or, from Python, what it stands for, in SI. Weights, lengths and other
+quantities with units are read by `rotorid.workflows.option_quantities`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar, cast
+
+from rotorid.base.suggestions import one_of as one_of
+
+_T = TypeVar("_T")
+Speeds = str | Sequence[float | str]
+"""As `speeds` reads them, or one by one: rad/s, or "3000rpm"."""
+Band = str | tuple[float | str, float | str]
+"""As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
+Nodes = str | Sequence[str | int]
+"""As `nodes` reads them, or numbers of nodes and names of stations."""
+Sensor = str | int | tuple[str | int, float]
+"""A node or station, in x or at an angle in degrees from x, with the rotation."""
+Names = str | Sequence[str]
+"""As `names` reads them."""
+SLOWEST, FASTEST = 1e-9, 1e9
+"""rad/s; no rotor turns so slowly or so fast, and squares of other numbers may overflow."""
+_SPEED_UNITS = {"rad_s": 1.0, "rad/s": 1.0, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi}
+
+
+def option_name(field: str) -> str:
+    """As the command line writes it: "--first-hole"."""
+    return f"--{field.replace('_', '-')}"
+
+
+def number(text: str) -> float:
+    """A finite number, or NaN for anything else."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+def nodes(given: Nodes, what: str) -> list[str | int]:
+    """Read "7,12,impeller 3" as node numbers and names of stations."""
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not parts or not all(part != "" for part in parts):
+        raise ValueError(
+            f"{what} takes nodes or names of stations with commas, such as 7,12,18; got {given!r}"
+        )
+    return [int(part) if isinstance(part, str) and part.isdecimal() else part for part in parts]
+
+
+def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sensor]:
+    """Read "2,22:45,probe DE:-30" as nodes with angles in degrees from x, with the rotation; 0 without."""
+    if not isinstance(given, str):
+        if not given:
+            raise ValueError(f"{what}: at least one node or station is needed")
+        return list(given)
+    found: list[Sensor] = []
+    for part in given.split(","):
+        head, colon, tail = part.partition(":")
+        angle = degrees(tail, what) if colon else None  # names of stations hold no colon
+        (node,) = nodes(head, what)
+        found.append(node if angle is None else (node, angle))
+    return found
+
+
+def degrees(given: str | float, what: str) -> float:
+    """An angle from −360 to 360 degrees."""
+    angle = number(given) if isinstance(given, str) else given
+    if not -360 <= angle <= 360:
+        raise ValueError(f"{what}: {str(given).strip()!r} is no angle from -360 to 360 degrees")
+    return angle
+
+
+def names(given: Names | None) -> list[str] | None:
+    """Read "A,B" as names; None stays None."""
+    if given is None:
+        return None
+    found = [part.strip() for part in given.split(",")] if isinstance(given, str) else list(given)
+    if not found or not all(found):
+        raise ValueError(f"names with commas between them are needed, such as left,right; got {given!r}")
+    return found
+
+
+def pairs(
+    given: str | Sequence[str] | Mapping[str, _T] | Mapping[str, str],
+    what: str,
+    read: Callable[[str, str], _T],
+    example: str,
+    alone: Callable[[str], Mapping[str, _T]] | None = None,
+    sign: str = "=",
+) -> dict[str, _T]:
+    """Read "alpha12=1.3,U31=-0.3" as names with values.
+
+    Parameters
+    ----------
+    given
+        The text, its parts, or the pairs themselves.
+    what
+        The option, for complaints.
+    read
+        Makes a value of its name and its text.
+    example
+        How it is written.
+    alone
+        What a part without `sign` stands for; None: nothing.
+    sign
+        Between name and value.
+
+    Raises
+    ------
+    ValueError
+        For anything else, and for a name that stands twice.
+    """
+    if isinstance(given, Mapping):
+        return {str(key): read(str(key), v) if isinstance(v, str) else v for key, v in given.items()}
+    parts = given.split(",") if isinstance(given, str) else given
+    if not all(isinstance(part, str) for part in parts):
+        raise ValueError(f"{what} {given!r}: texts are needed, such as {example}")
+    shown, found = ",".join(parts), dict[str, _T]()
+    for part in parts:
+        name, found_sign, text = (piece.strip() for piece in part.rpartition(sign))
+        if not (name and found_sign) and (found_sign or not text or alone is None):
+            raise ValueError(f"{what} {shown!r}: {part.strip()!r} is no NAME{sign}VALUE; use {example}")
+        new = alone(text) if alone is not None and not found_sign else {name: read(name, text)}
+        if twice := next((one for one in new if one in found), None):
+            raise ValueError(f"{what} {shown!r}: {twice} stands twice")
+        found |= new
+    return found
+
+
+def numbers(
+    given: str | Mapping[str, float], what: str, example: str, whole: float = 1.0
+) -> dict[str, float]:
+    """`pairs` of names with finite numbers, those of texts divided by `whole`."""
+
+    def read(name: str, text: str) -> float:
+        value = number(text)
+        if math.isnan(value):
+            raise ValueError(f"{what} {given!r}: {name}={text} is no NAME=NUMBER; use {example}")
+        return value / whole
+
+    return pairs(given, what, read, example)
+
+
+def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
+    """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
+    if given is None:
+        return None
+    if not isinstance(given, str):
+        factor, ends = 1.0, [one_speed(end, what) for end in given]
+    else:
+        text = given.strip()
+        unit = next((name for name in _SPEED_UNITS if text.endswith(name)), "")
+        factor = _SPEED_UNITS.get(unit, 1.0)
+        ends = [number(part) for part in text.removesuffix(unit).split(":")]
+    if len(ends) != 2 or not 0 <= ends[0] < ends[1] <= FASTEST / factor:
+        raise ValueError(
+            f"{what} {given!r} is not a range: use LOWEST:HIGHEST, in rad/s, or with rpm or Hz at the end"
+        )
+    return ends[0] * factor, ends[1] * factor
+
+
+def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[float]:
+    """Read speeds, rad/s: "100:700:50" (first:last:step) or "100,200", "1000:6000:50rpm", "20Hz,1500rpm".
+
+    A unit at the end holds for all; or each speed has its own. Without any it is `unit`. The last speed of a
+    range is included where the steps meet it.
+    """
+    if not isinstance(given, str):
+        found = [one_speed(value, what) if isinstance(value, str) else value for value in given]
+        return _possible([float(value) for value in found], what, given)
+    sign = ":" if ":" in given else ","
+    parts = [_speed(part) for part in given.split(sign)]
+    usual = unit.replace("rad_s", "rad/s")
+    others = " or ".join(name for name in ("rad/s", "rpm", "Hz") if name != usual)
+    example = f"use FIRST:LAST:STEP or a list with commas, in {usual}, or with {others} at the end"
+    if any(part is None for part in parts) or (sign == ":" and len(parts) != 3):
+        raise ValueError(f"{what} {given!r} is not a range: {example}")
+    values, own = zip(*cast("list[tuple[float, str]]", parts), strict=True)
+    if any(own[:-1]) and not all(own):
+        raise ValueError(f"{what} {given!r}: give the unit at every speed, or once at the end")
+    if sign == ":" and len(set(own[:-1]) | {own[-1]} - {""}) > 1 and any(own[:-1]):
+        raise ValueError(f"{what} {given!r}: a range has one unit")
+    if not all(math.isfinite(value) for value in values):
+        raise ValueError(f"{what} {given!r}: speeds must be finite and not negative")
+    factors = [_SPEED_UNITS[name or own[-1] or unit] for name in own]
+    if sign == ":":
+        values = _range(values, what, given)
+        factors = [factors[0]] * len(values)
+    return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
+
+
+def rising_speeds(given: Speeds, what: str = "--speeds") -> list[float]:
+    """`speeds` in ascending order, each once."""
+    return sorted(set(speeds(given, what=what)))
+
+
+def one_speed(given: str | float, what: str) -> float:
+    """Read "9000rpm" as one speed, rad/s."""
+    values = speeds(given if isinstance(given, str) else [given], what=what)
+    if len(values) != 1:
+        raise ValueError(f"{what} takes one speed, such as 9000rpm; got {given!r}")
+    return values[0]
+
+
+def _range(ends: Sequence[float], what: str, given: str) -> tuple[float, ...]:
+    """First, last and step as all values between them."""
+    first, last, step = ends
+    if step <= 0 or last < first:
+        raise ValueError(
+            f"{what} {given!r}: the step must be positive and the last speed not below the first"
+        )
+    if (last - first) / step > 1e6:
+        raise ValueError(f"{what} {given!r} has more than a million speeds")
+    return tuple(first + step * i for i in range(math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1))
+
+
+def _possible(found: list[float], what: str, given: Speeds) -> list[float]:
+    if not found or not all(value == 0 or SLOWEST <= value <= FASTEST for value in found):
+        raise ValueError(f"{what} {given!r}: speeds must be 0 or from {SLOWEST:g} to {FASTEST:g} rad/s")
+    return found
+
+
+def _speed(text: str) -> tuple[float, str] | None:
+    """A number and its unit (empty: none), or None."""
+    body = text.strip()
+    unit = next((name for name in _SPEED_UNITS if body.endswith(name)), "")
+    try:
+        return float(body.removesuffix(unit).strip()), unit
+    except ValueError:
+        return None

@@ -1,0 +1,207 @@
+"""What `reduce` gives: the masses, what was asked for beside them, and the small model as files."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from rotorid.base.text import counted
+from rotorid.workflows.option_values import one_of
+from rotorid.workflows.result_provenance import Parts
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    import fem
+    from rotorid.reduction import (
+        Methods,
+        Placement,
+        Reduction,
+        ResponseCost,
+        Shift,
+        SmallRotor,
+        StabilityCost,
+        TradeOff,
+    )
+
+NAMED = ("states", "inputs", "outputs")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReducedRotor(Parts):
+    """A reduction, what was asked for beside it, and the small model where it was needed.
+
+    Attributes
+    ----------
+    result
+        The masses.
+    placement, trade_off, methods, response, stability, shift
+        What was asked for beside them.
+    small
+        The model in both planes, with what turns, couples and damps; `damping`: its modal damping ratios.
+    speed, both_planes, forces
+        Of the files of the small model: rad/s, whether both planes are written, nodes of forces.
+    """
+
+    result: Reduction
+    placement: Placement | None = None
+    trade_off: TradeOff | None = None
+    methods: Methods | None = None
+    response: ResponseCost | None = None
+    stability: StabilityCost | None = None
+    shift: Shift | None = None
+    small: SmallRotor | None = None
+    damping: Sequence[float] = ()
+    speed: float = 0.0
+    both_planes: bool = False
+    forces: Sequence[int | str] = ()
+
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The masses, and what was asked for beside them."""
+        return {
+            "": self.result,
+            "what_if": self.shift,
+            "placement": self.placement,
+            "trade_off": self.trade_off,
+            "methods": self.methods,
+            "response": self.response,
+            "stability": self.stability,
+            "small_model": self.small,
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """The ranking where it was asked for, else masses and modes."""
+        return self.result.to_frame() if self.placement is None else self.placement.to_frame()
+
+    def figure(self, view: str | None = None) -> Figure:
+        """Shapes, methods, placement, response or stability; by default what was asked for last.
+
+        Raises
+        ------
+        ValueError
+            For a view of what was not computed.
+        """
+        from matplotlib.figure import Figure
+
+        from rotorid.plots import plot
+
+        parts = {
+            "stability": self.stability,
+            "response": self.response,
+            "methods": self.methods,
+            "placement": self.placement,
+            "shapes": self.result,
+        }
+        name = view or next(name for name, part in parts.items() if part is not None)
+        if parts[one_of(name, "view", [*parts])] is None:
+            option = {"placement": "--rank"}.get(name, f"--{name}")
+            raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
+        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
+        figure = Figure(figsize=(9.5, 6.5 if heights else 5.5), layout="constrained")
+        axes = [*figure.subplots(2, sharex=True, height_ratios=heights)] if heights else figure.add_subplot()
+        plot(parts[name], axes)
+        return figure
+
+    def sheet(self) -> bytes:
+        """To print: one HTML file."""
+        from rotorid.report.reduction import reduce_report
+
+        return reduce_report(
+            self.to_dict(),
+            self.result,
+            provenance=self.provenance,
+            placement=self.placement,
+            methods=self.methods,
+            response=self.response,
+            stability=self.stability,
+        )
+
+    def with_small(self) -> ReducedRotor:
+        """The same with the small model, which needs a rotor."""
+        return self if self.small else dataclasses.replace(self, small=self.result.small(self.damping))
+
+    def model_bytes(self, name: str = "") -> bytes:
+        """The small model as a file for `fit` and `identify`; `name` of the rotor for its comment.
+
+        Dampers to be estimated stand at every mass, beginning with 2 % of its critical damping.
+        """
+        from rotorid.tables.models.model_writing import ode_model_bytes
+
+        if (self.result.masses.solution <= 0).any():
+            raise ValueError(
+                "a model with a mass that is not positive cannot be written: use other nodes or modes"
+            )
+        motion = self._motion()
+        masses = [f"{axis}{node}" for axis in "xy" for node in self.result.nodes]
+        masses = [name for name in masses if name in motion.coordinates]
+        critical = {
+            x: 2 * math.sqrt(motion.M[i, i] * motion.K[i, i]) for x in masses for i in [motion.index(x)]
+        }
+        inputs = [f"f_x{node}" for node in self.forces]
+        if lost := [name for name in inputs if name.removeprefix("f_") not in masses]:
+            raise ValueError(
+                f"--force: no mass of the model stands at {lost[0].removeprefix('f_x')}; masses stand at "
+                f"{', '.join(map(str, self.result.nodes))}"
+            )
+        which = "both planes" if any(name.startswith("y") for name in masses) else "the plane x"
+        said = [
+            f"{name} reduced to masses at nodes {', '.join(map(str, self.result.nodes))} (formula 50, "
+            f"{counted(self.result.modes, 'mode')}), {which} at {motion.speed:.6g} rad/s, SI",
+            "Put what is known of the start into [initial]; v_x7 is the velocity of x7.",
+        ]
+        if motion.M.any(axis=0).all() and not inputs:
+            said.append("Put forces of time into [force].")
+        elif not inputs:
+            said.append("Measured forces: write the file with --force NODES.")
+        return ode_model_bytes(
+            motion,
+            {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
+            {},
+            comments=said,
+            inputs=inputs,
+            outputs=None if set(masses) == set(motion.coordinates) else masses,
+        )
+
+    def state_space_bytes(self, ending: str = ".json") -> bytes:
+        """A, B, C, D in both planes at the speed, as a file that ends in .json, .npz or .mat."""
+        import numpy as np
+
+        small = self.with_small().small
+        assert small is not None
+        document = small.state_space(self.speed).to_dict()
+        if ending == ".json":
+            return (json.dumps(document, indent=1, allow_nan=False) + "\n").encode()
+        arrays = {key: np.array(value) for key, value in document.items()}
+        stream = io.BytesIO()
+        if ending == ".mat":
+            from scipy.io import savemat
+
+            named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}
+            savemat(stream, arrays | named)
+        else:
+            # numpy before 2.1 would store allow_pickle= as an array
+            np.savez(stream, **arrays)  # type: ignore[arg-type]
+        return stream.getvalue()
+
+    def _motion(self) -> fem.Motion:
+        """One plane where nothing couples them; without massless unknowns where no damping acts on them."""
+        import numpy as np
+
+        if self.small is None:
+            return self.result.equations_of_motion
+        motion = self.small.motion(self.speed)
+        y = np.array(["y" in name for name in motion.coordinates])
+        across = np.ix_(~y, y)
+        coupled = bool(motion.C[across].any() or motion.K[across].any())
+        plane: Literal["both", "x"] = "both" if self.both_planes or coupled else "x"
+        try:
+            return self.small.motion(self.speed, plane, "condensed")
+        except ValueError:  # damped supports stay, as states of first order
+            return self.small.motion(self.speed, plane)

@@ -1,0 +1,176 @@
+"""What every workflow gives: a document with its provenance, a text, a table; and how its work is told."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import inspect
+import logging
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from rotorid.workflows.input_checks import changed, checked, plain
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from _typeshed import DataclassInstance
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+log = logging.getLogger("rotorid.workflows")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Outcome(ABC):
+    """What a workflow gives.
+
+    Attributes
+    ----------
+    provenance
+        Program version, input files with their hashes, date, and every option that differs from its default.
+    """
+
+    provenance: Mapping[str, Any]
+
+    @abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+
+    @abstractmethod
+    def summary(self) -> str:
+        """For the terminal."""
+
+    @abstractmethod
+    def to_frame(self) -> pd.DataFrame:
+        """The main table."""
+
+    def figure(self) -> Figure:
+        """The main picture."""
+        raise ValueError(f"{type(self).__name__} has no picture")
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        raise ValueError(f"{type(self).__name__} has no sheet")
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """What `--json` prints."""
+        return {**self.to_dict(), "provenance": dict(self.provenance)}
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Parts(Outcome):
+    """Results of the library beside each other."""
+
+    @property
+    @abstractmethod
+    def parts(self) -> Mapping[str, Any]:
+        """Results by their keys in the document, where "" is its top; None: not asked for."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
+        return {**known.pop("", {}), **known}
+
+    def summary(self) -> str:
+        """For the terminal."""
+        return "\n\n".join(part.summary() for part in self.parts.values() if part is not None)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table of the first."""
+        frame: pd.DataFrame = next(iter(self.parts.values())).to_frame()
+        return frame
+
+
+@dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Parts):
+    """One result of the library as it is; subclasses say which."""
+
+    found: Any
+
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """That one."""
+        return {"": self.found}
+
+    def figure(self) -> Figure:
+        """Its picture."""
+        from rotorid.base.plot_style import on_figure
+        from rotorid.plots import plot
+
+        return on_figure(lambda ax: plot(self.found, ax))
+
+
+def workflow(function: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Check its options first; while it works each file is read once: its hash is that of what was read."""
+    signature = inspect.signature(function)
+    kind, _, rest = str(signature.parameters["options"].annotation).partition(" | ")
+
+    @functools.wraps(function)
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> _T:
+        from rotorid.tables.reader.input_file import each_file_once
+
+        given = signature.bind(*args, **kwargs)
+        options = given.arguments.get("options")
+        if options is not None or not rest:
+            given.arguments["options"] = checked(options, function.__globals__[kind])
+        with each_file_once():
+            return function(*given.args, **given.kwargs)
+
+    return wrapper
+
+
+def provenance(
+    files: Iterable[Path],
+    options: DataclassInstance,
+    **given: object,
+) -> dict[str, Any]:
+    """Program version, input files with their hashes, date, and options that differ from their defaults.
+
+    What is `given` in place of files stands before the options.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read.
+    """
+    from rotorid import __version__
+    from rotorid.tables.reader.input_file import file_content
+
+    return {
+        "program": "rotorid",
+        "version": __version__,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
+        "options": {key: plain(value) for key, value in (given | changed(options)).items()},
+    }
+
+
+@contextmanager
+def phase(what: str) -> Iterator[None]:
+    """Log how long a part of the work takes."""
+    begun = time.perf_counter()
+    yield
+    log.info("time: %s %.3f s", what, time.perf_counter() - begun)
+
+
+def log_rotor(rotor: Rotor, **more: object) -> None:
+    """Log how large the model of a rotor is, and more numbers."""
+    stride = 4 if rotor.model.shear else 2
+    sizes: dict[str, object] = {
+        "elements": rotor.n_elements,
+        "unknowns_per_plane": 2 * rotor.n_nodes + (stride - 2) * rotor.n_elements,
+        "discs": len(rotor.discs),
+        "supports": len(rotor.supports),
+    }
+    for name, value in (sizes | more).items():
+        log.info("%s = %s", name, f"{value:.6g}" if isinstance(value, float) else value)

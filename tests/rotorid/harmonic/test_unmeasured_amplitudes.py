@@ -1,0 +1,201 @@
+"""Amplitudes that are measured nowhere: found without a start, or said; invariants in place of tangents."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
+from rotorid.harmonic.experiments import experiments
+from rotorid.harmonic.unmeasured_amplitudes import without
+
+CASES = Path(__file__).parents[2] / "data/identify_cases"
+METHODS = ("equation-error", "output-error")
+
+
+def drawn_chain(seed, masses, noise=0.0, stated=None, lost=1):
+    """A chain with known masses and drawn springs and dampers; some amplitudes are not measured."""
+    rng = np.random.default_rng(seed)
+    equations = []
+    for i in range(1, masses + 1):
+        left = f"(m{i}*p**2 + b{i}*p)*X{i} + k{i}*(X{i}{f' - X{i - 1}' if i > 1 else ''})"
+        left += f" + k{i + 1}*(X{i} - X{i + 1})" if i < masses else ""
+        equations.append(f"{left} = {'F' if i == 1 else '0'}")
+    known = {f"m{i}": rng.uniform(2, 10) for i in range(1, masses + 1)}
+    truth = {f"b{i}": rng.uniform(5, 50) for i in range(1, masses + 1)}
+    truth |= {f"k{i}": 10 ** rng.uniform(3.7, 4.7) for i in range(1, masses + 1)}
+    model = harmonic_model(equations, known=known, estimate=list(truth))
+    values, w = np.array(list(truth.values())), np.linspace(8, 130, 14)
+    z = model.predict(values, w, {"F": np.ones(14, dtype=complex)})
+    for name in rng.permutation(list(z))[:lost]:
+        del z[name]
+    z = {n: x * (1 + noise * (rng.standard_normal(14) + 1j * rng.standard_normal(14))) for n, x in z.items()}
+    return model, values, experiments(model, w, {"F": 1.0, **z}, free=False, errors=stated)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("method", METHODS)
+def test_drawn_chains_with_an_unmeasured_mass_are_found(seed, method):
+    model, truth, data = drawn_chain(seed, 2 + seed % 3)
+    found = identify(model, data, method=method)
+    np.testing.assert_allclose(found.values, truth, rtol=1e-5)
+    assert found.identifiable
+    assert not found.unidentifiable
+
+
+@pytest.mark.parametrize("seed", [0, 1, 20])  # 20: noise drives a damper to 0
+def test_noisy_ones_within_their_intervals(seed):
+    errors = AmplitudeErrors(0.01, 0.01)
+    model, truth, data = drawn_chain(seed, 3, 0.01, errors)
+    found = identify(model, data, method="output-error")
+    assert found.converged
+    assert found.warnings == ()
+    assert (np.abs(found.values - truth) < 4.5 * found.std).all()
+    assert found.left_out == (f"{(set(model.outputs) - set(data.signals)).pop()} is measured nowhere",)
+
+
+def test_phases_are_not_blamed_for_a_linear_estimate_that_is_poor_with_either_sign():
+    """A linear estimate with the phases turned is compared with one without that, from the same rows."""
+    poor = 0
+    for seed in range(5, 8):
+        errors = AmplitudeErrors(0.01, 0.01)
+        found = identify(*drawn_chain(seed, 4, 0.01, errors)[::2])
+        poor += not found.converged
+        assert not any("phases of the other sign" in text for text in found.warnings), found.warnings
+    assert poor
+
+
+def test_two_unmeasured_masses():
+    model, truth, data = drawn_chain(5, 4, lost=2)
+    np.testing.assert_allclose(identify(model, data, method="output-error").values, truth, rtol=1e-6)
+
+
+@pytest.mark.parametrize("hidden", [("X1",), ("X2", "X4"), ("X3", "X1")])
+def test_the_model_without_some_amplitudes_predicts_the_others_alike(hidden):
+    model, truth, _ = drawn_chain(6, 4)
+    fewer, w = without(model, hidden), np.linspace(3, 200, 25)
+    load = {"F": np.full(25, 2.0 + 1j)}
+    whole, part = model.predict(truth, w, load), fewer.predict(truth, w, load)
+    assert set(part) == set(whole) - set(hidden)
+    for name, z in part.items():
+        np.testing.assert_allclose(z, whole[name], rtol=1e-8)
+
+
+SPRINGS = ["(m*p**2 + b*p)*X + ka*(X - W) = F", "kb*W + ka*(W - X) = 0"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("ka", "kb"), [(2e4, 3e4), (1e3, 9e5), (5e5, 5e5)])
+def test_springs_in_series_show_the_one_stiffness_whatever_they_are(method, ka, kb):
+    model = harmonic_model(SPRINGS, known={"m": 5.0}, estimate=["b", "ka", "kb"])
+    w, errors = np.linspace(5, 200, 9), AmplitudeErrors(0.02, 0.02)
+    x = model.predict(np.array([30.0, ka, kb]), w, {"F": np.ones(9, dtype=complex)})["X"]
+    found = identify(
+        model, experiments(model, w, {"F": 1.0, "X": x}, free=False, errors=errors), method=method
+    )
+    assert found.value("b") == pytest.approx(30.0, rel=1e-6)
+    assert np.isnan(found.values[1:]).all()
+    (spring,) = found.combinations
+    assert spring.words == "ka*kb/(ka + kb)"
+    assert spring.value == pytest.approx(ka * kb / (ka + kb), rel=1e-6)
+    # one spring in their place: the same estimate and error
+    one = harmonic_model(["(m*p**2 + b*p + k)*X = F"], known={"m": 5.0}, estimate=["b", "k"])
+    plain = identify(one, experiments(one, w, {"F": 1.0, "X": x}, free=False, errors=errors), method=method)
+    assert spring.std == pytest.approx(plain.std[1], rel=0.02)
+
+
+def test_where_the_elimination_is_too_long_tangents_are_named_so(monkeypatch):
+    monkeypatch.setattr("rotorid.harmonic.unmeasured_amplitudes.MOST_TERMS", 0)
+    model = harmonic_model(SPRINGS, known={"m": 5.0}, estimate=["b", "ka", "kb"])
+    w = np.linspace(5, 200, 9)
+    x = model.predict(np.array([30.0, 2e4, 3e4]), w, {"F": np.ones(9, dtype=complex)})["X"]
+    data = experiments(model, w, {"F": 1.0, "X": x}, free=False)
+    found = identify(model, data, method="output-error")
+    assert found.value("b") == pytest.approx(30.0, rel=1e-6)
+    (near,) = found.combinations
+    assert near.words.startswith("(near these values) ka + ")
+    assert near.std is None
+    assert "no experiment of this kind tells more" in found.unidentifiable[1]
+    with pytest.raises(ValueError, match="W of the model is not among the measurements"):
+        identify(model, data)
+
+
+def test_a_search_that_does_not_converge_says_nothing_else():
+    model, truth, data = drawn_chain(1, 4)
+    start = dict(zip(model.parameters, 1e4 / truth, strict=True))
+    found = identify(model, data, method="output-error", start=start)
+    assert not found.converged
+    assert not found.identifiable
+    assert found.ci95 is None
+    assert found.std is None
+    document = found.to_dict()
+    assert document["converged"] is False
+    assert document["identifiable"] is False
+    assert all(p["std"] is None and p["ci95"] is None for p in document["parameters"].values())
+    assert document["combinations"] == {}
+    assert document["unidentifiable"] == []
+    text = found.summary()
+    assert "not converged: the values are where the search stopped" in text
+    assert "determined" not in text
+
+
+def test_several_solutions_beside_a_hidden_amplitude_are_said_as_such():
+    """Time constants in series can be exchanged; the amplitude between them is not measured."""
+    model = harmonic_model(["(T1*p + 1)*Y = F", "(T2*p + 1)*X = Y"], estimate=["T1", "T2"])
+    w = np.array([1.0, 3.0, 6.0])
+    x = model.predict(np.array([0.5, 0.2]), w, {"F": np.ones(3, dtype=complex)})["X"]
+    data = experiments(model, w, {"F": 1.0, "X": x}, free=False)
+    for method in METHODS:
+        found = identify(model, data, method=method)
+        assert np.isnan(found.values).all()
+        assert not any("are determined" in text for text in found.unidentifiable)
+        assert sorted(round(s["T1"], 6) for s in found.solutions) == [0.2, 0.5]
+        assert "can be exchanged" in found.unidentifiable[0]
+
+
+def test_too_few_experiments_for_the_elimination_are_said_and_output_error_does():
+    model, truth, data = drawn_chain(121, 3, lost=2)
+    few = data.take(np.arange(4))
+    with pytest.raises(ValueError, match="use the method output-error, or measure more"):
+        identify(model, few)
+    found = identify(model, few, method="output-error")
+    good = np.isfinite(found.values)
+    np.testing.assert_allclose(found.values[good], truth[good], rtol=1e-5)
+
+
+def run(cli, name, *options):
+    return cli("identify", CASES / name / "model.toml", CASES / name / "data.csv", "--json", *options)
+
+
+@pytest.mark.filterwarnings("ignore:.*the table has no")
+def test_the_cases_say_what_they_should(cli):
+    truth = {"b1": 20, "k1": 2e4, "k2": 3e4, "k3": 2.5e4, "k4": 1.2e4, "b4": 9}
+    for method in METHODS:
+        found = run(cli, "hidden_amplitude", "--method", method).json
+        assert found["identifiable"]
+        for name, value in truth.items():
+            assert found["parameters"][name]["value"] == pytest.approx(value, rel=1e-6)
+        found = run(cli, "series_springs", "--method", method).json
+        assert found["combinations"]["ka*kb/(ka + kb)"]["value"] == pytest.approx(12000, rel=1e-6)
+        assert found["parameters"]["ka"]["value"] is None
+        found = run(cli, "ratios_only", "--method", method).json
+        ratios = {words: c["value"] for words, c in found["combinations"].items()}
+        assert ratios == {"b/m": pytest.approx(20 / 3, rel=1e-6), "c/m": pytest.approx(1e4 / 3, rel=1e-6)}
+        words = " ".join(found["unidentifiable"])
+        assert "no experiment of this kind tells more" in words
+        assert "nothing is determined" not in words
+        assert "may determine" not in words
+        found = run(cli, "speed_column", "--method", method).json
+        assert found["identifiable"]
+
+
+@pytest.mark.filterwarnings("ignore:.*the table has no")
+def test_determined_and_not_determined_are_never_both_said(cli):
+    for name in ("ratios_only", "series_springs", "speed_column"):
+        text = cli("identify", CASES / name / "model.toml", CASES / name / "data.csv").out
+        both = [
+            bool(re.search(r"(are|is) determined \(condition", text)),
+            "by itself" in text or "only" in text,
+        ]
+        assert sum(both) == 1, text
