@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.data.conventions import Labels
+from balancing.data.result_columns import known, weight_columns
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -152,31 +153,27 @@ class Unbalance:
         return frame(self._columns())
 
     def _columns(self) -> tuple[Column, ...]:
-        size, angle = self.labels.weight(self.unbalance)
-        std = np.full(len(size), np.nan) if self.std is None else self.std * self.labels.weight_scale
+        station, size, unit, angle = weight_columns(self.labels, self.stations, self.unbalance)
+        std = known(self.std, len(self.stations)) * self.labels.weight_scale
         return (
-            Column("station", self.stations),
-            Column("unbalance", size),
-            Column("unit", [self.labels.weight_unit] * len(size)),
-            Column("angle_deg", angle),
-            Column("std", std),
+            replace(station, name="station"),
+            replace(size, name="unbalance", shown="{:.5g}".format),
+            unit,
+            angle,
+            Column("std", std, "{:.3g}".format),
             Column("own_share", self.own_share),
             Column("determined", self.determined),
         )
 
     def summary(self) -> str:
         """Text: what is determined, and the unbalance of each station with its standard deviation."""
-        width = max(8, *(len(name) for name in self.stations))
         lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {self.words()}"]
         lines[:0] = [self.labels.assumed_in_words()] if self.labels.assumed else []
-        lines.append(
-            f"{'station':<{width}} {self.labels.weight_unit:>12} {'angle':>8} {'std':>10}  determined"
-        )
-        for row in rows(self._columns()):
-            std = "" if row["std"] is None else f"{row['std']:.3g}"
-            sure = "yes" if row["determined"] else f"no ({_percent(row['own_share'])} % its own)"
-            size = f"{row['unbalance']:>12.5g} {row['angle_deg']:>7.1f}°"
-            lines.append(f"{row['station']:<{width}} {size} {std:>10}  {sure}")
+        sure = [
+            "yes" if alone else f"no ({_percent(share)} % its own)"
+            for alone, share in zip(self.determined, self.own_share, strict=True)
+        ]
+        lines.append(text((*self._columns(), Column("", sure, str, "determined"))))
         return "\n".join(lines)
 
 

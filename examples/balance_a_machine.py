@@ -37,9 +37,10 @@ def main(picture: str | None = None) -> dict[str, float]:
 
     # The check run is one more run to learn from; trim is what to add to what is mounted now.
     refined = balancing.refine(checked.trials, checked.check, corrections=correction)
-    trim = balancing.trim(balancing.correct(refined))
-    print(f"Trim, to be added to the weights of run {trim.run!r}:")
-    for plane, weight in zip(trim.planes, trim.add, strict=True):
+    better = balancing.correct(refined)
+    run, planes, _ = better.mounted
+    print(f"Trim, to be added to the weights of run {run!r}:")
+    for plane, weight in zip(planes, better.to_add, strict=True):
         print(f"  {plane:7} {1e6 * abs(weight):6.2f} g·mm at {np.angle(weight, deg=True) % 360:5.1f}°")
 
     if picture is not None:
@@ -51,7 +52,7 @@ def main(picture: str | None = None) -> dict[str, float]:
         "largest_after_um_pp": 2e6 * float(np.abs(correction.after).max()),
         "largest_with_pieces_um_pp": 2e6 * float(np.abs(mounted.after).max()),
         "largest_in_check_um_pp": 2e6 * float(np.abs(check.achieved).max()),
-        "trim_left_g_mm": 1e6 * float(abs(trim.add[0])),
+        "trim_left_g_mm": 1e6 * float(abs(better.to_add[0])),
     }
 
 

@@ -17,9 +17,10 @@ from fem.solvers.crossing import crossings, off_synchronous
 from fem.solvers.mode_tracking import Followed
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
-from fem.whirl import available_modes, checked_number, checked_speeds, in_both_planes
+from fem.whirl import available_modes, checked_number, in_both_planes
 from fem.windows import Window, within
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
+from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.rpm import RPM, rpm_text
@@ -202,7 +203,7 @@ def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
         If speeds are impossible or outside the table of a support, the mesh is too fine for float64, or the
         rotor is pushed aside by negative stiffness at every speed.
     """
-    speeds = checked_speeds(speeds)
+    speeds = checked_speeds(speeds, ascending=True)
     available = available_modes(rotor)
     said_of_number: tuple[str, ...] = ()
     if n is not None and whole(n, "the number of modes") > available:

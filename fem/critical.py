@@ -18,6 +18,7 @@ from rotorid.base.arrays import AnyArray, FloatArray
 
 _LINE = 1e-6  # relative difference of forward and backward amplitude below which an orbit is a line
 _USUAL = 3  # critical speeds, where nothing else is asked for
+_FEW, _MANY = 4, 32  # looked for at first; over tables all are found at once, however many are asked for
 _NAMED = 5  # critical speeds beyond the end of a list that are named
 _SLOW = 1e-6  # of the last speed of the tables: no motion of a rotor is slower, but as a rigid body
 
@@ -52,7 +53,14 @@ def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
         If the model has fewer than n modes, the bearing tables hold no critical speed, nothing
         that moves has mass, or the mesh is too fine for float64.
     """
-    asked = _USUAL if n is None else whole(n, "the number of critical speeds")
+    if n is None:
+        return lowest_critical_speeds(rotor, _USUAL)
+    asked = whole(n, "the number of critical speeds")
+    return lowest_critical_speeds(rotor, asked, asked)
+
+
+def lowest_critical_speeds(rotor: Rotor, most: int, least: int = 1) -> Modes:
+    """`critical_speeds`: the `most` lowest, or all there are, where there are not fewer than `least`."""
     A = assemble(rotor)
     said: tuple[str, ...] = ()
     cut = ""
@@ -61,15 +69,40 @@ def critical_speeds(rotor: Rotor, n: int | None = None) -> Modes:
         rigid = pencil.rigid.shape[1]
         available = finite_modes(pencil)
         available = max(available - rigid, min(available, 1))
-        _check_number(1 if n is None else asked, available)
-        found = positive_modes(pencil, min(asked, available) + rigid)
+        _check_number(least, available)
+        found = positive_modes(pencil, min(most, available) + rigid)
         thin = " (discs whose polar inertia exceeds the diametral one take some away)"
-        _check_number(1 if n is None else asked, found.squares.size - rigid, thin)
-        parts = [found.only(slice(0, asked + rigid))]
+        _check_number(least, found.squares.size - rigid, thin)
+        parts = [found.only(slice(0, most + rigid))]
     else:
-        _check_number(asked, asked)
-        parts, said, cut = _over_speed(rotor, A, asked)
+        _check_number(most, most)
+        parts, said, cut = _over_speed(rotor, A, most)
     return replace(_modes(rotor, parts, said), cut=cut)
+
+
+def critical_speeds_below(rotor: Rotor, top: float, most: float = np.inf) -> FloatArray:
+    """All critical speeds above 0 up to a speed, rad/s, ascending, shape (c,).
+
+    Parameters
+    ----------
+    rotor
+        The rotor.
+    top
+        rad/s.
+    most
+        How many of the lowest are enough.
+
+    Raises
+    ------
+    ValueError
+        As `critical_speeds`, if it finds none at all.
+    """
+    n = _FEW if rotor.constant else _MANY
+    while True:
+        found = np.sort(lowest_critical_speeds(rotor, n).frequencies)
+        if found.size < n or found[-1] > top or n >= most:
+            return np.asarray(found[(found > 0) & (found <= top)])
+        n *= 2
 
 
 def _check_number(n: int, available: int, reason: str = "") -> None:

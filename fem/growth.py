@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES, whirl_direction
-from fem.solvers.crossing import crossings
+from fem.solvers.crossing import crossings, growth_rate
 from fem.solvers.quadratic_eigenvalues import NONE
 from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
@@ -84,7 +84,7 @@ class Growing:
 
 def growing(whirl: Whirl, values: ComplexArray, X: ComplexArray) -> tuple[Growing, ...]:
     """Ranges in which modes grow, by the speed where they start to, from shapes (S, n) and (S, n, R)."""
-    growth = values.real / np.abs(values)
+    growth = growth_rate(values)
     grows = np.nan_to_num(growth, nan=-np.inf) > GROWTH
     only = np.full_like(values, NONE)
     runs = []
@@ -97,7 +97,7 @@ def growing(whirl: Whirl, values: ComplexArray, X: ComplexArray) -> tuple[Growin
                 only[k : k + 2, mode] = values[k : k + 2, mode]
     roots: dict[int, list[tuple[float, ComplexArray, ComplexArray]]] = {}
     if np.isfinite(only).any():
-        found = crossings(whirl, only, X, _level)
+        found = crossings(whirl, only, X, growth_rate)
         for c, mode in enumerate(found.modes.tolist()):
             root = float(found.speeds[c]), found.values[c : c + 1], found.shapes[c : c + 1]
             roots.setdefault(mode, []).append(root)
@@ -142,7 +142,3 @@ def joined(ranges: Sequence[Growing], speeds: FloatArray) -> tuple[Window, ...]:
             begins = bool(g.speed > speeds[0])
             found.append(Window(g.speed, last, begins, ends, g.mode, g.frequency, g.direction))
     return tuple(w for w in found if ((speeds >= w.first) & (speeds <= w.last)).any())
-
-
-def _level(lam: ComplexArray, _: FloatArray) -> FloatArray:
-    return np.asarray(lam.real / np.abs(lam))

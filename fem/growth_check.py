@@ -7,6 +7,7 @@ import numpy as np
 from fem.matrices.lateral_planes import both_planes
 from fem.model.rotor import Rotor
 from fem.orbits import whirl_direction
+from fem.solvers.bracketed_roots import bracketed_root
 from fem.solvers.quadratic_eigenvalues import all_values, solve
 from fem.solvers.stable_speeds import GROWTH, Bases, bases, growing_at, largest_growth, rates
 from fem.whirl import in_both_planes
@@ -125,7 +126,6 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
     The speed, and the eigenvalue that grows from there; 0 if the rotor runs away without oscillating.
     """
     from scipy.linalg import eigvals
-    from scipy.optimize import brentq
 
     knots = found.fine.P.rotor.knots
     ends = min(unstable, stable), max(unstable, stable)
@@ -139,12 +139,12 @@ def loss(found: Bases, unstable: float, stable: float, level: float = GROWTH) ->
     k = int(np.argmin(over))
     if over.all() or k == 0:
         return float(unstable), _fastest(found, unstable)
-    a, b = trials[k - 1 : k + 1].tolist()
+    (a, b), around = trials[k - 1 : k + 1].tolist(), (growth[k - 1 : k + 1] - level).tolist()
 
     def excess(speed: float) -> float:
         return float(largest_growth(found, np.array([speed]))[0]) - level
 
-    speed = float(brentq(excess, a, b, xtol=1e-13 * max(a, b), rtol=1e-14))
+    speed = bracketed_root(excess, (a, b), around, 1e-13 * max(a, b))
     value = _fastest(found, speed)
     if not value:
         # K is singular there, and linear between a and b: sharper than the eigenvalue, which rounding blurs.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fem.api684_peaks import Peaks
-from fem.critical import critical_speeds
+from fem.critical import critical_speeds_below
 from fem.model.sensors import SensorLike
 from fem.response import judged, response_peaks
 from fem.response_result import Response
@@ -21,7 +21,7 @@ _FINEST = 2e-7  # relative step; finer ones would show rounding
 _ROUNDS = 14
 _MOST = 30_000  # speeds
 _AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
-_CRITICALS = 32
+_CRITICALS = 32  # around which speeds are added
 _OVER_SPEED = ("speeds", "amplitudes", "backward", "largest", "largest_node")
 
 
@@ -69,7 +69,11 @@ def _refine(result: Response, places: Sequence[SensorLike]) -> Response:
     all. Bounded: what is not resolved with steps of 2e-7 of the speed counts as undamped.
     """
     omega = result.speeds
-    near = np.add.outer(_criticals(result), np.zeros(_AROUND.size)) * (1 + _AROUND)
+    try:
+        criticals = critical_speeds_below(result.rotor, omega[-1] / (1 + _AROUND[0]), _CRITICALS)
+    except ValueError:  # fewer modes than one asks for, or none inside the tables
+        criticals = np.empty(0)
+    near = np.multiply.outer(criticals, 1 + _AROUND)
     extra = near[(near > omega[0]) & (near < omega[-1])]
     for _ in range(_ROUNDS):
         merged = _with(result, extra)
@@ -99,21 +103,6 @@ def _settle(result: Response, peaks: Sequence[Peaks], asked: FloatArray) -> Resp
                 tops.append(peak.speed)
     kept = _at(result, keep | np.isin(result.speeds, asked))
     return _with(kept, np.array(tops)) or kept
-
-
-def _criticals(result: Response) -> FloatArray:
-    """Undamped critical speeds up to the highest speed; none where they cannot be found."""
-    # Over tables all are found at once, whatever n.
-    n, found = 4 if result.rotor.constant else _CRITICALS, np.zeros(0)
-    while n <= _CRITICALS:
-        try:
-            found = critical_speeds(result.rotor, n).frequencies
-        except ValueError:
-            break  # fewer modes than that, or none inside the tables
-        if found.size < n or found[-1] > result.speeds[-1]:
-            break
-        n *= 2
-    return found
 
 
 def _with(result: Response, extra: FloatArray) -> Response | None:

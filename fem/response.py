@@ -18,6 +18,7 @@ from fem.solvers.eigen import fine_mesh_warning
 from fem.solvers.receptance import Receptance, prepare
 from fem.solvers.synchronous_banded import rounding_warning
 from rotorid.base.arrays import ComplexArray, FloatArray, read_only
+from rotorid.base.checks import checked_speeds
 
 __all__ = ["BearingForces", "InfluenceCoefficients", "Response", "influence", "response_peaks"]
 __all__ += ["unbalance_response"]
@@ -56,7 +57,7 @@ def unbalance_response(
         If the undamped rotor runs exactly at a critical speed, for impossible input, at a speed outside a
         bearing table, or for a mesh too fine for float64.
     """
-    speeds = _checked_speeds(speeds)
+    speeds = checked_speeds(speeds)
     kept = np.array(range(1, rotor.n_nodes + 1) if nodes is None else [rotor.node(n) for n in nodes])
     masses: dict[int, complex] = {}
     for key, value in dict(unbalance).items():
@@ -101,7 +102,7 @@ def response_from_rest(
     speeds
         rad/s, ascending.
     """
-    omega = _checked_speeds(speeds)
+    omega = checked_speeds(speeds)
     known = all(not support.speeds or support.speeds[0] == 0 for support in rotor.supports)
     if omega[0] > 0 or omega.size < 2 or not known:
         return unbalance_response(rotor, unbalance, omega, nodes=nodes)
@@ -198,7 +199,7 @@ def influence(
     ValueError
         As `unbalance_response`.
     """
-    speeds = _checked_speeds(speeds)
+    speeds = checked_speeds(speeds)
     planes, sensors = tuple(planes), tuple(sensors)
     if not planes or not sensors:
         raise ValueError("name at least one plane and one sensor")
@@ -225,16 +226,3 @@ def influence(
 
 def _model_warnings(ready: Receptance) -> tuple[str, ...]:
     return (*ignored_inertia(ready.rotor), *fine_mesh_warning(ready.rotor, ready.rounding))
-
-
-def _checked_speeds(speeds: ArrayLike) -> FloatArray:
-    try:
-        array = np.atleast_1d(np.array(speeds, dtype=float))
-    except (TypeError, ValueError):
-        raise ValueError("speeds must be numbers in rad/s") from None
-    if array.ndim != 1 or not array.size:
-        raise ValueError("speeds must be one number or a list of at least one")
-    if not (np.isfinite(array) & (array >= 0)).all():
-        raise ValueError("speeds must be finite and not negative, in rad/s")
-    read_only(array)
-    return array

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fem.critical import critical_speeds
+from fem.critical import lowest_critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
 from fem.solvers.bracketed_roots import bracketed_root
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
@@ -80,22 +80,24 @@ class SpeedMap:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; one list of speeds per mode."""
-        return {
-            "stiffness_N_per_m": self.stiffness.tolist(),
-            "critical_speeds_rad_s": [floats(row) for row in self.speeds.T],
-            "free_rad_s": floats(self.free),
-            "pinned_rad_s": floats(self.pinned),
-            "intersections": [
-                {
-                    "support": item.support,
-                    "direction": item.direction,
-                    "mode": item.mode,
-                    "speed_rad_s": item.speed,
-                    "stiffness_N_per_m": item.stiffness,
-                }
-                for item in self.intersections
-            ],
-        }
+        return plain(
+            {
+                "stiffness_N_per_m": self.stiffness,
+                "critical_speeds_rad_s": self.speeds.T,
+                "free_rad_s": self.free,
+                "pinned_rad_s": self.pinned,
+                "intersections": [
+                    {
+                        "support": item.support,
+                        "direction": item.direction,
+                        "mode": item.mode,
+                        "speed_rad_s": item.speed,
+                        "stiffness_N_per_m": item.stiffness,
+                    }
+                    for item in self.intersections
+                ],
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per stiffness, one column per critical speed."""
@@ -235,16 +237,10 @@ def _with_stiffness(rotor: Rotor, chosen: list[int], value: float) -> Rotor:
 
 def _criticals(rotor: Rotor, n: int) -> FloatArray:
     """The n lowest, NaN for those that the model does not have."""
-    for m in range(n, 0, -1):
-        try:
-            found = critical_speeds(rotor, m).frequencies[:m]
-        except ValueError:
-            # Thin discs take critical speeds away; anything else is the user's to know.
-            if m == 1 or not rotor.model.gyroscopic:
-                raise
-            continue
-        return np.concatenate((found, np.full(n - found.size, np.nan)))
-    raise ValueError(f"{n} critical speeds cannot be found; choose n from 1")
+    # Thin discs take critical speeds away; anything else is the user's to know.
+    least = 1 if rotor.model.gyroscopic else n
+    found = lowest_critical_speeds(rotor, n, least).frequencies[:n]
+    return np.concatenate((found, np.full(n - found.size, np.nan)))
 
 
 def _free(at: _Criticals, lowest: float) -> FloatArray:

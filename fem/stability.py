@@ -13,9 +13,10 @@ from fem.model.rotor import Rotor
 from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.solvers.stable_speeds import Bases
-from fem.whirl import available_modes, checked_number, checked_speeds
+from fem.whirl import available_modes, checked_number
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.json import finite
+from rotorid.base.checks import checked_speeds
+from rotorid.base.json import plain
 from rotorid.base.rpm import RPM, speed_text
 
 SMALLEST = 1e-9
@@ -70,19 +71,21 @@ class Stability:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; unknown values are None."""
-        return {
-            "status": self.status,
-            "lowest_rad_s": self.lowest,
-            "highest_rad_s": self.highest,
-            "threshold_rad_s": self.threshold,
-            "threshold_rpm": None if self.threshold is None else self.threshold * RPM,
-            "mode": self.mode,
-            "frequency_rad_s": self.frequency,
-            "whirl_ratio": self.whirl_ratio,
-            "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
-            "smallest_log_decrement": finite(self.margin),
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "status": self.status,
+                "lowest_rad_s": self.lowest,
+                "highest_rad_s": self.highest,
+                "threshold_rad_s": self.threshold,
+                "threshold_rpm": None if self.threshold is None else self.threshold * RPM,
+                "mode": self.mode,
+                "frequency_rad_s": self.frequency,
+                "whirl_ratio": self.whirl_ratio,
+                "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
+                "smallest_log_decrement": self.margin,
+                "warnings": self.warnings,
+            }
+        )
 
     def summary(self) -> str:
         """The answer as text."""
@@ -148,7 +151,7 @@ def range_of_speeds(lowest: float, highest: float, steps: int) -> FloatArray:
         )
     if int(steps) != steps or steps < 1:
         raise ValueError(f"the range is divided into at least one step; got {steps!r}")
-    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1))
+    return checked_speeds(np.linspace(lowest, highest, int(steps) + 1), ascending=True)
 
 
 def searched(found: Bases | None, grows: BoolArray, whirl: Whirl) -> Stability:

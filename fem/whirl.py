@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fem.matrices.banded_matrices import assemble
 from fem.matrices.lateral_planes import both_planes
@@ -15,6 +14,7 @@ from fem.orbits import DIRECTION_NAMES, whirl_direction
 from fem.solvers.eigen import finite_modes
 from fem.solvers.reduced_whirl import solve_whirl
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import checked_speeds
 from rotorid.base.rpm import RPM, speed_text
 
 if TYPE_CHECKING:
@@ -177,31 +177,6 @@ def missing_modes(planes: int, real: FloatArray, still: int, found: int, n: int)
             "a support pushes it aside; check negative stiffness"
         )
     return tuple(texts)
-
-
-def checked_speeds(speeds: ArrayLike) -> FloatArray:
-    """Speeds as an array, ascending.
-
-    Raises
-    ------
-    ValueError
-        If they are no numbers, negative or not ascending.
-    """
-    try:
-        array = np.atleast_1d(np.array(speeds, dtype=float))
-    except (TypeError, ValueError):
-        raise ValueError("speeds must be numbers in rad/s") from None
-    if array.ndim != 1 or not array.size:
-        raise ValueError("speeds must be one number or a list of at least one")
-    if not (np.isfinite(array) & (array >= 0)).all():
-        raise ValueError("speeds must be finite and not negative, in rad/s")
-    if (np.diff(array) <= 0).any():
-        k = int(np.argmax(np.diff(array) <= 0))
-        raise ValueError(
-            f"speeds must ascend, but {array[k + 1]:.6g} rad/s follows {array[k]:.6g} rad/s; sort them"
-        )
-    array.flags.writeable = False
-    return array
 
 
 def checked_number(rotor: Rotor, n: int | None) -> int:

@@ -17,6 +17,7 @@ from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.reading_errors import Source
 from balancing.data.result_columns import (
+    covariance_column,
     degrees,
     known,
     reading_columns,
@@ -29,7 +30,7 @@ from balancing.data.result_columns import (
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.json import finite, plain
+from rotorid.base.json import cell, plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, counted, figures, wrap
 from rotorid.regression import coverage_factor
@@ -209,7 +210,7 @@ class Correction:
             return {"max_weight": None, "forbidden_deg": []}
         opposite = self.planes[p] in self.remove
         return {
-            "max_weight": finite(self.limits.max_weight[p] * self.labels.weight_scale),
+            "max_weight": cell(self.limits.max_weight[p] * self.labels.weight_scale),
             "forbidden_deg": [self.labels.arc(*a, opposite=opposite) for a in self.limits.forbidden[p]],
         }
 
@@ -306,11 +307,10 @@ class Correction:
         )
 
     def _residual_columns(self) -> tuple[Column, ...]:
-        covariance = self.after_covariance
-        blocks: Sequence[Any] | FloatArray = [None] * self.before.size
-        if covariance is not None:
-            blocks = self.labels.vibration_covariance(covariance).reshape(-1, 2, 2)
-        return (*self.vibration_columns(ROUNDING), Column("after_covariance", blocks))
+        return (
+            *self.vibration_columns(ROUNDING),
+            covariance_column(self.labels, "after_covariance", self.after_covariance, self.before.size),
+        )
 
     def vibration_columns(self, rounding: float, after: ComplexArray | None = None) -> tuple[Column, ...]:
         """Speed, sensor, vibration before and after, one row a reading.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.coefficients.baseline import match_speeds
-from balancing.correction.refine_coefficients import runs_and_weights
+from balancing.correction.refine_coefficients import runs_and_weights, sensors_in
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.result_columns import known, mounted_rows
@@ -126,9 +127,9 @@ class History:
             for row in run["speeds"]:
                 own = {"run": run["run"], "kind": run["kind"]}
                 for plane in self.planes:
-                    weight = mounted.get(plane)
-                    own[f"{plane} weight"] = weight["mass"] if weight else np.nan
-                    own[f"{plane} angle_deg"] = weight["angle_deg"] if weight else np.nan
+                    weight = mounted.get(plane, {})
+                    own[f"{plane} weight"] = weight.get("mass", np.nan)
+                    own[f"{plane} angle_deg"] = weight.get("angle_deg", np.nan)
                 found.append({**own, **row})
         return pd.DataFrame(found).astype({"of_limit": float, "within_limits": object})
 
@@ -143,12 +144,10 @@ class History:
                 f"{figures(weight['mass'])} at {round(weight['angle_deg']) % 360}° {weight['plane']}"
                 for weight in run["weights"]
             ] or ["nothing"]
-            for k in range(max(len(weights), len(run["speeds"]))):
-                cells = [run["run"] if k == 0 else "", weights[k] if k < len(weights) else ""]
-                cells += (
-                    _vibration(run["speeds"][k], limited=limited) if k < len(run["speeds"]) else ["", "", ""]
-                )
-                lines.append(cells + [""] * (len(lines[0]) - len(cells)))
+            read = [_vibration(row, limited=limited) for row in run["speeds"]]
+            for name, weight, cells in zip_longest([run["run"]], weights, read):
+                row = [name or "", weight or "", *(cells or ())]
+                lines.append(row + [""] * (len(lines[0]) - len(row)))
         turn = self.labels.turning_in_words()
         foot = f"Vibration{unit}: the largest of the sensors, and the root mean square of them; {turn}."
         return f"History of the job\n{table(lines, left=2)}\n{wrap(foot)}"
@@ -181,15 +180,9 @@ def history(
     names, planes, weights = runs_and_weights(trials, checks, corrections)
     blocks = [trials.mean]
     for check in checks:
-        for name in check.sensors:
-            if name not in trials.sensors:
-                known = ", ".join(map(repr, trials.sensors))
-                raise ValueError(f"the trial runs have no sensor {name!r}; they have {known}")
         rows = match_speeds(check.speeds, trials.speeds, "trial runs")
-        columns = [trials.sensors.index(name) for name in check.sensors]
-        shape = (len(check.runs), len(trials.speeds), len(trials.sensors))
-        block = np.full(shape, complex(np.nan, np.nan))
-        block[np.ix_(range(shape[0]), rows, columns)] = check.mean
+        block = np.full((len(check.runs), *trials.mean.shape[1:]), complex(np.nan, np.nan))
+        block[np.ix_(range(len(block)), rows, sensors_in(check, trials))] = check.mean
         blocks.append(block)
     largest = None if limits is None or not np.isfinite(limits.residual).any() else limits.residual
     first = len(trials.runs)

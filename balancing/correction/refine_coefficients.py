@@ -24,6 +24,7 @@ from balancing.coefficients.baseline import match_speeds
 from balancing.coefficients.identifiability import UndeterminedError
 from balancing.coefficients.influence import Influence, estimate_influence, estimate_like
 from balancing.data.trials import Trials
+from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
 from rotorid.base.rpm import rpm_text
 
@@ -40,8 +41,6 @@ _ROUNDING = 1e-9
 """Coefficients below this share of the plane's largest one are none."""
 _TIMES = 10.0
 _NAMED = 3
-_REGION = 5.991464547107979
-"""χ² of two degrees of freedom that errors alone exceed with 5 %."""
 
 
 def refine(
@@ -148,8 +147,14 @@ def different(name: str, names: Sequence[str]) -> str:
     return new
 
 
-def _sensors(check: Trials, trials: Trials) -> list[int]:
-    """Where the sensors of a check run stand among those of the trial runs."""
+def sensors_in(check: Trials, trials: Trials) -> list[int]:
+    """Where the sensors of a check run stand among those of the trial runs.
+
+    Raises
+    ------
+    ValueError
+        For a sensor that the trial runs do not have.
+    """
     for name in check.sensors:
         if name not in trials.sensors:
             raise ValueError(
@@ -176,7 +181,7 @@ def _common(trials: Trials, checks: Sequence[Trials]) -> tuple[list[int], list[i
     """Speeds and sensors of the trial runs that all check runs have."""
     at = [match_speeds(check.speeds, trials.speeds, "trial runs") for check in checks]
     rows = [s for s in range(len(trials.speeds)) if all(s in speeds for speeds in at)]
-    sensors = [_sensors(check, trials) for check in checks]
+    sensors = [sensors_in(check, trials) for check in checks]
     return rows, [c for c in range(len(trials.sensors)) if all(c in own for own in sensors)]
 
 
@@ -193,7 +198,7 @@ def _joined(
     steps = [_steps(trials)[:, :, :, rows][..., columns]]
     for check in checks:
         speeds = match_speeds(check.speeds, trials.speeds, "trial runs")
-        sensors = _sensors(check, trials)
+        sensors = sensors_in(check, trials)
         at, of = [speeds.index(s) for s in rows], [sensors.index(c) for c in columns]
         blocks.append(check.readings[:, :, at][..., of])
         steps.append(_steps(check)[:, :, :, at][..., of])
@@ -310,10 +315,10 @@ def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
     words = []
     for p, plane in enumerate(alone.planes):
         old, new = alone.W[..., p], refined.W[..., refined.planes.index(plane)]
-        rounding = _ROUNDING * max(float(np.abs(old).max()), float(np.abs(new).max()))
-        for s, c in np.argwhere((np.abs(old) > rounding) | (np.abs(new) > rounding)):
-            change = abs(new[s, c]) / max(abs(old[s, c]), rounding) - 1.0
-            both = min(abs(old[s, c]), abs(new[s, c])) > rounding
+        dust = _ROUNDING * max(float(np.abs(old).max()), float(np.abs(new).max()))
+        for s, c in np.argwhere((np.abs(old) > dust) | (np.abs(new) > dust)):
+            change = abs(new[s, c]) / max(abs(old[s, c]), dust) - 1.0
+            both = min(abs(old[s, c]), abs(new[s, c])) > dust
             turn = float(np.angle(new[s, c] * np.conj(old[s, c]))) if both else 0.0
             if abs(change) <= MOVED_AMPLITUDE and abs(turn) <= MOVED_ANGLE:
                 continue
@@ -340,7 +345,7 @@ def _unclear(influence: Influence, s: int, c: int, p: int) -> bool:
     block = influence.covariance[s, c, own, own]
     regular = block + 1e-12 * np.trace(block) * np.eye(2)
     w = np.array([influence.W[s, c, p].real, influence.W[s, c, p].imag])
-    return bool(np.trace(block) > 0 and w @ np.linalg.solve(regular, w) < _REGION)
+    return bool(np.trace(block) > 0 and w @ np.linalg.solve(regular, w) < region_radius(None) ** 2)
 
 
 def _percent(change: float) -> str:

@@ -66,6 +66,13 @@ def reading_columns(speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column,
     )
 
 
+def covariance_column(labels: Labels, name: str, covariance: FloatArray | None, count: int) -> Column:
+    """Covariance (2, 2) of each of so many readings; None: not known."""
+    if covariance is None:
+        return Column(name, [None] * count)
+    return Column(name, labels.vibration_covariance(covariance).reshape(-1, 2, 2))
+
+
 def vector_columns(
     labels: Labels, name: str, readings: ComplexArray, nothing: float | None = None
 ) -> tuple[Column, Column]:

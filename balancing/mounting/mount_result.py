@@ -8,6 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.correction.correction_result import Correction, small
+from balancing.data.result_columns import (
+    covariance_column,
+    reading_columns,
+    rms,
+    vector_columns,
+    weight_columns,
+)
 from balancing.mounting.discrete_weights import Discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -82,37 +89,21 @@ class Mounted:
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, in the job's units and conventions."""
         c, labels = self.correction, self.correction.labels
-        size, angle = labels.weight(self.weights)
-        after, phase = labels.vibration(self.after)
-        covariance = np.full(after.shape, None)
-        if self.after_covariance is not None:
-            covariance = labels.vibration_covariance(self.after_covariance)
+        actions = Column("action", [_action(c, plane) for plane in c.planes])
+        residuals = (
+            *reading_columns(c.speeds, c.sensors),
+            *vector_columns(labels, "after", self.after),
+            covariance_column(labels, "after_covariance", self.after_covariance, self.after.size),
+        )
+        after = labels.vibration(self.after)[0]
         return plain(
             {
-                "planes": rows(
-                    (
-                        Column("plane", c.planes),
-                        Column("mass", size),
-                        Column("unit", [labels.weight_unit] * len(size)),
-                        Column("angle_deg", angle),
-                        Column("action", [_action(c, plane) for plane in c.planes]),
-                    )
-                ),
+                "planes": rows((*weight_columns(labels, c.planes, self.weights), actions)),
                 "on_top_of": self.on_top_of,
                 "warnings": self.warnings,
                 "holes": rows(_columns(self)),
-                "residuals": [
-                    {
-                        "speed_rpm": rpm(speed),
-                        "sensor": sensor,
-                        "after": after[s, k],
-                        "after_phase_deg": phase[s, k],
-                        "after_covariance": covariance[s, k],
-                    }
-                    for s, speed in enumerate(c.speeds)
-                    for k, sensor in enumerate(c.sensors)
-                ],
-                "rms_after": np.sqrt(np.mean(after**2)),
+                "residuals": rows(residuals),
+                "rms_after": rms(after),
                 "max_after": after.max(),
                 "proven": self.found.proven,
                 "gap": self.found.gap,
@@ -144,8 +135,7 @@ class Mounted:
         left = []
         for z in (self.after, c.after):
             size = labels.vibration(z)[0]
-            rms, largest = float(np.sqrt(np.mean(size**2))), float(size.max())
-            left.append(f"rms {small(rms, scale)}, largest {small(largest, scale)}")
+            left.append(f"rms {small(rms(size), scale)}, largest {small(size.max(), scale)}")
         lines.append(f"{labels.vibration_unit} left: {left[0]}; with any weights {left[1]}".strip())
         lines += [
             f"Plane {plane}: nothing; no pieces that it can take make it better."

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 # Okabe and Ito: told apart with every kind of colour vision
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-BEFORE = "#7F7F7F"
 SPEEDS_SHOWN = 6
 
 
@@ -152,16 +151,6 @@ def _legend_words(c: Correction, regions: ComplexArray | None) -> str:
     return "\n".join(words)
 
 
-def _amplitude_limits(ax: Axes, c: Correction, x: FloatArray) -> None:
-    """A short line over each bar whose amplitude is limited."""
-    if c.limits is None:
-        return
-    limit = c.limits.residual.ravel() * c.labels.vibration_scale
-    there = np.isfinite(limit)
-    if there.any():
-        ax.hlines(limit[there], x[there] - 0.45, x[there] + 0.45, color=VERMILION, lw=1.8, label="limit")
-
-
 def vibration(c: Correction, speed: int = 0, ax: Axes | None = None, *, legend: bool = True) -> Axes:
     """Polar picture of the vibration vectors at one speed (index), before and after, one per sensor."""
     polar = polar_axes(ax, c.labels.phases_on_paper, "vectors")
@@ -192,26 +181,15 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     old, new = (np.abs(z).ravel() * c.labels.vibration_scale for z in (c.before, c.after))
     S, C = c.before.shape
     x = np.arange(S * C) + np.repeat(np.arange(S), C) * 0.8
-    ax.bar(x, old, 0.85, color="#D9D9D9", edgecolor=BEFORE, lw=0.6, label="before")
-    note = "predicted after"
-    error: Any = None
-    if c.after_covariance is not None:
-        reach = c.within(c.after_covariance)
-        error = [np.minimum(reach, new), reach]
-        note += ", 95 % of a check run"
-    _amplitude_limits(ax, c, x)
-    ax.errorbar(x, new, yerr=error, fmt="o", ms=4, color=COLORS[0], capsize=2, lw=1.2, label=note)
-    positive = old[old > 0]
-    wide = (
-        positive.size > 0
-        and old.max() > 0
-        and (new.min() < old.max() / 20 or positive.min() < old.max() / 20)
+    known = c.after_covariance is not None
+    before_and_after(
+        ax,
+        x,
+        (old, new),
+        reach=c.within(c.after_covariance) if known else None,
+        limit=None if c.limits is None else c.limits.residual.ravel() * c.labels.vibration_scale,
+        after="predicted after, 95 % of a check run" if known else "predicted after",
     )
-    if wide:
-        # a quiet reading and what is left of a loud one are both worth seeing
-        linear = 10.0 ** np.floor(np.log10(max(float(new.min()), old.max() / 300)))
-        ax.set_yscale("symlog", linthresh=linear)
-        ax.yaxis.set_major_formatter("{x:g}")
     ax.set_ylim(bottom=0)
     ax.margins(x=0.01)
     _name_bars(ax, c, x)
@@ -220,6 +198,58 @@ def amplitudes(c: Correction, ax: Axes | None = None) -> Axes:
     ax.legend(fontsize="small", loc="upper left", bbox_to_anchor=(0, -0.22), ncols=2, frameon=False)
     ax.spines[["top", "right"]].set_visible(False)
     return ax
+
+
+def before_and_after(
+    ax: Axes,
+    at: FloatArray,
+    sizes: tuple[FloatArray, FloatArray],
+    *,
+    reach: FloatArray | None,
+    limit: FloatArray | None,
+    after: str,
+    lying: bool = False,
+    colors: tuple[str, str] = (COLORS[0], VERMILION),
+) -> None:
+    """Draw amplitudes before (bars) and after (dots with 95 %), and their limits (thick lines).
+
+    Parameters
+    ----------
+    ax
+        Along whose x (`lying`: y) the readings stand.
+    at
+        Place of each reading, (N,).
+    sizes
+        Before and after, (N,) each. Where some are far smaller than others, the scale is linear up to the
+        small ones and logarithmic from there.
+    reach
+        Half widths of 95 % intervals, (N,); None: not known.
+    limit
+        Largest amplitude of each reading, (N,), not finite for none; None: none has one.
+    after
+        What the dots are, in words.
+    lying
+        Whether the bars lie.
+    colors
+        Of the dots and of the limits.
+    """
+    old, new = sizes
+    axis = ax.xaxis if lying else ax.yaxis
+    (ax.barh if lying else ax.bar)(at, old, 0.8, color="0.86", edgecolor="0.5", lw=0.6, label="before")
+    there = np.zeros(0, dtype=int) if limit is None else np.flatnonzero(np.isfinite(limit))
+    if limit is not None and there.size:
+        lines = ax.vlines if lying else ax.hlines
+        lines(limit[there], at[there] - 0.45, at[there] + 0.45, color=colors[1], lw=2.2, label="limit")
+    error = None if reach is None else [np.minimum(reach, new), reach]
+    places: dict[str, Any] = (
+        {"x": new, "y": at, "xerr": error} if lying else {"x": at, "y": new, "yerr": error}
+    )
+    ax.errorbar(**places, fmt="o", ms=4, color=colors[0], capsize=2, lw=1.2, label=after)
+    top = float(max(old.max(), new.max()))
+    if top > 0 and min(new.min(), old[old > 0].min(initial=top)) < top / 20:
+        linear = 10.0 ** np.floor(np.log10(max(float(new.min()), top / 300)))
+        (ax.set_xscale if lying else ax.set_yscale)("symlog", linthresh=linear)
+        axis.set_major_formatter("{x:g}")
 
 
 def _name_bars(ax: Axes, c: Correction, x: FloatArray) -> None:

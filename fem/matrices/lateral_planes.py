@@ -47,7 +47,7 @@ class Planes:
     A: Matrices
     planes: int
     rows: IndexArray
-    pedestals: IndexArray
+    feet: IndexArray
     pedestal_mass: FloatArray
     pedestal_stiffness: FloatArray
     pedestal_damping: FloatArray
@@ -161,7 +161,7 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
         A=A,
         planes=p,
         rows=np.array([A.stride * (s.node - 1) for s in supports], dtype=np.intp),
-        pedestals=np.array([i for i, _ in stands], dtype=np.intp),
+        feet=np.array([i for i, _ in stands], dtype=np.intp),
         pedestal_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
         pedestal_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
         pedestal_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
@@ -173,8 +173,6 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
 
 def project(P: Planes, basis: FloatArray) -> Quadratic:
     """The equations in a basis of the shaft, shape (size, d), the same in both planes."""
-    from scipy.linalg import block_diag
-
     d, p, f = basis.shape[1], P.planes, len(P.pedestals)
     strain = strains(P.rotor, basis)
     flat = strain.reshape(-1, d)
@@ -189,7 +187,11 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
 
     def planes(sides: AnyArray, shaft: FloatArray, pedestals: FloatArray) -> AnyArray:
         """A matrix of the shaft, made symmetric, in the planes, and its values at the pedestals."""
-        return np.asarray(block_diag(np.kron(sides, (shaft + shaft.T) / 2), np.diag(pedestals.T.ravel())))
+        whole = np.zeros((p * (d + f), p * (d + f)), dtype=sides.dtype)
+        both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]  # plane, unknown, plane, unknown
+        whole[: p * d, : p * d] = both.reshape(p * d, p * d)
+        np.fill_diagonal(whole[p * d :, p * d :], feet.T.ravel())
+        return whole
 
     along, none = np.eye(p), np.zeros((f, p))
     # What a support feels: motion of its node against the ground or the foot, in each plane.

@@ -61,7 +61,7 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class _Root:
-    """A speed, rad/s, the eigenvalue and its vector in the basis, shape (R,)."""
+    """A mode at a speed, rad/s: its eigenvalue and vector in the basis, shape (R,)."""
 
     speed: float
     value: complex
@@ -85,6 +85,11 @@ class _Bracket:
 def off_synchronous(lam: ComplexArray, speed: FloatArray) -> FloatArray:
     """Whirl frequency less the speed."""
     return np.asarray(np.abs(lam.imag) - speed)
+
+
+def growth_rate(lam: ComplexArray, _: FloatArray | None = None) -> FloatArray:
+    """Re λ / |λ|, at any speed: 0 where a mode neither grows nor decays."""
+    return np.asarray(lam.real / np.abs(lam))
 
 
 def crossings(whirl: Whirl, values: ComplexArray, vectors: ComplexArray, function: Function) -> Crossings:
@@ -136,7 +141,8 @@ def _on_the_mode(Q: Quadratic, bracket: _Bracket, function: Function) -> _Root:
     part = fa / (fa - fb) if fa != fb else 0.0
     value = bracket.values[0] + part * (bracket.values[1] - bracket.values[0])
     start = _Root(a, value, bracket.vectors[int(part >= 0.5)])
-    return _root(Q, start, bracket.ends, bracket.f, _ROUGH * (b - a), function)
+    root, _ = _root(Q, start, bracket.ends, bracket.f, _ROUGH * (b - a), function)
+    return root
 
 
 def _last_digits(Q: Quadratic, bracket: _Bracket, rough: _Root, function: Function) -> _Root:
@@ -145,8 +151,7 @@ def _last_digits(Q: Quadratic, bracket: _Bracket, rough: _Root, function: Functi
     left = (here > 0) == (bracket.f[1] > 0)
     ends = (bracket.ends[0], rough.speed) if left else (rough.speed, bracket.ends[1])
     f = (bracket.f[0], here) if left else (here, bracket.f[1])
-    root = _root(Q, there, ends, f, 1e-14 * bracket.ends[1], function)
-    _, excess = _value(Q, root, root.speed, function)
+    root, excess = _root(Q, there, ends, f, 1e-14 * bracket.ends[1], function)
     mac = np.abs(np.vdot(rough.vector, root.vector)) / np.linalg.norm(rough.vector)
     good = mac**2 > _SAME and abs(excess) <= _VANISHES * max(map(abs, bracket.f))
     return root if good else rough
@@ -159,17 +164,21 @@ def _root(
     f: tuple[float, float],
     tolerance: float,
     function: Function,
-) -> _Root:
-    """A bracketed root of a function whose values at both ends are known, on a mode like that of `start`."""
+) -> tuple[_Root, float]:
+    """A bracketed root of a function whose values at both ends are known, on a mode like that of `start`.
+
+    With the value of the function there.
+    """
     last = start
+    tried: dict[float, tuple[_Root, float]] = {}
 
     def excess(speed: float) -> float:
         nonlocal last
-        last, value = _value(Q, last, speed, function)
+        last, value = tried[speed] = _value(Q, last, speed, function)
         return value
 
     speed = bracketed_root(excess, ends, f, tolerance)
-    return _value(Q, last, speed, function)[0]
+    return tried[speed] if speed in tried else _value(Q, last, speed, function)
 
 
 def _value(Q: Quadratic, start: _Root, speed: float, function: Function) -> tuple[_Root, float]:

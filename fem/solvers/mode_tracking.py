@@ -57,16 +57,21 @@ class _Steps:
         self.apart = whirl.Q.P.planes == 1
         self.trials = _TRIALS
 
-    def between(self, one: _At, other: _At, depth: int = 0) -> tuple[dict[int, int], set[int]]:
-        """Numbers of partners, and the modes in doubt."""
-        alike = likeness(one.values, one.vectors, other.values, other.vectors, self.weight, self.apart)
+    def alike(self, one: _At, other: _At) -> FloatArray:
+        """`likeness` of the modes of two speeds."""
+        return likeness(one.values, one.vectors, other.values, other.vectors, self.weight, self.apart)
+
+    def between(
+        self, one: _At, other: _At, alike: FloatArray, depth: int = 0
+    ) -> tuple[dict[int, int], set[int]]:
+        """Numbers of partners, and the modes in doubt; `alike` is the likeness of the two."""
         pairs, doubt = _pairs(alike)
         if not doubt or depth > _HALVINGS or self.trials <= 0:
             return pairs, doubt
         self.trials -= 1
         middle = self._solved((one.speed + other.speed) / 2, len(one.values))
-        first, unsure = self.between(one, middle, depth + 1)
-        second, later = self.between(middle, other, depth + 1)
+        first, unsure = self.between(one, middle, self.alike(one, middle), depth + 1)
+        second, later = self.between(middle, other, self.alike(middle, other), depth + 1)
         through = {i: second[j] for i, j in first.items() if j in second}
         return through, unsure | {i for i, j in first.items() if j in later}
 
@@ -87,9 +92,10 @@ def follow(whirl: Whirl, known: dict[float, Solutions] | None = None) -> Followe
     count = m
     doubtful = []
     at = [_At(float(speed), values[k], X[k]) for k, speed in enumerate(whirl.speeds)]
+    alike = likeness(values[:-1], X[:-1], values[1:], X[1:], steps.weight, steps.apart)
     for k in range(S - 1):
         steps.trials = _TRIALS
-        pairs, doubt = steps.between(at[k], at[k + 1])
+        pairs, doubt = steps.between(at[k], at[k + 1], alike[k])
         doubtful += [(k, int(labels[k, i])) for i in sorted(doubt)]
         for i, j in pairs.items():
             labels[k + 1, j] = labels[k, i]

@@ -244,13 +244,15 @@ def _true_vectors(
     out = []
     for i, (value, speed) in enumerate(zip(values, speeds, strict=True)):
         factored = band.factor(complex(value), float(speed))
-        # One step is enough: the value is known to more digits than the vector needs.
-        right = factored.solve(band.inertia(Q.expand(X[i])))
-        columns = [band.planes(right).T]
+        left = Q.mirror(X[i])
         if not mirrored:
             reduced = value * value * Q.M + value * D[i] + stiffness[i]
-            start = np.linalg.svd(reduced.T)[2][-1].conj()
-            left = factored.solve(band.inertia(Q.expand(start)), transposed=True)
-            columns.append(band.planes(left).T)
+            left = np.linalg.svd(reduced.T)[2][-1].conj()
+        # One step is enough: the value is known to more digits than the vector needs. Loads that do work on
+        # the left vector y, yᵀ M y*, excite the mode however damped it is; M x may not.
+        columns = [band.planes(factored.solve(band.inertia(Q.expand(left.conj())))).T]
+        if not mirrored:
+            loads = band.inertia(Q.expand(X[i].conj()))
+            columns.append(band.planes(factored.solve(loads, transposed=True)).T)
         out.append(np.hstack(columns))
     return out

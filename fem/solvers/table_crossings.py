@@ -17,6 +17,7 @@ import numpy as np
 from fem.matrices.banded_matrices import Matrices, assemble
 from fem.matrices.undamped_matrices import Pencil, static_stiffness, whole_rotor
 from fem.model.rotor import Rotor
+from fem.solvers.bracketed_roots import bracketed_root
 from fem.solvers.eigen import finite_modes, lowest_modes
 from rotorid.base.arrays import AnyArray, FloatArray
 
@@ -114,7 +115,6 @@ class TableSearch:
 
     def _roots(self, k: int, a: float, b: float, *, last: bool) -> list[float] | None:
         """Crossings of one mode; None if its curve may turn twice."""
-        from scipy.optimize import brentq
 
         def excess(speed: float) -> float:
             squares = self.at(speed, k + 1).squares
@@ -124,21 +124,24 @@ class TableSearch:
             step = _STEP * (b - a) if speed < (a + b) / 2 else -_STEP * (b - a)
             return (excess(speed + step) - excess(speed)) / step
 
-        def root(low: float, high: float) -> float:
-            return float(brentq(excess, low, high, xtol=1e-11 * high, rtol=1e-11))
-
         (ga, gb), (da, db) = (excess(a), excess(b)), (slope(a), slope(b))
         if ga == 0:
             return [a]
         if (ga > 0) != (gb > 0):
             plain = da * (gb - ga) > 0 and db * (gb - ga) > 0
-            return [root(a, b)] if plain or last or gb == 0 else None
+            if not (plain or last or gb == 0):
+                return None
+            return [bracketed_root(excess, (a, b), (ga, gb), 1e-11 * b)]
         if not (da * ga < 0 < db * ga):
             return []
-        turn = float(brentq(slope, a, b, xtol=1e-10 * b, rtol=1e-12))
-        if (excess(turn) > 0) == (ga > 0):
+        turn = bracketed_root(slope, (a, b), (da, db), 1e-10 * b)
+        gt = excess(turn)
+        if (gt > 0) == (ga > 0):
             return []
-        return [root(a, turn), root(turn, b)]
+        return [
+            bracketed_root(excess, ends, values, 1e-11 * ends[1])
+            for ends, values in (((a, turn), (ga, gt)), ((turn, b), (gt, gb)))
+        ]
 
     def _bounds(self, a: float, b: float) -> tuple[FloatArray, FloatArray]:
         """Squares of frequencies on the least and the largest stiffness between two speeds."""

@@ -1,4 +1,4 @@
-"""Checks of single numbers, shared by the parts of a rotor."""
+"""Checks of numbers and speeds, shared by the parts of a rotor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import operator
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from rotorid.base.arrays import FloatArray, read_only
 
 
 def whole(value: object, what: str) -> int:
@@ -29,6 +32,31 @@ def number(value: object, what: str, *, signed: bool = False) -> float:
         limit = "finite" if signed else "finite and not negative"
         raise ValueError(f"{what} must be {limit}, not {result}")
     return result + 0.0  # no negative zero
+
+
+def checked_speeds(speeds: ArrayLike, *, ascending: bool = False) -> FloatArray:
+    """One or many speeds in rad/s as a read-only array, shape (S,).
+
+    Raises
+    ------
+    ValueError
+        If they are no numbers, not finite or negative, or do not ascend although they must.
+    """
+    try:
+        array = np.atleast_1d(np.array(speeds, dtype=float))
+    except (TypeError, ValueError):
+        raise ValueError("speeds must be numbers in rad/s") from None
+    if array.ndim != 1 or not array.size:
+        raise ValueError("speeds must be one number or a list of at least one")
+    if not (np.isfinite(array) & (array >= 0)).all():
+        raise ValueError("speeds must be finite and not negative, in rad/s")
+    if ascending and (np.diff(array) <= 0).any():
+        k = int(np.argmax(np.diff(array) <= 0))
+        raise ValueError(
+            f"speeds must ascend, but {array[k + 1]:.6g} rad/s follows {array[k]:.6g} rad/s; sort them"
+        )
+    read_only(array)
+    return array
 
 
 class Attached(Protocol):

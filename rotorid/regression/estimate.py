@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.json import finite
+from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
 
@@ -190,15 +190,17 @@ class Estimate(Uncertain):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        return {
-            "parameters": parameter_dict(self.names, self),
-            "rank": self.rank,
-            "condition_number": finite(self.condition_number),
-            "identifiable": self.full_rank,
-            "unidentifiable": [] if self.full_rank else [self.describe_rank()],
-            "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
-            "residual_rms": float(np.sqrt(np.mean(self.residuals**2))),
-        }
+        return plain(
+            {
+                "parameters": parameter_dict(self.names, self),
+                "rank": self.rank,
+                "condition_number": self.condition_number,
+                "identifiable": self.full_rank,
+                "unidentifiable": [] if self.full_rank else [self.describe_rank()],
+                "combinations": {c.words: {"value": c.value, "std": c.std} for c in self.combinations},
+                "residual_rms": np.sqrt(np.mean(self.residuals**2)),
+            }
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""

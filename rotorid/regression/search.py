@@ -90,7 +90,7 @@ def drive(
                 f_scale=search.f_scale,
                 ftol=search.tolerance,
                 xtol=search.tolerance,
-                gtol=search.tolerance,
+                gtol=TOLERANCE,  # absolute: it depends on the units of the parameters
                 max_nfev=limit,
             )
         x, ok = np.asarray(found.x), found.status > 0

@@ -96,6 +96,8 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
     """
     from matplotlib.figure import Figure
 
+    from balancing.plots.correction_polar import before_and_after
+
     if len(rows) > ROWS_SHOWN:
         largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
         rows = [rows[i] for i in sorted(largest[:ROWS_SHOWN])]
@@ -105,23 +107,19 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
     step = [0.0] + [0.5 * (b != a) for a, b in pairwise(speeds)]
     y = np.arange(len(rows)) + np.cumsum(step)
     old, new = (np.array([row[key] for row in rows]) for key in ("before", "after"))
-    ax.barh(y, old, 0.75, color="0.87", edgecolor="0.45", lw=0.6, label="before")
-    error = None
-    label = "predicted"
-    if all(row["within_95"] is not None for row in rows):
-        reach = np.array([row["within_95"] for row in rows])
-        error = [np.minimum(reach, new), reach]
-        label += " with 95 % of a check run"
-    ax.errorbar(new, y, xerr=error, fmt="o", color="black", ms=4, lw=1.1, capsize=2, label=label)
-    limited = [(at, row["limit"]) for at, row in zip(y, rows, strict=True) if row["limit"] is not None]
-    if limited:
-        at, limits = np.array(limited).T
-        ax.vlines(limits, at - 0.45, at + 0.45, color="black", lw=2.6, label="limit")
-    top = float(max(old.max(), new.max()))
-    if top > 0 and min(new.min(), old[old > 0].min(initial=top)) < top / 20:
-        linear = 10.0 ** np.floor(np.log10(max(float(new.min()), top / 300)))
-        ax.set_xscale("symlog", linthresh=linear)
-        ax.xaxis.set_major_formatter("{x:g}")
+    reach = np.array([row["within_95"] for row in rows], dtype=float)
+    known = bool(np.isfinite(reach).all())
+    label = "predicted with 95 % of a check run" if known else "predicted"
+    before_and_after(
+        ax,
+        y,
+        (old, new),
+        reach=reach if known else None,
+        limit=np.array([row["limit"] for row in rows], dtype=float),
+        after=label,
+        lying=True,
+        colors=("black", "black"),
+    )
     ax.set_yticks(y, [_short(row["sensor"]) for row in rows], fontsize="small")
     for speed in dict.fromkeys(speeds):
         first = y[speeds.index(speed)]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotorid.base.rpm import RPM
 from rotorid.base.text import listing
-from rotorid.report.number_tables import Cells, Grid, Numbers, Part, below, numbered, words
-from rotorid.report.page import NOTHING
+from rotorid.report.document import NOTHING, Cells, Document
+from rotorid.report.number_tables import Grid, Part, below, numbered, words
 from rotorid.report.rotor_figures import (
     methods_picture,
     placement_picture,
@@ -33,30 +33,30 @@ STABILITY = (
 """Rows on the stability of a model: words, key of the document, significant digits."""
 
 
-def trade_off_part(document: Mapping[str, Any], show: Numbers) -> Part:
+def trade_off_part(document: Document) -> Part:
     """Other masses at the same nodes: frequencies against shapes."""
     from markupsafe import Markup
 
     key = "trade_off.alternatives"
     names = [
-        Markup("{}: {} kg").format(found["model"], show.listed(f"{key}.{r}.masses_kg.*", decimals=2))
+        Markup("{}: {} kg").format(found["model"], document.listed(f"{key}.{r}.masses_kg.*", decimals=2))
         for r, found in enumerate(document["trade_off"]["alternatives"])
     ]
     note = (
         "Masses that have all frequencies of the rotor (matching sets) can still move unlike it: choose by "
         "the error and the MAC."
     )
-    columns = _by_mode(document, show, key, "masses from", names)
+    columns = _by_mode(document, key, "masses from", names)
     return Part("Other masses at these nodes", tables=(Grid("", columns, note),))
 
 
-def methods_part(document: Mapping[str, Any], show: Numbers, methods: Methods | None) -> Part:
+def methods_part(document: Document, methods: Methods | None) -> Part:
     """All methods of reduction at the same nodes."""
     found = document["methods"]["methods"]
     said = [f"{each['method']}: {each['reason']}" for each in found if each["reason"]]
     full = [each["method"] for each in found if each["mass_matrix_kg"] is not None and not each["diagonal"]]
     said.append(f"{listing(full, 'and')} have full mass matrices, which couple the nodes.")
-    columns = _by_mode(document, show, "methods.methods", "method", [each["method"] for each in found])
+    columns = _by_mode(document, "methods.methods", "method", [each["method"] for each in found])
     return Part(
         "Other methods at these nodes",
         tuple(said),
@@ -65,35 +65,33 @@ def methods_part(document: Mapping[str, Any], show: Numbers, methods: Methods | 
     )
 
 
-def _by_mode(
-    document: Mapping[str, Any], show: Numbers, key: str, head: str, names: Sequence[str]
-) -> tuple[Cells, ...]:
+def _by_mode(document: Document, key: str, head: str, names: Sequence[str]) -> tuple[Cells, ...]:
     """One row per model and mode; the name of the model stands in the first of each."""
     modes = range(len(document["nodes"]))
     columns = []
     for r, name in enumerate(names):
         stem = f"{key}.{r}"
-        frequencies = show.column("rad/s", f"{stem}.natural_frequencies_rad_s.*", rows=modes, decimals=3)
-        errors = show.column(
+        frequencies = document.column("rad/s", f"{stem}.natural_frequencies_rad_s.*", rows=modes, decimals=3)
+        errors = document.column(
             "error, %", f"{stem}.relative_error.*", rows=modes, decimals=3, scale=100.0, sign=True
         )
-        mac = show.column("MAC", f"{stem}.mac.*", rows=modes, decimals=4)
-        first = Cells(head, (name, *("" for _ in modes[1:])), words=True)
+        mac = document.column("MAC", f"{stem}.mac.*", rows=modes, decimals=4)
+        first = words(head, (name, *("" for _ in modes[1:])))
         columns.append((first, numbered("mode", len(modes)), frequencies, errors, mac))
     return below(*columns)
 
 
-def placement_part(document: Mapping[str, Any], show: Numbers, placement: Placement | None) -> Part:
+def placement_part(document: Document, placement: Placement | None) -> Part:
     """The ranking of places, and the choices with a name."""
     from markupsafe import Markup
 
     found = document["placement"]
     said = Markup("{} choices of nodes, {} of them with positive masses.").format(
-        show("placement.considered", decimals=0), show("placement.ranked", decimals=0)
+        document.show("placement.considered", decimals=0), document.show("placement.ranked", decimals=0)
     )
     trap = Markup(
         "{} choices match all checked frequencies but not the shapes: choose by both columns."
-    ).format(show("placement.frequency_match_with_wrong_shapes", decimals=0))
+    ).format(document.show("placement.frequency_match_with_wrong_shapes", decimals=0))
     named = {
         f"placement.{key}": name
         for name, key in (
@@ -106,7 +104,7 @@ def placement_part(document: Mapping[str, Any], show: Numbers, placement: Placem
     }
     ranked = {f"placement.choices.{r}": each["rank"] for r, each in enumerate(found["choices"][:TOP])}
     tables = [
-        Grid(caption, _choices(show, head, choices))
+        Grid(caption, _choices(document, head, choices))
         for caption, head, choices in (
             ("Choices with a name", "choice", named),
             ("First in rank", "rank", ranked),
@@ -117,24 +115,26 @@ def placement_part(document: Mapping[str, Any], show: Numbers, placement: Placem
     return Part("Other places of the masses", (said, trap), tuple(tables), drawings)
 
 
-def _choices(show: Numbers, head: str, choices: Mapping[str, object]) -> tuple[Cells, ...]:
+def _choices(document: Document, head: str, choices: Mapping[str, object]) -> tuple[Cells, ...]:
     """One row per choice of nodes, each given by its path and called by a name or number."""
     return (
         words(head, choices.values()),
-        words("nodes", (", ".join(map(str, show.found(f"{key}.nodes"))) for key in choices)),
+        words("nodes", (", ".join(map(str, document.found(f"{key}.nodes"))) for key in choices)),
         Cells(
-            "masses, kg", tuple(show.listed(f"{key}.masses_kg.*", decimals=2) for key in choices), words=True
+            "masses, kg",
+            tuple(document.listed(f"{key}.masses_kg.*", decimals=2) for key in choices),
+            words=True,
         ),
         Cells(
             "largest error, %",
-            tuple(show(f"{key}.largest_error", decimals=3, scale=100.0) for key in choices),
+            tuple(document.show(f"{key}.largest_error", decimals=3, scale=100.0) for key in choices),
         ),
-        Cells("smallest MAC", tuple(show(f"{key}.smallest_mac", decimals=4) for key in choices)),
-        Cells("condition", tuple(show(f"{key}.condition_number", 3) for key in choices)),
+        Cells("smallest MAC", tuple(document.show(f"{key}.smallest_mac", decimals=4) for key in choices)),
+        Cells("condition", tuple(document.show(f"{key}.condition_number", 3) for key in choices)),
     )
 
 
-def response_part(document: Mapping[str, Any], show: Numbers, response: ResponseCost | None) -> Part:
+def response_part(document: Document, response: ResponseCost | None) -> Part:
     """Unbalance response of both models."""
     from markupsafe import Markup
 
@@ -142,8 +142,8 @@ def response_part(document: Mapping[str, Any], show: Numbers, response: Response
     said = [
         Markup("Compared at {} speeds from {} to {} rpm, at the masses.").format(
             len(found["speeds_rad_s"]),
-            show("response.speeds_rad_s.0", decimals=1, scale=RPM),
-            show(f"response.speeds_rad_s.{len(found['speeds_rad_s']) - 1}", decimals=1, scale=RPM),
+            document.show("response.speeds_rad_s.0", decimals=1, scale=RPM),
+            document.show(f"response.speeds_rad_s.{len(found['speeds_rad_s']) - 1}", decimals=1, scale=RPM),
         )
     ]
     if found["largest"] is not None:
@@ -153,10 +153,10 @@ def response_part(document: Mapping[str, Any], show: Numbers, response: Response
                 "(median {} %), within {} % of the largest of all speeds. Worst at {} rpm: reading at {}, "
                 "unbalance at {}."
             ).format(
-                show("response.largest", 3, scale=100.0),
-                show("response.median", 3, scale=100.0),
-                show("response.largest_to_highest", 3, scale=100.0),
-                show("response.where.speed_rad_s", decimals=1, scale=RPM),
+                document.show("response.largest", 3, scale=100.0),
+                document.show("response.median", 3, scale=100.0),
+                document.show("response.largest_to_highest", 3, scale=100.0),
+                document.show("response.where.speed_rad_s", decimals=1, scale=RPM),
                 found["where"]["sensor"],
                 found["where"]["plane"],
             )
@@ -168,38 +168,38 @@ def response_part(document: Mapping[str, Any], show: Numbers, response: Response
     return Part("Unbalance response beside the full rotor's", tuple(said), drawings=drawings)
 
 
-def stability_part(document: Mapping[str, Any], show: Numbers, stability: StabilityCost | None) -> Part:
+def stability_part(document: Document, stability: StabilityCost | None) -> Part:
     """Stability of both models over speed; where nothing damps, there is nothing to draw."""
     from markupsafe import Markup
 
     found = document["stability"]
     heading = "Stability"
     span = Markup("From {} to {} rpm").format(
-        show("stability.full.lowest_rad_s", decimals=1, scale=RPM),
-        show("stability.full.highest_rad_s", decimals=1, scale=RPM),
+        document.show("stability.full.lowest_rad_s", decimals=1, scale=RPM),
+        document.show("stability.full.highest_rad_s", decimals=1, scale=RPM),
     )
     decrements = [v for which in ("full", "small") for v in found[f"{which}_log_decrement"] if v is not None]
     if decrements and max(map(abs, decrements)) < UNDAMPED:
         return Part(heading, (span + " no damping acts on either model: no motion grows, and none decays.",))
     columns = (
         words("", ("status", *(name for name, _, _ in STABILITY), "direction")),
-        _one_model(show, "full rotor", "full"),
-        _one_model(show, "small model", "small"),
+        _one_model(document, "full rotor", "full"),
+        _one_model(document, "small model", "small"),
     )
     said = []
     if found["relative_difference_of_threshold"] is not None:
         said.append(
             Markup("The small model loses stability {} % away from the speed of the full rotor.").format(
-                show("stability.relative_difference_of_threshold", 3, scale=100.0, sign=True)
+                document.show("stability.relative_difference_of_threshold", 3, scale=100.0, sign=True)
             )
         )
     drawings = () if stability is None else (stability_picture(stability),)
     return Part(heading, tuple(said), (Grid(span, columns),), drawings)
 
 
-def _one_model(show: Numbers, head: str, which: str) -> Cells:
+def _one_model(document: Document, head: str, which: str) -> Cells:
     """What is known of the stability of one model."""
-    found = show.found(f"stability.{which}")
+    found = document.found(f"stability.{which}")
     status = {"threshold": "unstable above"}.get(found["status"], found["status"])
-    numbers = (show(f"stability.{which}.{key}", digits) for _, key, digits in STABILITY)
+    numbers = (document.show(f"stability.{which}.{key}", digits) for _, key, digits in STABILITY)
     return Cells(head, (status, *numbers, found["direction"] or NOTHING))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rotorid.tables.reader import units
 
@@ -202,17 +203,15 @@ def rotor_figure(
     count = labels.angles_on_paper
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     _turning(ax, 0.27, np.radians(100), drawn * np.radians(250))
-    ax.text(0, 0, "rotation", ha="center", va="center", fontsize=7)
+    _say(ax, 0.0, "rotation", fontsize=7)
     for degrees in (0, 90, 180, 270):
         way = np.exp(1j * (mark + count * np.radians(degrees)))
-        ax.plot([0.94 * way.real, way.real], [0.94 * way.imag, way.imag], color="black", lw=1)
+        _line(ax, [0.94 * way, way], color="black", lw=1)
         if degrees:
-            ax.text(1.17 * way.real, 1.14 * way.imag, f"{degrees}°", ha="center", va="center", fontsize=8)
+            _say(ax, complex(1.17 * way.real, 1.14 * way.imag), f"{degrees}°")
     tip = np.exp(1j * mark)
-    ax.plot(
-        0.93 * tip.real, 0.93 * tip.imag, marker=(3, 0, 90 + np.degrees(mark)), color="black", ms=11, zorder=5
-    )
-    ax.text(0.66 * tip.real, 0.66 * tip.imag, "mark\n0°", ha="center", va="center", fontsize=8)
+    _line(ax, 0.93 * tip, marker=(3, 0, 90 + np.degrees(mark)), color="black", ms=11, zorder=5)
+    _say(ax, 0.66 * tip, "mark\n0°")
     _weight_at(ax, mark, count)
     _sensors(ax, labels, places, key_phasor)
     return figure
@@ -223,39 +222,28 @@ def _weight_at(ax: Axes, mark: float, count: int) -> None:
     from matplotlib.patches import Circle
 
     way = np.exp(1j * (mark + count * np.radians(_SAMPLE)))
-    ax.plot([0, 0.78 * way.real], [0, 0.78 * way.imag], color="black", lw=0.8, ls=":")
+    _line(ax, [0, 0.78 * way], color="black", lw=0.8, ls=":")
     ax.add_patch(Circle((0.84 * way.real, 0.84 * way.imag), 0.075, fc="black", zorder=5))
     _turning(ax, 0.48, mark + count * 0.42, count * (np.radians(_SAMPLE) - 0.42))
-    text = np.exp(1j * (mark + count * np.radians(_SAMPLE + 34))) * 0.7
-    ax.text(text.real, text.imag, f"weight\nat {_SAMPLE:g}°", ha="center", va="center", fontsize=8)
+    beside = np.exp(1j * (mark + count * np.radians(_SAMPLE + 34))) * 0.7
+    _say(ax, beside, f"weight\nat {_SAMPLE:g}°")
 
 
 def _sensors(ax: Axes, labels: Labels, places: Mapping[str, float] | None, key_phasor: float | None) -> None:
     drawn = labels.drawn_sign
     key = np.exp(1j * drawn * np.radians(key_phasor or 0.0))
-    ax.plot(
-        _KEY * key.real,
-        _KEY * key.imag,
-        marker=(3, 0, 90 + np.degrees(np.angle(key))),
-        color="black",
-        mfc="white",
-        ms=11,
-    )
+    _line(ax, _KEY * key, marker=(3, 0, 90 + np.degrees(np.angle(key))), color="black", mfc="white", ms=11)
     beside = abs(key.real) > 0.5
-    ax.text(
-        (1.18 if beside else 1.0) * key.real,
-        1.15 * key.imag - 0.2 - 0.1 * max(0.0, -float(key.imag)),
-        "key phasor",
-        ha="center" if not beside else "left" if key.real > 0 else "right",
-        va="top",
-        fontsize=8,
+    at = complex(
+        (1.18 if beside else 1.0) * key.real, 1.15 * key.imag - 0.2 - 0.1 * max(0.0, -float(key.imag))
     )
+    _say(ax, at, "key phasor", ha=_beside(key.real), va="top")
     by_angle: dict[float, list[str]] = {}
     for name, angle in (places or {}).items():
         by_angle.setdefault(float(np.mod(angle, 360.0)), []).append(name)
     if key_phasor is not None and 0.0 not in by_angle and key_phasor % 360:
         ax.annotate("", (1.9, 0), (1.4, 0), arrowprops={"arrowstyle": "->", "lw": 0.8})
-        ax.text(1.95, 0, "x", ha="left", va="center", fontsize=8)
+        _say(ax, 1.95, "x", ha="left")
     if not by_angle:
         away = -45.0 if abs((np.degrees(np.angle(key)) + 135 + 180) % 360 - 180) < 60 else -135.0
         _probe(ax, away, "sensor, place\nnot stated", dashed=True)
@@ -273,23 +261,26 @@ def _short(name: str) -> str:
 def _probe(ax: Axes, paper: float, text: str, *, dashed: bool) -> None:
     """A sensor that looks at the shaft from an angle on the paper, degrees."""
     way = np.exp(1j * np.radians(paper))
-    inner, outer = _INNER * way, _OUTER * way
-    ax.plot(
-        [inner.real, outer.real],
-        [inner.imag, outer.imag],
-        color="0.55" if dashed else "black",
-        lw=6,
-        solid_capstyle="butt",
-    )
-    at = (_OUTER + 0.07) * way
-    ax.text(
-        at.real,
-        at.imag,
-        text,
-        ha="center" if abs(way.real) < 0.5 else "left" if way.real > 0 else "right",
-        va="center" if abs(way.imag) < 0.5 else "bottom" if way.imag > 0 else "top",
-        fontsize=8,
-    )
+    color = "0.55" if dashed else "black"
+    _line(ax, [_INNER * way, _OUTER * way], color=color, lw=6, solid_capstyle="butt")
+    level = "center" if abs(way.imag) < 0.5 else "bottom" if way.imag > 0 else "top"
+    _say(ax, (_OUTER + 0.07) * way, text, ha=_beside(way.real), va=level)
+
+
+def _beside(across: float) -> str:
+    """On which side of its place a text begins, so that it points away from the rotor."""
+    return "center" if abs(across) <= 0.5 else "left" if across > 0 else "right"
+
+
+def _say(ax: Axes, at: complex, words: str, **style: Any) -> None:  # noqa: ANN401  as of matplotlib
+    """A text around a point of the complex plane."""
+    options: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, **style}
+    ax.text(at.real, at.imag, words, **options)
+
+
+def _line(ax: Axes, points: ArrayLike, **style: Any) -> None:  # noqa: ANN401  as of matplotlib
+    """A line, or a mark, through points of the complex plane."""
+    ax.plot(np.real(points), np.imag(points), **style)
 
 
 def _turning(ax: Axes, radius: float, start: float, turn: float) -> None:
@@ -316,17 +307,17 @@ def phase_figure(labels: Labels) -> Figure:
     peak = _SAMPLE if labels.phase == "lag" else -_SAMPLE
     ax.plot(turn, np.cos(np.radians(turn - peak)), color="black", lw=1.5)
     ax.plot([-100, 575], [0, 0], color="0.5", lw=0.7)
-    ax.text(585, 0, "time", ha="left", va="center", fontsize=8)
+    _say(ax, 585, "time", ha="left")
     for pulse in (0.0, 360.0):
         ax.plot([pulse, pulse], [-1.75, 1.5], color="0.5", lw=0.7, ls=":")
         ax.plot(
             [pulse - 12, pulse - 6, pulse, pulse + 6, pulse + 12], [-1.75, -1.75, -1.35, -1.75, -1.75], "k-"
         )
-        ax.text(pulse, -1.8, "pulse", ha="center", va="top", fontsize=8)
+        _say(ax, complex(pulse, -1.8), "pulse", va="top")
     ax.plot([360 + peak] * 2, [1.0, 1.5], color="0.5", lw=0.7, ls=":")
     ends = (360.0, 360.0 + peak) if labels.phase == "lag" else (360.0 + peak, 360.0)
     ax.annotate("", (ends[1], 1.38), (ends[0], 1.38), arrowprops={"arrowstyle": "-|>", "lw": 1.2})
-    ax.text(sum(ends) / 2, 1.5, f"phase {_SAMPLE:g}° ({labels.phase})", ha="center", va="bottom", fontsize=8)
-    ax.text(-100, 1.12, "reading of\na sensor", ha="left", va="bottom", fontsize=8)
+    _say(ax, complex(sum(ends) / 2, 1.5), f"phase {_SAMPLE:g}° ({labels.phase})", va="bottom")
+    _say(ax, -100 + 1.12j, "reading of\na sensor", ha="left", va="bottom")
     ax.set(xlim=(-110, 660), ylim=(-2.15, 1.95))
     return figure

@@ -1,4 +1,4 @@
-"""Tables of a sheet: numbers of the document with the place they come from, and texts."""
+"""Sections and tables of a sheet."""
 
 from __future__ import annotations
 
@@ -6,39 +6,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rotorid.report.page import NOTHING, Shown, fixed, significant
+from rotorid.report.document import Cells
 
 if TYPE_CHECKING:
-    from markupsafe import Markup
-
     from rotorid.report.rotor_figures import Drawing
 
 NARROW = 6
 """Columns that a telephone shows side by side; rows of wider tables become blocks there."""
 
 
-@dataclass(frozen=True)
-class Cells:
-    """A column of a table.
-
-    Attributes
-    ----------
-    head
-        Over it, with the unit.
-    cells
-        One a row: texts, or numbers of the document as `Numbers` prints them.
-    words
-        Whether it holds words; numbers stand at the right.
-    """
-
-    head: str
-    cells: tuple[str, ...]
-    words: bool = False
-
-
 def words(head: str, cells: Iterable[object]) -> Cells:
-    """A column of words."""
-    return Cells(head, tuple(map(str, cells)), words=True)
+    """A column of words; markup stays markup."""
+    return Cells(head, tuple(cell if isinstance(cell, str) else str(cell) for cell in cells), words=True)
 
 
 def figures(head: str, values: Iterable[object]) -> Cells:
@@ -122,96 +101,6 @@ class Part:
     said: tuple[str, ...] = ()
     tables: tuple[Grid, ...] = ()
     drawings: tuple[Drawing, ...] = ()
-
-
-class Numbers:
-    """Prints numbers of a document, in the document's unit or a multiple, each with its dotted path.
-
-    A number that is not printed in the document's unit carries the factor as `data-scale`.
-
-    Parameters
-    ----------
-    document
-        As JSON types.
-    """
-
-    def __init__(self, document: Mapping[str, Any]) -> None:
-        self._shown = Shown(document)
-        self.found = self._shown.found
-
-    def __call__(
-        self,
-        key: str,
-        digits: int = 6,
-        *,
-        decimals: int | None = None,
-        scale: float = 1.0,
-        sign: bool = False,
-    ) -> Markup:
-        """Print the number at a path.
-
-        Parameters
-        ----------
-        key
-            Such as "critical_speeds_rad_s.0".
-        digits
-            Significant digits; not used with `decimals`.
-        decimals
-            Digits after the point.
-        scale
-            What one unit of the document is in the unit printed.
-        sign
-            Whether a + stands before numbers above zero.
-
-        Raises
-        ------
-        KeyError
-            If the document has nothing there, or something that is neither a number nor null.
-        """
-        from markupsafe import Markup
-
-        value = self._shown.value(key)
-        if value is None:
-            text = NOTHING
-        else:
-            value *= scale
-            text = significant(value, digits) if decimals is None else fixed(value, decimals)
-            text = f"+{text}" if sign and value > 0 and float(text) else text
-        factor = Markup("") if scale == 1.0 else Markup(' data-scale="{}"').format(repr(scale))
-        return Markup('<span data-key="{}"{}>{}</span>').format(key, factor, text.replace("-", "−"))
-
-    def column(
-        self,
-        head: str,
-        path: str,
-        digits: int = 6,
-        *,
-        rows: Iterable[int] | None = None,
-        **options: Any,  # noqa: ANN401  as for one number
-    ) -> Cells:
-        """Print one number a row.
-
-        Parameters
-        ----------
-        head
-            Over the column.
-        path
-            Such as "critical_speeds_rad_s.*": `*` is the number of the row, from 0.
-        rows
-            Which of them; None: all that the document has.
-        digits, options
-            As for one number.
-        """
-        before, _, after = path.partition("*")
-        if rows is None:
-            rows = range(len(self.found(before.rstrip("."))))
-        return Cells(head, tuple(self(f"{before}{row}{after}", digits, **options) for row in rows))
-
-    def listed(self, path: str, *, decimals: int) -> Markup:
-        """Print the numbers of a list, path as for a column, in one cell."""
-        from markupsafe import Markup
-
-        return Markup(", ").join(self.column("", path, decimals=decimals).cells)
 
 
 def every_warning(document: Mapping[str, Any]) -> list[str]:

@@ -14,18 +14,9 @@ from rotorid.report.comparisons import (
     stability_part,
     trade_off_part,
 )
-from rotorid.report.number_tables import (
-    Cells,
-    Grid,
-    Numbers,
-    Part,
-    below,
-    every_warning,
-    few,
-    numbered,
-    words,
-)
-from rotorid.report.page import NOTHING, render_report
+from rotorid.report.document import NOTHING, Cells, Document
+from rotorid.report.number_tables import Grid, Part, below, every_warning, few, numbered, words
+from rotorid.report.page import render_report
 from rotorid.report.rotor_description import rotor_sheet
 from rotorid.report.rotor_figures import reduction_picture
 
@@ -63,21 +54,21 @@ def reduce_report(
     bytes
         HTML, UTF-8.
     """
-    show = Numbers(document)
+    document = Document(document)
     parts = [
-        _masses(document, show, result),
-        *_uncertain(document, show),
-        *_what_if(document, show),
-        *_if("trade_off", document, lambda: trade_off_part(document, show)),
-        *_if("methods", document, lambda: methods_part(document, show, methods)),
-        *_if("response", document, lambda: response_part(document, show, response)),
-        *_if("stability", document, lambda: stability_part(document, show, stability)),
-        *_if("small_model", document, lambda: _small(document)),
-        *_if("placement", document, lambda: placement_part(document, show, placement)),
-        _compliance(document, show),
+        _masses(document, result),
+        *_uncertain(document),
+        *_what_if(document),
+        *_if("trade_off", document, trade_off_part),
+        *_if("methods", document, methods_part, methods),
+        *_if("response", document, response_part, response),
+        *_if("stability", document, stability_part, stability),
+        *_if("small_model", document, _small),
+        *_if("placement", document, placement_part, placement),
+        _compliance(document),
     ]
     return render_report(
-        "reduce.html",
+        "rotor.html",
         document,
         title=f"Rotor reduced to {counted(len(document['nodes']), 'mass', 'masses')}",
         warnings=every_warning(document),
@@ -92,8 +83,9 @@ def reduce_report(
     )
 
 
-def _if(key: str, document: Mapping[str, Any], part: Callable[[], Part]) -> list[Part]:
-    return [part()] if document.get(key) is not None else []
+def _if(key: str, document: Document, part: Callable[..., Part], *results: object) -> list[Part]:
+    """The part of what the document holds under a key, if it holds it."""
+    return [] if document.get(key) is None else [part(document, *results)]
 
 
 def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -110,21 +102,21 @@ def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[t
     ]
 
 
-def _masses(document: Mapping[str, Any], show: Numbers, result: Reduction) -> Part:
+def _masses(document: Document, result: Reduction) -> Part:
     masses, note = [words("node", document["nodes"])], ""
     if document["positions_m"] is not None:
-        masses.append(show.column("position, m", "positions_m.*", decimals=4))
-    masses.append(show.column("mass, kg", "masses_kg.*", decimals=3))
+        masses.append(document.column("position, m", "positions_m.*", decimals=4))
+    masses.append(document.column("mass, kg", "masses_kg.*", decimals=3))
     if document["masses_std_kg"] is not None:
-        masses.append(show.column("±, kg", "masses_std_kg.*", 2))
+        masses.append(document.column("±, kg", "masses_std_kg.*", 2))
         note = "±: one standard deviation from the residuals of the regression: error of the model."
     count = len(document["natural_frequencies_rad_s"])
     modes = (
         numbered("mode", count),
-        show.column("model, rad/s", "natural_frequencies_rad_s.*", decimals=4),
-        show.column("rotor, rad/s", "rotor_frequencies_rad_s.*", rows=range(count), decimals=4),
-        show.column("error, %", "relative_error.*", decimals=3, scale=100.0, sign=True),
-        show.column("MAC", "mac.*", decimals=5),
+        document.column("model, rad/s", "natural_frequencies_rad_s.*", decimals=4),
+        document.column("rotor, rad/s", "rotor_frequencies_rad_s.*", rows=range(count), decimals=4),
+        document.column("error, %", "relative_error.*", decimals=3, scale=100.0, sign=True),
+        document.column("MAC", "mac.*", decimals=5),
     )
     meaning = "MAC: 1 where the shapes at the masses are the same, 0 where nothing of them is."
     drawn = (
@@ -134,7 +126,7 @@ def _masses(document: Mapping[str, Any], show: Numbers, result: Reduction) -> Pa
     )
     return Part(
         "Masses and modes",
-        (_condition(show),),
+        (_condition(document),),
         (
             Grid("Equivalent masses", tuple(masses), note),
             Grid("Natural frequencies and shapes", modes, meaning),
@@ -143,13 +135,13 @@ def _masses(document: Mapping[str, Any], show: Numbers, result: Reduction) -> Pa
     )
 
 
-def _condition(show: Numbers) -> str:
+def _condition(document: Document) -> str:
     from markupsafe import Markup
 
-    return Markup("Condition number of the regression: {}.").format(show("condition_number", 3))
+    return Markup("Condition number of the regression: {}.").format(document.show("condition_number", 3))
 
 
-def _uncertain(document: Mapping[str, Any], show: Numbers) -> list[Part]:
+def _uncertain(document: Document) -> list[Part]:
     """What errors of the inputs do to masses and frequencies."""
     found = document.get("uncertainty")
     if found is None:
@@ -162,11 +154,11 @@ def _uncertain(document: Mapping[str, Any], show: Numbers) -> list[Part]:
         stem = f"uncertainty.{kind}"
         part = [
             words("quantity", _names(document)[kind]),
-            show.column("value", f"{stem}_{unit}.*", decimals=digits),
-            show.column("±", f"{stem}_std_{unit}.*", 3),
+            document.column("value", f"{stem}_{unit}.*", decimals=digits),
+            document.column("±", f"{stem}_std_{unit}.*", 3),
         ]
         if found["drawn"] is not None:
-            part.append(show.column("± of drawn inputs", f"uncertainty.drawn.{kind}_std_{unit}.*", 3))
+            part.append(document.column("± of drawn inputs", f"uncertainty.drawn.{kind}_std_{unit}.*", 3))
         shares = {name: each[f"{kind}_{square}"] for name, each in found["contributions"].items()}
         part.append(words("from", (_largest_shares(shares, i) for i in range(len(part[0].cells)))))
         columns.append(part)
@@ -184,14 +176,14 @@ def _largest_shares(contributions: Mapping[str, Sequence[float | None]], i: int)
     return ", ".join(f"{name} {100 * shares[name] / whole:.0f} %" for name in largest)
 
 
-def _what_if(document: Mapping[str, Any], show: Numbers) -> list[Part]:
+def _what_if(document: Document) -> list[Part]:
     if "what_if" not in document:
         return []
     masses, frequencies = (
         (
             words("quantity", _names(document)[kind]),
-            show.column("change", f"what_if.exact.{key}.*", 4, sign=True),
-            show.column("predicted to first order", f"what_if.first_order.{key}.*", 4, sign=True),
+            document.column("change", f"what_if.exact.{key}.*", 4, sign=True),
+            document.column("predicted to first order", f"what_if.first_order.{key}.*", 4, sign=True),
         )
         for kind, key in (("masses", "masses_kg"), ("natural_frequencies", "frequencies_rad_s"))
     )
@@ -199,14 +191,14 @@ def _what_if(document: Mapping[str, Any], show: Numbers) -> list[Part]:
     return [Part("What the asked change of inputs does", tables=(table,))]
 
 
-def _names(document: Mapping[str, Any]) -> dict[str, list[str]]:
+def _names(document: Document) -> dict[str, list[str]]:
     return {
         "masses": [f"mass at {node}, kg" for node in document["nodes"]],
         "natural_frequencies": [f"frequency {k + 1}, rad/s" for k in range(len(document["nodes"]))],
     }
 
 
-def _small(document: Mapping[str, Any]) -> Part:
+def _small(document: Document) -> Part:
     """What the small model keeps, in words."""
     small = document["small_model"]
     said = [
@@ -220,42 +212,42 @@ def _small(document: Mapping[str, Any]) -> Part:
     return Part("The small model to go on with", tuple(said))
 
 
-def _compliance(document: Mapping[str, Any], show: Numbers) -> Part:
+def _compliance(document: Document) -> Part:
     """What the masses were computed from: compliance at the masses, springs that it does not hold."""
-    tables = [Grid("Compliance", _deflections(document, show, "compliance_m_per_N"))]
+    tables = [Grid("Compliance", _deflections(document, "compliance_m_per_N"))]
     if any(document["seal_stiffness_N_per_m"]):
         springs = (
             words("node", document["nodes"]),
-            show.column("stiffness, N/m", "seal_stiffness_N_per_m.*"),
+            document.column("stiffness, N/m", "seal_stiffness_N_per_m.*"),
         )
         tables.append(Grid("Springs of seals to the ground", springs))
     used = range(document["modes"])
     columns = (
         numbered("mode", len(used)),
-        show.column("rad/s", "rotor_frequencies_rad_s.*", 9, rows=used),
-        show.column("rpm", "rotor_frequencies_rad_s.*", 7, rows=used, scale=RPM),
+        document.column("rad/s", "rotor_frequencies_rad_s.*", 9, rows=used),
+        document.column("rpm", "rotor_frequencies_rad_s.*", 7, rows=used, scale=RPM),
     )
     tables.append(Grid("Modes of the regression", columns))
-    tables += _apart(document, show)
+    tables += _apart(document)
     return Part("Compliance at the masses, and modes used", tables=tuple(tables))
 
 
-def _deflections(document: Mapping[str, Any], show: Numbers, key: str) -> tuple[Cells, ...]:
+def _deflections(document: Document, key: str) -> tuple[Cells, ...]:
     """Deflections at the masses under unit forces there."""
     nodes = document["nodes"]
     return (
         words("deflection, nm/N", (f"at {node}" for node in nodes)),
-        *(show.column(f"force at {node}", f"{key}.*.{j}", scale=1e9) for j, node in enumerate(nodes)),
+        *(document.column(f"force at {node}", f"{key}.*.{j}", scale=1e9) for j, node in enumerate(nodes)),
     )
 
 
-def _apart(document: Mapping[str, Any], show: Numbers) -> list[Grid]:
+def _apart(document: Document) -> list[Grid]:
     """The shaft's own compliance and the shares of its two bearings, formula (47)."""
     if "separated" not in document:
         return []
     shares = (
-        show.column(f"share of {support}", f"separated.fractions.*.{s}", decimals=4)
+        document.column(f"share of {support}", f"separated.fractions.*.{s}", decimals=4)
         for s, support in enumerate(document["separated"]["supports"])
     )
-    columns = (*_deflections(document, show, "separated.delta_m_per_N"), *shares)
+    columns = (*_deflections(document, "separated.delta_m_per_N"), *shares)
     return [Grid("Of the shaft alone, on rigid bearings; shares of the bearings' nodes", columns)]

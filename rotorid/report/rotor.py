@@ -8,18 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from fem.model.rotor import Rotor
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.report.number_tables import (
-    Cells,
-    Grid,
-    Numbers,
-    Part,
-    evenly,
-    every_warning,
-    figures,
-    numbered,
-    words,
-)
-from rotorid.report.page import NOTHING, render_report
+from rotorid.report.document import NOTHING, Cells, Document
+from rotorid.report.number_tables import Grid, Part, evenly, every_warning, figures, numbered, words
+from rotorid.report.page import render_report
 from rotorid.report.rotor_description import place, rotor_sheet, unbalance_table
 from rotorid.report.rotor_figures import bode_picture, map_picture, modes_picture
 
@@ -64,18 +55,18 @@ def critical_report(
     bytes
         HTML, UTF-8.
     """
-    show = Numbers(document)
+    document = Document(document)
     parts = [
         Part(
             "Critical speeds",
-            tables=(_criticals(document, show),),
+            tables=(_criticals(document),),
             drawings=(modes_picture(modes),),
         ),
-        *_map(document, show, chart, operating),
-        Part("Mode shapes", tables=_shapes(document, show)),
+        *_map(document, chart, operating),
+        Part("Mode shapes", tables=_shapes(document)),
     ]
     return render_report(
-        "critical.html",
+        "rotor.html",
         document,
         title="Critical speeds",
         warnings=[*_inside(document), *every_warning(document)],
@@ -117,7 +108,7 @@ def response_report(
     bytes
         HTML, UTF-8.
     """
-    show = Numbers(document)
+    document = Document(document)
     rotor = response.rotor
     low, high = document["speeds_rad_s"][0], document["speeds_rad_s"][-1]
     about = [
@@ -133,14 +124,14 @@ def response_report(
         Part("Unbalance", tables=(unbalance_table(rotor, response.unbalance),)),
         Part(
             "Vibration",
-            tables=(_largest(document, show), *_peaks(document, show, operating)),
+            tables=(_largest(document), *_peaks(document, operating)),
             drawings=(bode_picture(response, places, peaks, operating),),
         ),
-        *_forces(document, show, rotor),
-        Part("Readings", tables=_readings(document, show)),
+        *_forces(document, rotor),
+        Part("Readings", tables=_readings(document)),
     ]
     return render_report(
-        "response.html",
+        "rotor.html",
         document,
         title="Unbalance response",
         warnings=[*_margins(document), *every_warning(document)],
@@ -172,38 +163,38 @@ def _inside(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _criticals(document: Mapping[str, Any], show: Numbers) -> Grid:
+def _criticals(document: Document) -> Grid:
     speeds, operating = document["critical_speeds_rad_s"], document.get("operating")
     whirl = zip(document["direction"], speeds, strict=True)
     columns = [
         numbered("mode", len(speeds)),
-        show.column("rpm", "critical_speeds_rpm.*", decimals=2),
-        show.column("rad/s", "critical_speeds_rad_s.*", decimals=4),
-        show.column("Hz", "critical_speeds_rad_s.*", decimals=4, scale=1 / math.tau),
+        document.column("rpm", "critical_speeds_rpm.*", decimals=2),
+        document.column("rad/s", "critical_speeds_rad_s.*", decimals=4),
+        document.column("Hz", "critical_speeds_rad_s.*", decimals=4, scale=1 / math.tau),
         words("whirl", (way if speed else "rigid body" for way, speed in whirl)),
     ]
     notes = []
     if operating:
         path = "operating.critical_speeds.*.separation_percent"
-        distance = show.column("from operating range, %", path, decimals=1)
+        distance = document.column("from operating range, %", path, decimals=1)
         rows = zip(operating["critical_speeds"], distance.cells, strict=True)
         shown = tuple("INSIDE" if row["inside"] else cell for row, cell in rows)
         columns.append(Cells(distance.head, shown))
         notes.append("The distance is in percent of the nearest end of the operating range.")
     if document.get("mesh_check"):
-        columns.append(show.column("error of the mesh, %", "mesh_check.relative_error.*", 2, scale=100.0))
+        columns.append(document.column("error of the mesh, %", "mesh_check.relative_error.*", 2, scale=100.0))
     if document.get("critical_speeds_cut"):
         notes.append(document["critical_speeds_cut"])
     caption = "Where the frequency of free whirl equals the speed of rotation"
     return Grid(caption, tuple(columns), " ".join(notes))
 
 
-def _map(document: Mapping[str, Any], show: Numbers, chart: SpeedMap | None, operating: Band) -> list[Part]:
+def _map(document: Document, chart: SpeedMap | None, operating: Band) -> list[Part]:
     if chart is None:
         return []
     found = document["map"]
     free, pinned = (
-        show.column(f"{which}, rpm", f"map.{which}_rad_s.*", decimals=1, scale=RPM)
+        document.column(f"{which}, rpm", f"map.{which}_rad_s.*", decimals=1, scale=RPM)
         for which in ("free", "pinned")
     )
     modes = numbered("mode", len(found["free_rad_s"]))
@@ -216,8 +207,8 @@ def _map(document: Mapping[str, Any], show: Numbers, chart: SpeedMap | None, ope
                 words("support", (item["support"] for item in met)),
                 words("direction", (item["direction"] for item in met)),
                 figures("critical speed", (item["mode"] for item in met)),
-                show.column("rpm", "map.intersections.*.speed_rad_s", decimals=1, scale=RPM),
-                show.column("stiffness, MN/m", "map.intersections.*.stiffness_N_per_m", 4, scale=1e-6),
+                document.column("rpm", "map.intersections.*.speed_rad_s", decimals=1, scale=RPM),
+                document.column("stiffness, MN/m", "map.intersections.*.stiffness_N_per_m", 4, scale=1e-6),
             ),
         ),
     ]
@@ -226,12 +217,12 @@ def _map(document: Mapping[str, Any], show: Numbers, chart: SpeedMap | None, ope
     return [Part("Critical speed map", (said,), kept, (map_picture(chart, operating),))]
 
 
-def _shapes(document: Mapping[str, Any], show: Numbers) -> tuple[Grid, ...]:
+def _shapes(document: Document) -> tuple[Grid, ...]:
     """Deflections at the nodes, some modes abreast."""
     count = len(document["mode_shapes"])
     nodes = numbered("node", len(document["positions_m"]))
-    positions = show.column("position, m", "positions_m.*", decimals=4)
-    modes = [show.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4) for k in range(count)]
+    positions = document.column("position, m", "positions_m.*", decimals=4)
+    modes = [document.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4) for k in range(count)]
     caption = "Deflection at the nodes, 1 at node 1 (or the largest 1)"
     return tuple(
         Grid(caption, (nodes, positions, *modes[first : first + MODES_ABREAST]))
@@ -249,35 +240,35 @@ def _margins(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _largest(document: Mapping[str, Any], show: Numbers) -> Grid:
+def _largest(document: Document) -> Grid:
     sensors = [item["sensor"] for item in document["largest"]]
     return Grid(
         "Largest readings",
         (
             words("sensor", (name if isinstance(name, str) else f"node {name}" for name in sensors)),
-            show.column("amplitude, µm peak", "largest.*.amplitude_m", 4, scale=MICRO),
-            show.column("rpm", "largest.*.speed_rad_s", decimals=1, scale=RPM),
-            show.column("rad/s", "largest.*.speed_rad_s"),
+            document.column("amplitude, µm peak", "largest.*.amplitude_m", 4, scale=MICRO),
+            document.column("rpm", "largest.*.speed_rad_s", decimals=1, scale=RPM),
+            document.column("rad/s", "largest.*.speed_rad_s"),
         ),
     )
 
 
-def _peaks(document: Mapping[str, Any], show: Numbers, operating: Band) -> tuple[Grid, ...]:
+def _peaks(document: Document, operating: Band) -> tuple[Grid, ...]:
     """Peaks with amplification factors, and with margins where there is a range; nothing without peaks."""
     peaks = document["peaks"]
     if not peaks:
         return ()
     columns = [
         words("sensor", (peak["sensor"] for peak in peaks)),
-        show.column("rpm", "peaks.*.speed_rpm", decimals=1),
-        show.column("amplitude, µm peak", "peaks.*.amplitude", 4, scale=MICRO),
-        show.column("AF", "peaks.*.amplification_factor", decimals=2),
+        document.column("rpm", "peaks.*.speed_rpm", decimals=1),
+        document.column("amplitude, µm peak", "peaks.*.amplitude", 4, scale=MICRO),
+        document.column("AF", "peaks.*.amplification_factor", decimals=2),
     ]
     if operating is not None:
         verdicts = {True: "enough", False: "NOT ENOUGH", None: NOTHING}
         columns += [
-            show.column("margin, %", "peaks.*.separation_margin_percent", decimals=1),
-            show.column("required, %", "peaks.*.required_margin_percent", decimals=1),
+            document.column("margin, %", "peaks.*.separation_margin_percent", decimals=1),
+            document.column("required, %", "peaks.*.required_margin_percent", decimals=1),
             words("margin is", (verdicts[peak["enough"]] for peak in peaks)),
         ]
     notes: dict[str, list[str]] = {}
@@ -289,31 +280,31 @@ def _peaks(document: Mapping[str, Any], show: Numbers, operating: Band) -> tuple
     return (Grid("Peaks", tuple(columns), note),)
 
 
-def _forces(document: Mapping[str, Any], show: Numbers, rotor: Rotor) -> list[Part]:
+def _forces(document: Document, rotor: Rotor) -> list[Part]:
     supports = rotor.supports
     if not supports:
         return []
     columns = (
         words("support", (each.name or f"support {k}" for k, each in enumerate(supports, start=1))),
         words("node", (place(rotor, each.node) for each in supports)),
-        show.column("largest force, N", "bearing_forces.largest_N.*", 4),
-        show.column("rpm", "bearing_forces.largest_at_rad_s.*", decimals=1, scale=RPM),
+        document.column("largest force, N", "bearing_forces.largest_N.*", 4),
+        document.column("rpm", "bearing_forces.largest_at_rad_s.*", decimals=1, scale=RPM),
     )
     return [Part("Forces on the supports", tables=(Grid("", columns),))]
 
 
-def _readings(document: Mapping[str, Any], show: Numbers) -> tuple[Grid, ...]:
+def _readings(document: Document) -> tuple[Grid, ...]:
     """Amplitude and phase at some of the speeds asked for, a few sensors abreast."""
     sensors, count = document["sensors"], len(document["speeds_rad_s"])
     picked = evenly(count, READINGS)
     note = (
         f"{len(picked)} of the {count} speeds asked for; --output writes all." if len(picked) < count else ""
     )
-    speeds = show.column("rpm", "speeds_rad_s.*", rows=picked, decimals=1, scale=RPM)
+    speeds = document.column("rpm", "speeds_rad_s.*", rows=picked, decimals=1, scale=RPM)
     readings = []
     for k, sensor in enumerate(sensors):
-        size = show.column(f"{sensor}: µm peak", f"amplitude_m.{k}.*", 4, rows=picked, scale=MICRO)
-        readings += [size, show.column("phase, °", f"phase_deg.{k}.*", rows=picked, decimals=1)]
+        size = document.column(f"{sensor}: µm peak", f"amplitude_m.{k}.*", 4, rows=picked, scale=MICRO)
+        readings += [size, document.column("phase, °", f"phase_deg.{k}.*", rows=picked, decimals=1)]
     return tuple(
         Grid("Amplitude and phase (lead)", (speeds, *readings[first : first + 2 * ABREAST]), note)
         for first in range(0, len(readings), 2 * ABREAST)

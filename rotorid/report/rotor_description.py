@@ -10,7 +10,8 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.rpm import RPM, phase_deg
-from rotorid.report.number_tables import Cells, Grid, figures, numbered, words
+from rotorid.report.document import Cells
+from rotorid.report.number_tables import Grid, figures, numbered, words
 from rotorid.report.rotor_figures import Drawing, rotor_picture
 
 if TYPE_CHECKING:

@@ -46,6 +46,11 @@ def sketch(height: float, draw: Callable[[Figure], object], caption: str) -> Dra
         return Drawing(inline_svg(figure, caption), caption)
 
 
+def whole(height: float, result: StabilityCost | Placement, caption: str) -> Drawing:
+    """A result as its own plot draws it."""
+    return sketch(height, lambda figure: plot(result, figure.add_subplot()), caption)
+
+
 def rotor_picture(
     rotor: Rotor, planes: Sequence[str | int], sensors: Sequence[SensorLike], meaning: str
 ) -> Drawing:
@@ -151,20 +156,13 @@ def running_picture(response: ResponseCost) -> Drawing:
 
 def stability_picture(stability: StabilityCost) -> Drawing:
     """Smallest logarithmic decrement of both models over speed."""
-
-    def draw(figure: Figure) -> None:
-        plot(stability, figure.add_subplot())
-
-    return sketch(3.6, draw, "Smallest logarithmic decrement over speed; below 0 a motion grows.")
+    return whole(3.6, stability, "Smallest logarithmic decrement over speed; below 0 a motion grows.")
 
 
 def placement_picture(placement: Placement) -> Drawing:
     """All ranked choices of nodes."""
-
-    def draw(figure: Figure) -> None:
-        plot(placement, figure.add_subplot())
-
-    return sketch(4.4, draw, "All ranked choices: largest error of a frequency over the largest 1 − MAC.")
+    caption = "All ranked choices: largest error of a frequency over the largest 1 − MAC."
+    return whole(4.4, placement, caption)
 
 
 def _curves_only(axes: Axes, columns: int, below: bool = False) -> None:

@@ -8,8 +8,12 @@ from typing import Any
 from rotorid.base.suggestions import one_of
 from rotorid.tables.job.job_keys import JOB
 from rotorid.tables.reader.settings_keys import Key, file_schema
+from rotorid.tables.rotor.rotor_file import ROTOR
 
-FILES: dict[str, tuple[str, Sequence[Key]]] = {"job": ("Job file of rotorid", JOB)}
+FILES: dict[str, tuple[str, Sequence[Key]]] = {
+    "job": ("Job file of rotorid", JOB),
+    "rotor": ("Rotor file of rotorid", ROTOR),
+}
 """What the file is, and its keys, by the names that `rotorid schema` takes."""
 
 

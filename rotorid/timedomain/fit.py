@@ -133,10 +133,12 @@ def fit(  # noqa: PLR0913
     path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
     for _ in range(WEIGHINGS if weigh and path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, len(names))
-        if errors is None or settled(errors, problem.errors):
+        stopped = problem.late and not path.converged
+        if stopped or errors is None or settled(errors, problem.errors):
             break
         left = problem.limit - time.monotonic()
         problem = Problem(model, several, integrator, rtol, errors, left)
+        problem.seconds = max_seconds  # what a message says
         path = search(problem, path.estimate.solution).after(path.history)
     problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)

@@ -30,6 +30,11 @@ class Fit(Path):
         What was fitted to what: one model for each record, all with the same parameters.
     method, integrator, loss
         How; the integrator is the one that was used ("none": the model has no states).
+    history, costs, trajectories
+        Parameters at the start and after each iteration, (k + 1, n), half the sum of squared residuals at
+        each, and the states of each record that quasilinearization went through.
+    converged, message, at_bounds
+        Whether a minimum was reached, and in words; parameters that stand at a bound.
     estimate
         Values, covariance, rank, combinations; residuals (model − record, over the stated standard deviations
         if there are any), record by record, output by output. No covariance where intervals would mislead.

@@ -57,9 +57,9 @@ def test_every_column_of_a_table_is_described(table):
 
 
 def asked_for(monkeypatch, read, *files):
-    """The keys that a reader asks for, without the names that users choose."""
+    """The keys that a reader asks for or knows, without the names that users choose."""
     keys = set()
-    take = Section.take
+    take, know = Section.take, Section.know
 
     def noted(self, key):
         parts = [part for part in re.sub(r"\[\d+\]", "", self._prefix).split(".") if part]
@@ -67,8 +67,14 @@ def asked_for(monkeypatch, read, *files):
             keys.add(key)
         return take(self, key)
 
+    def known(self, names):
+        names = list(names)
+        keys.update(names)
+        return know(self, names)
+
     with monkeypatch.context() as patch:
         patch.setattr(Section, "take", noted)
+        patch.setattr(Section, "know", known)
         for file in files:
             read(file)
     return keys

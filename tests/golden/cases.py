@@ -157,6 +157,7 @@ rk4                         balance sample_data/rk4/job.toml
 left-in-minmax              balance sample_data/left_in/job.toml --method minmax --max-mass 10g
 template                    balance --template job.xlsx
 schema-job                  schema job
+schema-rotor                schema rotor
 schema-misspelt             schema jop
 balance-misspelt-column     balance misspelt.csv {TURBO}/weights.csv
 balance-missing-run         balance {TURBO}/runs.csv short.csv

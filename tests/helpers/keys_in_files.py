@@ -1,17 +1,32 @@
-"""The tables of keys of a job in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
+"""Tables of keys in docs/files.md: `python tests/helpers/keys_in_files.py` writes them."""
+
+import re
 
 from rotorid.samples import sample_data
-from rotorid.tables.job import job_keys
+from rotorid.tables.job import keys
+from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys
 from rotorid.tables.reader.settings_keys import key_lines
+from rotorid.tables.rotor import bearing, rotor_file
 
 PAGE = sample_data().parent / "docs" / "files.md"
 TABLES = {
-    "key": job_keys.JOB,
-    "key of [errors]": job_keys.ERRORS,
-    "key of [key_phasor]": job_keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
-    "key of [planes.NAME]": job_keys.PLANE,
-    "key of [sensors.NAME]": job_keys.SENSOR,
+    "key": keys.JOB,
+    "key of [errors]": keys.ERRORS,
+    "key of [key_phasor]": keys.KEY_PHASOR,
+    "key of [slow_roll.SENSOR]": keys.VECTOR,
+    "key of [planes.NAME]": keys.PLANE,
+    "key of [sensors.NAME]": keys.SENSOR,
+    "key of a model file for harmonic tests": harmonic_file.HARMONIC,
+    "key of a model file with states": ode_file.TIME_STATES,
+    "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),
+    "key of [nuisance]": ode_file.NUISANCE,
+    "key of [errors] of a model file": shared_keys.ERRORS,
+    "key of a rotor file": rotor_file.ROTOR,
+    "key of [material]": rotor_file.MATERIAL,
+    "key of [model]": rotor_file.MODEL,
+    "key of [[station]]": rotor_file.STATION,
+    "key of [[disc]]": rotor_file.DISC,
+    "key of [[bearing]]": bearing.KEYS_OF["bearing"],
 }
 
 
@@ -21,7 +36,7 @@ def with_tables(text):
         mark = f"<!-- keys: {title} -->\n"
         before, own_mark, after = text.partition(mark)
         assert own_mark, title
-        lines = "\n".join(key_lines(own, title.replace("[", "`[").replace("]", "]`")))
+        lines = "\n".join(key_lines(own, re.sub(r"(\[.*\])", r"`\1`", title)))
         text = f"{before}{mark}{lines}\n{after[after.index('<!-- end -->') :]}"
     return text
 

@@ -1,4 +1,4 @@
-"""`rotorid schema`: the keys of a job file as a JSON schema, for editors."""
+"""`rotorid schema`: the keys of a job or rotor file as a JSON schema, for editors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rotorid.cli.output import Destination, json_text
 
 @command(to=("json",))
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job or rotor.")],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
     """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.

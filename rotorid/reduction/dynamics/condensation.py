@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 import fem
 from fem.matrices.banded_matrices import assemble, free_motions, ignored_inertia, multiply, rounding_error
@@ -189,20 +188,3 @@ def left_out(rotor: fem.Rotor) -> tuple[str, ...]:
             "fitted to modes that know it; no moment of inertia is added"
         )
     return tuple(out)
-
-
-def checked_speeds(speeds: ArrayLike) -> FloatArray:
-    """One or many speeds in rad/s as an array.
-
-    Raises
-    ------
-    ValueError
-        If they are no numbers, not finite or negative.
-    """
-    try:
-        array = np.atleast_1d(np.array(speeds, dtype=float))
-    except (TypeError, ValueError):
-        raise ValueError("speeds must be numbers in rad/s") from None
-    if array.ndim != 1 or not array.size or not (np.isfinite(array) & (array >= 0)).all():
-        raise ValueError("speeds must be finite and not negative, in rad/s, one or a list")
-    return array

@@ -9,20 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import fem
-from fem.matrices.banded_matrices import assemble
+from fem.critical import critical_speeds_below
 from fem.model.sensors import SensorLike, label
-from fem.solvers.eigen import finite_modes
-from fem.whirl import checked_speeds
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.base.json import floats
+from rotorid.base.checks import checked_speeds
+from rotorid.base.json import plain
 from rotorid.base.rpm import phase_deg
 from rotorid.reduction.dynamics.instability_threshold import stability_threshold
-from rotorid.reduction.dynamics.small_rotor_whirl import equations
+from rotorid.reduction.dynamics.small_rotor import SmallRotor, readings
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from rotorid.reduction.dynamics.small_rotor import SmallRotor
 
 
 CLOSE = 0.08
@@ -136,21 +133,23 @@ class ResponseCost:
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON: what is said of all speeds, and `worst` of each as relative difference."""
         speed, sensor, plane = self.where
-        return {
-            "nodes": list(self.nodes),
-            "sensors": [str(label(each)) for each in self.sensors],
-            "speeds_rad_s": self.speeds.tolist(),
-            "criticals_rad_s": self.criticals.tolist(),
-            "bands": self.bands,
-            "excluded": self.excluded.tolist(),
-            "relative_difference": floats(self.worst),
-            "largest": self.largest,
-            "median": self.median,
-            "largest_to_highest": self.largest_to_highest,
-            "median_to_highest": self.median_to_highest,
-            "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "sensors": [str(label(each)) for each in self.sensors],
+                "speeds_rad_s": self.speeds,
+                "criticals_rad_s": self.criticals,
+                "bands": self.bands,
+                "excluded": self.excluded,
+                "relative_difference": self.worst,
+                "largest": self.largest,
+                "median": self.median,
+                "largest_to_highest": self.largest_to_highest,
+                "median_to_highest": self.median_to_highest,
+                "where": {"speed_rad_s": speed, "sensor": str(label(sensor)), "plane": plane},
+                "warnings": self.warnings,
+            }
+        )
 
 
 def compare_response(
@@ -185,7 +184,7 @@ def compare_response(
     rotor, nodes = small.rotor, tuple(int(node) for node in small.nodes)
     if not (np.isfinite(bands) and 0 <= bands < 1):
         raise ValueError(f"the bands are a part of the critical speed, 0 to below 1, not {bands!r}")
-    omega = _default_speeds(rotor, bands) if speeds is None else checked_speeds(speeds)
+    omega = _default_speeds(rotor, bands) if speeds is None else checked_speeds(speeds, ascending=True)
     sensors: tuple[SensorLike, ...] = nodes
     if not rotor.symmetric:
         sensors = (*((node, 0.0) for node in nodes), *((node, 90.0) for node in nodes))
@@ -193,8 +192,12 @@ def compare_response(
     left = without_modal_damping(small)
     if left:
         small = small.undamped_modes
-    own = _response(small, omega)
-    criticals, said = _criticals(rotor, omega[-1] / (1 - bands))
+    own = readings(small, omega)[:, : len(sensors)]
+    said: tuple[str, ...] = ()
+    try:
+        criticals = critical_speeds_below(rotor, omega[-1] / (1 - bands) * (1 - 1e-9))
+    except ValueError as problem:
+        criticals, said = np.empty(0), (f"no band is left out: {problem}",)
     criticals = criticals[criticals * (1 + bands) > omega[0]]
     near = np.abs(omega[:, None] - criticals) < bands * criticals * (1 - 1e-9)  # its ends are compared
     excluded = near.any(axis=1) | (omega == 0)
@@ -243,51 +246,6 @@ def without_modal_damping(small: SmallRotor) -> tuple[str, ...]:
     if not any(small.modal_damping):
         return ()
     return ("the modal damping of the small model is left out of this comparison: the full rotor has none",)
-
-
-def _response(small: SmallRotor, omega: FloatArray) -> ComplexArray:
-    """Influence coefficients of the small model, unbalance and readings at its masses, m per kg·m.
-
-    Shape (S, n, n), as `SmallRotor.response`; of a rotor that is not symmetric (S, 2 n, n): readings in x,
-    then in y.
-    """
-    Q = equations(small)
-    D, K = Q.at(omega)
-    w = omega[:, None, None]
-    n, d = len(small.nodes), len(small.kept)
-    at = np.arange(n)  # the masses are the first of the kept nodes
-    loads = np.zeros((Q.size, n), dtype=complex)
-    loads[at, at] = 1.0
-    if Q.P.planes == 2:
-        loads[d + at, at] = -1j
-    try:
-        moved = np.linalg.solve(
-            K + 1j * w * D - w * w * Q.M, np.broadcast_to(loads, (omega.size, *loads.shape))
-        )
-    except np.linalg.LinAlgError:
-        moved = np.full((omega.size, *loads.shape), np.inf, dtype=complex)
-    if not np.isfinite(moved).all():
-        raise ValueError(
-            "the undamped small model runs exactly at one of its critical speeds: choose other speeds"
-        )
-    taken = at if Q.P.planes == 1 else np.concatenate((at, d + at))
-    return np.asarray(moved[:, taken] * w * w)
-
-
-def _criticals(rotor: fem.Rotor, top: float) -> tuple[FloatArray, list[str]]:
-    """Critical speeds of the full rotor up to `top`, and what to say of them."""
-    available = finite_modes(assemble(rotor)) * (1 if rotor.symmetric else 2)
-    n = min(4, available)
-    while True:
-        try:
-            found = fem.critical_speeds(rotor, n)
-        except ValueError as problem:
-            return np.empty(0), [f"no band is left out: {problem}"]
-        frequencies = np.sort(found.frequencies)
-        if frequencies[-1] > top or frequencies.size < n or n == available:
-            break
-        n = min(2 * n, available)
-    return frequencies[(frequencies > 0) & (frequencies < top * (1 - 1e-9))], []
 
 
 def _default_speeds(rotor: fem.Rotor, bands: float) -> FloatArray:

@@ -25,9 +25,9 @@ import fem
 from fem.matrices.lateral_planes import Quadratic, both_planes, project
 from fem.state_space import StateSpace, state_space
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import checked_speeds
 from rotorid.base.text import counted
 from rotorid.reduction.dynamics.condensation import (
-    checked_speeds,
     condensed,
     damping_ratios,
     external_damping,
@@ -197,24 +197,7 @@ class SmallRotor:
         ValueError
             For impossible speeds, outside the table of a support, or exactly at an undamped critical speed.
         """
-        omega = checked_speeds(speeds)
-        D, K = self._at(omega)
-        n, d = len(self.nodes), len(self.kept)
-        loads = np.zeros((self.quadratic.size, n), dtype=complex)
-        loads[np.arange(n), np.arange(n)] = 1.0
-        loads[d + np.arange(n), np.arange(n)] = -1j
-        w = omega[:, None, None]
-        dynamic = K - w * w * self.quadratic.M + 1j * w * D
-        try:
-            X = np.linalg.solve(dynamic, np.broadcast_to(loads, (len(omega), *loads.shape)))
-        except np.linalg.LinAlgError:
-            X = np.full((len(omega), *loads.shape), np.inf, dtype=complex)
-        if not np.abs(X).max() * np.abs(K).max() < _INFINITE:
-            raise ValueError(
-                "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
-                "infinite; leave out this speed"
-            )
-        return np.asarray(w * w * X[:, :n])
+        return readings(self, checked_speeds(speeds))[:, : len(self.nodes)]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""
@@ -258,7 +241,7 @@ class SmallRotor:
 
     def _order(self) -> list[tuple[str, int]]:
         """Names of the unknowns, and where they stand in `quadratic`."""
-        d, n, pedestals = len(self.kept), len(self.nodes), self.quadratic.P.pedestals
+        d, n, feet = len(self.kept), len(self.nodes), self.quadratic.P.pedestals
         out = [
             (f"{axis}{self.kept[k]}", plane * d + k)
             for part in (range(n), range(n, d))
@@ -348,6 +331,27 @@ def small_rotor(
         external=external_damping(rotor, quadratic, ratios),
         warnings=left_out(rotor),
     )
+
+
+def readings(small: SmallRotor, omega: FloatArray) -> ComplexArray:
+    """`SmallRotor.response` at speeds, rad/s, shape (S,): in x, then in y, shape (S, 2 n, n)."""
+    D, K = small._at(omega)
+    n = len(small.nodes)
+    own = np.arange(n)  # the masses are the first of the kept nodes
+    in_y = len(small.kept) + own
+    loads = np.zeros((len(omega), small.quadratic.size, n), dtype=complex)
+    loads[:, own, own], loads[:, in_y, own] = 1.0, -1j
+    w = omega[:, None, None]
+    try:
+        X = np.linalg.solve(K - w * w * small.quadratic.M + 1j * w * D, loads)
+    except np.linalg.LinAlgError:
+        X = np.full_like(loads, np.inf)
+    if not np.abs(X).max() * np.abs(K).max() < _INFINITE:
+        raise ValueError(
+            "the undamped model runs exactly at a critical speed, or nothing holds it: the response is "
+            "infinite; leave out this speed"
+        )
+    return np.asarray(w * w * X[:, np.concatenate((own, in_y))])
 
 
 def _plane(name: str) -> str:

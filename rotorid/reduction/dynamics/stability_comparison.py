@@ -14,7 +14,7 @@ from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.stability import least_damped, range_of_speeds
 from fem.whirl import available_modes, checked_number
-from rotorid.base.json import floats
+from rotorid.base.json import plain
 from rotorid.base.text import counted
 from rotorid.reduction.dynamics.instability_threshold import STEPS, stability_threshold, threshold_of
 from rotorid.reduction.dynamics.response_comparison import without_modal_damping
@@ -157,19 +157,21 @@ class StabilityCost:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON; what is not known is None."""
-        return {
-            "nodes": list(self.nodes),
-            "speeds_rad_s": self.speeds.tolist(),
-            "full_log_decrement": floats(self.full_decrement),
-            "small_log_decrement": floats(self.small_decrement),
-            "full_frequency_rad_s": floats(self.full_frequency),
-            "small_frequency_rad_s": floats(self.small_frequency),
-            "full": self.full.to_dict(),
-            "small": self.small.to_dict(),
-            "relative_difference_of_threshold": self.relative_difference,
-            "modes_watched": {"full": self.n_full, "small": self.n_small},
-            "warnings": list(self.warnings),
-        }
+        return plain(
+            {
+                "nodes": self.nodes,
+                "speeds_rad_s": self.speeds,
+                "full_log_decrement": self.full_decrement,
+                "small_log_decrement": self.small_decrement,
+                "full_frequency_rad_s": self.full_frequency,
+                "small_frequency_rad_s": self.small_frequency,
+                "full": self.full.to_dict(),
+                "small": self.small.to_dict(),
+                "relative_difference_of_threshold": self.relative_difference,
+                "modes_watched": {"full": self.n_full, "small": self.n_small},
+                "warnings": self.warnings,
+            }
+        )
 
 
 def compare_stability(

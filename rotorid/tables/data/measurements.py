@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +15,9 @@ from rotorid.base.text import listing
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems, TableWarning
-from rotorid.tables.reader.units import Unit, UnitError, one_of
+from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
@@ -69,24 +70,21 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     equations = model.model if isinstance(model, HarmonicFile) else model
     problems = Problems()
     columns = _columns(equations.signals, equations.varying)
-    table = read_table(path, "measurements", columns, problems, first=True)
-    if table is None:
-        problems.stop()
-        raise AssertionError("no table and no problem")
+    table = problems.need(read_table(path, "measurements", columns, problems, first=True))
     unclear = len(problems) > 0
-    frequency = _frequency(table, problems, unclear=unclear)
-    read = {name: _amplitude(table, name, problems, unclear=unclear) for name in equations.signals}
+    frequency = _frequency(table)
+    read = {name: _amplitude(table, name, unclear=unclear) for name in equations.signals}
     if not unclear:
-        _complain_about_missing(table, equations, read, problems)
+        _complain_about_missing(table, equations, read)
         for name in equations.varying:
             if name not in table:
                 expected = f"a column {name}: the equations multiply amplitudes by it"
                 near = did_you_mean(name, [*equations.parameters, *equations.known])
-                problems.add(table.source, table.header_row, name, None, expected + near)
-    names = _experiments(table, problems)
+                table.in_header(name, expected + near)
+    names = _experiments(table)
     problems.stop()
     signals = {name: values for name, values in read.items() if values is not None}
-    free = _free(table, equations, signals, problems)
+    free = _free(table, equations, signals)
     problems.stop()
     nothing = np.full(len(table), complex(np.nan, np.nan))
     for name in equations.signals:
@@ -96,29 +94,24 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     varying = {name: table.numbers(name) for name in equations.varying}
     rows = Experiments(names, frequency, signals, free, errors, varying=varying)
     if "repeat" in table:
-        rows = merge_repeats(table, rows, equations, problems)
-        problems.stop()
+        rows = merge_repeats(table, rows, equations)
     return rows
 
 
 def _columns(signals: tuple[str, ...], varying: tuple[str, ...]) -> tuple[Column, ...]:
-    own = [Column(name, _row_unit, (name,), False, blank=True) for name in varying]
-    own += [
-        column
-        for name in signals
-        for column in (
-            Column(f"{name}_amplitude", _amplitude_unit, (f"{name}_amplitude",), False, blank=True),
-            Column(f"{name}_phase", one_of(units.ANGLE), (f"{name}_phase_deg",), False, blank=True),
-            Column(f"{name}_re", _amplitude_unit, (f"{name}_re",), False, blank=True),
-            Column(f"{name}_im", _amplitude_unit, (f"{name}_im",), False, blank=True),
-        )
-    ]
+    def own(name: str, unit: UnitReader, example: str = "") -> Column:
+        return Column(name, unit, (example or name,), required=False, blank=True)
+
+    columns = [own(name, _row_unit) for name in varying]
+    for name in signals:
+        size, real, imag = (own(f"{name}_{part}", _amplitude_unit) for part in ("amplitude", "re", "im"))
+        columns += [size, own(f"{name}_phase", one_of(units.ANGLE), f"{name}_phase_deg"), real, imag]
     return (
         Column("experiment", required=False),
         Column("frequency", _SPEED, ("frequency_rad_s", "frequency_Hz"), required=False),
         Column("speed", _SPEED, ("speed_rpm",), required=False),
         Column("repeat", required=False),
-        *own,
+        *columns,
     )
 
 
@@ -146,20 +139,17 @@ def _row_unit(name: str) -> Unit:
         ) from None
 
 
-def _frequency(table: Table, problems: Problems, *, unclear: bool) -> FloatArray:
-    present = [stem for stem in FREQUENCIES if stem in table]
-    if len(present) != 1:
-        if not unclear or present:
-            expected = "one column frequency_rad_s, frequency_Hz or speed_rpm"
-            name = table.fields[present[1]].name if present else "frequency_rad_s"
-            problems.add(table.source, table.header_row, name, None, expected)
+def _frequency(table: Table) -> FloatArray:
+    expected = "one column frequency_rad_s, frequency_Hz or speed_rpm"
+    stem = table.only(FREQUENCIES, "frequency_rad_s", expected)
+    if stem is None:
         return np.full(len(table), np.nan)
-    values = table.numbers(present[0])
-    must_be(table, present[0], values >= 0, "a frequency of 0 or more", problems)
+    values = table.numbers(stem)
+    table.must_be(stem, values >= 0, "a frequency of 0 or more")
     return values
 
 
-def _amplitude(table: Table, name: str, problems: Problems, *, unclear: bool) -> ComplexArray | None:
+def _amplitude(table: Table, name: str, *, unclear: bool) -> ComplexArray | None:
     """One amplitude of the model, NaN where a row does not have it; None if the table has no such column."""
     size, phase, real, imag = (f"{name}_{part}" for part in ("amplitude", "phase", "re", "im"))
     there = [stem for stem in (size, phase, real, imag) if stem in table]
@@ -169,96 +159,65 @@ def _amplitude(table: Table, name: str, problems: Problems, *, unclear: bool) ->
     for stem in there:
         if stem not in way:
             expected = f"{name} either as {size} and {phase}_deg or as {real} and {imag}, not some of both"
-            problems.add(table.source, table.header_row, table.fields[stem].name, None, expected)
+            table.in_header(table.fields[stem].name, expected)
             return None
     lead, follow = (size, phase) if size in way else (real, imag)
     if lead not in table or (follow == phase and phase not in table):
         missing, other = (lead, there[0]) if lead not in table else (f"{phase}_deg", lead)
         if not unclear:
             expected = f"a column {missing}, as there is {table.fields[other].name}"
-            problems.add(table.source, table.header_row, missing, None, expected)
+            table.in_header(missing, expected)
         return None
-    first = table.numbers(lead)
-    second = table.numbers(follow, missing=0.0)
-    blank = [np.array([_is_blank(table, stem, i) for i in range(len(table))]) for stem in (lead, follow)]
+    first, second = table.numbers(lead), table.numbers(follow, missing=0.0)
+    blank, no_second = table.is_blank(lead), table.is_blank(follow)
+    needs = no_second & ~blank & ~((follow == phase) & (first == 0))
+    hint = "a number, as its amplitude is given" if follow == phase else "a number (0 for a real amplitude)"
+    table.complain_where(needs, follow, hint)
     if follow in table:
-        needs = blank[1] & ~blank[0] & ~((follow == phase) & (first == 0))
-        for i in np.flatnonzero(needs):
-            hint = (
-                "a number, as its amplitude is given"
-                if follow == phase
-                else "a number (0 for a real amplitude)"
-            )
-            table.complain(problems, int(i), follow, hint)
-        for i in np.flatnonzero(blank[0] & ~blank[1]):
-            expected = f"a number, or {follow} blank too where {name} was not measured"
-            table.complain(problems, int(i), lead, expected)
-        second = np.where(blank[1] & ~blank[0], 0.0, second)
+        expected = f"a number, or {follow} blank too where {name} was not measured"
+        table.complain_where(blank & ~no_second, lead, expected)
+    second = np.where(no_second & ~blank, 0.0, second)
     if lead == size:
-        must_be(
-            table,
-            size,
-            (first >= 0) | blank[0],
-            f"an amplitude of 0 or more ({real} may be negative)",
-            problems,
-        )
-        allowed = (np.abs(second) <= FULL_TURN) | blank[1]
-        must_be(table, phase, allowed, "a phase from -360 to 360 degrees", problems)
-        return polar(first, np.where(blank[0], 0.0, second))
+        expected = f"an amplitude of 0 or more ({real} may be negative)"
+        table.must_be(size, (first >= 0) | blank, expected)
+        allowed = (np.abs(second) <= FULL_TURN) | no_second
+        table.must_be(phase, allowed, "a phase from -360 to 360 degrees")
+        return polar(first, np.where(blank, 0.0, second))
     value = np.empty(len(table), dtype=complex)
     value.real, value.imag = first, second
-    value[blank[0]] = complex(np.nan, np.nan)
+    value[blank] = complex(np.nan, np.nan)
     return value
 
 
-def _is_blank(table: Table, stem: str, index: int) -> bool:
-    return stem in table and table.fields[stem].cells[index] == ""
-
-
-def _complain_about_missing(
-    table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None], problems: Problems
-) -> None:
-    absent = [name for name in model.outputs if not _mentioned(table, name)]
+def _complain_about_missing(table: Table, model: HarmonicModel, read: dict[str, ComplexArray | None]) -> None:
+    parts = ("amplitude", "phase", "re", "im")
+    absent = [name for name in model.outputs if not any(f"{name}_{part}" in table for part in parts)]
     if len(absent) == len(model.outputs):
         forms = listing(
             [f"{name}_amplitude and {name}_phase_deg, or {name}_re and {name}_im" for name in absent]
         )
-        problems.add(table.source, table.header_row, None, None, f"measured amplitudes: columns {forms}")
-    elif absent and not len(problems):
-        import warnings
-
+        table.in_header(None, f"measured amplitudes: columns {forms}")
+    elif absent and not len(table.problems):
         lost = listing(absent, "and")
         message = f"{table.source}: the table has no {lost}: eliminated from the equations, or predicted"
         warnings.warn(message, TableWarning, stacklevel=3)
     for name, values in read.items():
-        if values is not None and np.isnan(values).all() and not len(problems):
+        if values is not None and np.isnan(values).all() and not len(table.problems):
             column = next(f.name for stem, f in table.fields.items() if stem.startswith(f"{name}_"))
-            problems.add(table.source, None, column, None, "a number in at least one row, or no such column")
+            table.as_whole(column, "a number in at least one row, or no such column")
 
 
-def _mentioned(table: Table, name: str) -> bool:
-    return any(f"{name}_{part}" in table for part in ("amplitude", "phase", "re", "im"))
-
-
-def _experiments(table: Table, problems: Problems) -> tuple[str, ...]:
+def _experiments(table: Table) -> tuple[str, ...]:
     if "experiment" not in table:
         return tuple(str(i + 1) for i in range(len(table)))
     names = table.texts("experiment")
     if "repeat" not in table:
-        first: dict[str, int] = {}
-        for i, name in enumerate(names):
-            if name and first.setdefault(name, i) != i:
-                expected = (
-                    f"another name than in row {table.rows[first[name]]}; "
-                    "repeated readings of one experiment need a column repeat"
-                )
-                table.complain(problems, i, "experiment", expected)
+        repeated = "another name than in row {}; repeated readings of one experiment need a column repeat"
+        table.once("experiment", names, repeated)
     return names
 
 
-def _free(
-    table: Table, model: HarmonicModel, signals: dict[str, ComplexArray], problems: Problems
-) -> BoolArray:
+def _free(table: Table, model: HarmonicModel, signals: dict[str, ComplexArray]) -> BoolArray:
     """Which rows are free vibrations; complaints about rows without a force that are none."""
     unforced = np.ones(len(table), dtype=bool)
     if model.has_constant_terms:
@@ -272,10 +231,10 @@ def _free(
         for i in np.flatnonzero(unforced & (np.abs(signals[name].imag) > 0)):
             stem = f"{name}_im" if f"{name}_im" in table else f"{name}_phase"
             if len(inputs) == len(model.inputs):
-                table.complain(problems, int(i), stem, f"0: nothing excites this row, and {_FREE}")
+                table.complain(i, stem, f"0: nothing excites this row, and {_FREE}")
                 continue
             lost = [name for name in model.inputs if name not in signals]
             expected = f"a column {lost[0]}_re or {lost[0]}_amplitude: nothing excites the rows, and {_FREE}"
-            problems.add(table.source, table.header_row, f"{lost[0]}_re", None, expected)
+            table.in_header(f"{lost[0]}_re", expected)
             return unforced
     return unforced

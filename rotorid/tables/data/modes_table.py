@@ -11,12 +11,13 @@ import numpy as np
 
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.tables.data.repeated_readings import FREQUENCIES
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, nearest, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, one_of, ratio
+from rotorid.tables.rotor.unbalance_table import node_at
 
 Node = int | str
 """The number of a node; without a rotor also any label."""
@@ -29,7 +30,6 @@ RECIPROCAL = 1e-3
 """So far, relative, the two entries of a pair of nodes may differ: rounding, not a contradiction."""
 LARGEST_PERCENT = 1000.0
 _SAME = 1e-9
-_MODE_FREQUENCIES = ("frequency", "speed")
 _SPEED = one_of(units.SPEED)
 _PERCENT = one_of({"percent": Unit("percent", "ratio", 1.0, 100.0)})
 
@@ -98,29 +98,30 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         With all problems of the file.
     """
     problems = Problems()
-    table = _table(path, "modes", MODE_COLUMNS, problems)
-    stem = _frequency_column(table, problems)
-    nodes = [_node(table, "node", i, rotor, problems) for i in range(len(table))]
+    table = problems.need(read_table(path, "modes", MODE_COLUMNS, problems, first=True))
+    expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm or speed_rpm"
+    stem = table.only(FREQUENCIES, "frequency_rad_s", expected)
+    nodes = [_node(table, "node", i, rotor) for i in range(len(table))]
     number = table.numbers("mode")
-    must_be(table, "mode", (number >= 1) & (number == np.floor(number)), "a mode number: 1, 2, …", problems)
+    numbered = (number >= 1) & (number == np.floor(number))
+    table.must_be("mode", numbered, "a mode number: 1, 2, …")
     for name in ("frequency_std", "shape_std"):
         stated = table.numbers(name)
         fits = (stated >= 0) & (stated <= LARGEST_PERCENT / 100)
-        must_be(table, name, fits, f"a standard deviation from 0 to {LARGEST_PERCENT:g} percent", problems)
+        table.must_be(name, fits, f"a standard deviation from 0 to {LARGEST_PERCENT:g} percent")
     rows: dict[int, list[int]] = {}
-    for place in np.flatnonzero((number >= 1) & (number == np.floor(number))):
-        rows.setdefault(int(number[place]), []).append(int(place))
-    complete = table.complete and sum(map(len, rows.values())) == len(table)
+    for place in np.flatnonzero(numbered).tolist():
+        rows.setdefault(int(number[place]), []).append(place)
+    complete = table.complete and bool(numbered.all())
     if stem is not None:
-        must_be(table, stem, table.numbers(stem) > 0, "a frequency above 0", problems)
-        _complain_about_order(table, stem, rows, problems, complete=complete)
-        _complain_about_changes(table, stem, "a frequency", rows, problems, complete=complete)
+        table.must_be(stem, table.numbers(stem) > 0, "a frequency above 0")
+        _complain_about_order(table, stem, rows, complete=complete)
+        _complain_about_changes(table, stem, "a frequency", rows, complete=complete)
     if "frequency_std" in table:
-        _complain_about_changes(
-            table, "frequency_std", "a standard deviation", rows, problems, complete=complete
-        )
-    known = tuple(dict.fromkeys(node for node in nodes if node is not None))
-    places = _places(table, nodes, known, rows, problems, complete=complete)
+        _complain_about_changes(table, "frequency_std", "a standard deviation", rows, complete=complete)
+    known = _different(nodes)
+    places = _places(table, nodes, rows, complete=complete)
+    stem = problems.need(stem)
     problems.stop()
     ordered = sorted(rows)
     first = [rows[mode][0] for mode in ordered]
@@ -129,9 +130,8 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     for mode, still, i in zip(ordered, ~shapes.any(axis=0), first, strict=True):
         if still:
             expected = f"a shape that is not 0 at every node, as that of mode {mode} is"
-            table.complain(problems, i, "shape", expected)
+            table.complain(i, "shape", expected)
     problems.stop()
-    assert stem is not None
     return MeasuredModes(
         nodes=known,
         frequencies=table.numbers(stem)[first],
@@ -169,27 +169,24 @@ def read_compliance(
         With all problems of the file.
     """
     problems = Problems()
-    table = _table(path, "compliance", COMPLIANCE_COLUMNS, problems)
-    pairs = [
-        (_node(table, "node", i, rotor, problems), _node(table, "force_node", i, rotor, problems))
-        for i in range(len(table))
-    ]
+    table = problems.need(read_table(path, "compliance", COMPLIANCE_COLUMNS, problems, first=True))
+    ends = ("node", "force_node")
+    pairs = [tuple(_node(table, stem, i, rotor) for stem in ends) for i in range(len(table))]
     values = table.numbers("compliance")
     own = np.array([a is not None and a == b for a, b in pairs], dtype=bool)
     expected = "a number above 0: a node moves in the direction of a force on it"
-    must_be(table, "compliance", ~own | (values > 0), expected, problems)
-    found = nodes if nodes is not None else [a for a, _ in pairs] + [b for _, b in pairs]
-    known = tuple(dict.fromkeys(node for node in found if node is not None))
+    table.must_be("compliance", ~own | (values > 0), expected)
+    known = _different(nodes if nodes is not None else [a for a, _ in pairs] + [b for _, b in pairs])
     first: dict[tuple[Node, Node], int] = {}
     for i, (a, b) in enumerate(pairs):
         if a is None or b is None:
             continue
         for stem, node in (("node", a), ("force_node", b)):
             if node not in known:
-                table.complain(problems, i, stem, f"one of the nodes {listing(map(str, known))}")
-        if first.setdefault((a, b), i) != i:
-            same = table.rows[first[a, b]]
-            table.complain(problems, i, "force_node", f"another pair of nodes than in row {same}")
+                table.complain(i, stem, f"one of the nodes {listing(map(str, known))}")
+        first.setdefault((a, b), i)
+    given = [None if None in pair else pair for pair in pairs]
+    table.once("force_node", given, "another pair of nodes than in row {}")
     for (a, b), i in first.items():
         j = first.get((b, a), i)
         if j < i and abs(values[i] - values[j]) > RECIPROCAL * max(abs(values[i]), abs(values[j])):
@@ -197,65 +194,40 @@ def read_compliance(
                 f"{table.shown('compliance', j)} to {100 * RECIPROCAL:g} %, as in row {table.rows[j]}: "
                 f"a force at node {a} moves node {b} as much as a force at node {b} moves node {a}"
             )
-            table.complain(problems, i, "compliance", expected)
+            table.complain(i, "compliance", expected)
     if table.complete:
-        _complain_about_missing_pairs(table, known, first, problems)
+        _complain_about_missing_pairs(table, known, first)
     problems.stop()
     alpha = np.empty((len(known), len(known)))
     for p, a in enumerate(known):
         for q, b in enumerate(known[: p + 1]):
             both = [values[first[pair]] for pair in ((a, b), (b, a)) if pair in first]
             alpha[p, q] = alpha[q, p] = np.mean(both)
-    _complain_about_indefinite(table, known, alpha, problems)
+    _complain_about_indefinite(table, known, alpha)
     problems.stop()
     return known, alpha
 
 
-def _table(path: str | Path, sheet: str, columns: Sequence[Column], problems: Problems) -> Table:
-    table = read_table(path, sheet, columns, problems, first=True)
-    if table is None:
-        problems.stop()
-        raise AssertionError("no table and no problem")
-    return table
-
-
-def _frequency_column(table: Table, problems: Problems) -> str | None:
-    present = [stem for stem in _MODE_FREQUENCIES if stem in table]
-    if len(present) == 1:
-        return present[0]
-    # A misspelt column has been reported, with a suggestion: that is enough.
-    near = {(nearest(str(p.column), MODE_COLUMNS) or "").split("_")[0] for p in problems.of(table.source)}
-    if present or not near & set(_MODE_FREQUENCIES):
-        name = table.fields[present[1]].name if present else "frequency_rad_s"
-        expected = "one column frequency_rad_s, frequency_Hz, frequency_rpm or speed_rpm"
-        problems.add(table.source, table.header_row, name, None, expected)
-    return None
-
-
-def _node(table: Table, stem: str, index: int, rotor: Rotor | None, problems: Problems) -> Node | None:
+def _node(table: Table, stem: str, index: int, rotor: Rotor | None) -> Node | None:
     """A node: its number, or a label that is none; None where the cell is no node (and has been reported)."""
+    if rotor is not None:
+        return node_at(table, stem, index, rotor)
     name = table.texts(stem)[index]
-    if not name:
-        return None
-    if rotor is None:
-        return int(name) if name.isascii() and name.isdecimal() else name
-    try:
-        return rotor.node(name)
-    except ValueError:
-        expected = f"a node from 1 to {rotor.n_nodes} or a station{did_you_mean(name, rotor.stations)}"
-        table.complain(problems, index, stem, expected)
-        return None
+    return int(name) if name.isascii() and name.isdecimal() else name or None
 
 
-def _complain_about_order(
-    table: Table, stem: str, rows: dict[int, list[int]], problems: Problems, *, complete: bool
-) -> None:
+def _different(nodes: Sequence[Node | None]) -> tuple[Node, ...]:
+    """Each node once, in the order in which they come."""
+    return tuple(dict.fromkeys(node for node in nodes if node is not None))
+
+
+def _complain_about_order(table: Table, stem: str, rows: dict[int, list[int]], *, complete: bool) -> None:
     """Modes are numbered 1 … k in the order of their frequencies."""
     ordered = sorted(rows)
     lost = [mode for mode in range(1, min(ordered[-1], 1000) + 1) if mode not in rows] if ordered else []
     if lost and complete:
         expected = f"modes numbered from 1 without a gap; there is no mode {listing(map(str, lost))}"
-        table.complain(problems, rows[next(mode for mode in ordered if mode > lost[0])][0], "mode", expected)
+        table.complain(rows[next(mode for mode in ordered if mode > lost[0])][0], "mode", expected)
     omega = table.numbers(stem)
     for low, high in pairwise(ordered):
         i, j = rows[low][0], rows[high][0]
@@ -264,66 +236,59 @@ def _complain_about_order(
                 f"a frequency above that of mode {low} ({table.shown(stem, i)} in row {table.rows[i]}): "
                 "modes are numbered from the lowest frequency"
             )
-            table.complain(problems, j, stem, expected)
+            table.complain(j, stem, expected)
 
 
 def _complain_about_changes(
-    table: Table, stem: str, what: str, rows: dict[int, list[int]], problems: Problems, *, complete: bool
+    table: Table, stem: str, what: str, rows: dict[int, list[int]], *, complete: bool
 ) -> None:
     """What belongs to a mode stands in its first row; further rows repeat it or are blank."""
-    values = table.numbers(stem)
+    values, blank = table.numbers(stem), table.is_blank(stem)
     for mode, (head, *others) in rows.items():
-        if table.fields[stem].cells[head] == "":
+        if blank[head]:
             if complete:
-                table.complain(problems, head, stem, f"{what} in the first row of mode {mode}")
+                table.complain(head, stem, f"{what} in the first row of mode {mode}")
             continue
         for i in others:
             if abs(values[i] - values[head]) > _SAME * abs(values[head]):
                 shown, row = table.shown(stem, head), table.rows[head]
-                table.complain(problems, i, stem, f"{shown} as in row {row}, the same mode, or a blank")
+                table.complain(i, stem, f"{shown} as in row {row}, the same mode, or a blank")
 
 
 def _places(
-    table: Table,
-    nodes: Sequence[Node | None],
-    known: tuple[Node, ...],
-    rows: dict[int, list[int]],
-    problems: Problems,
-    *,
-    complete: bool,
+    table: Table, nodes: Sequence[Node | None], rows: dict[int, list[int]], *, complete: bool
 ) -> dict[int, dict[Node, int]]:
     """The row of each node of each mode; complaints about nodes that a mode has twice or not at all."""
-    place: dict[int, dict[Node, int]] = {}
-    for mode, members in rows.items():
-        mine = place[mode] = {}
-        for i in members:
-            node = nodes[i]
-            if node is not None and mine.setdefault(node, i) != i:
-                expected = f"another node than in row {table.rows[mine[node]]}: each stands once in a mode"
-                table.complain(problems, i, "node", expected)
+    mode_of = {i: mode for mode, members in rows.items() for i in members}
+    stands = [
+        None if node is None or i not in mode_of else (mode_of[i], node) for i, node in enumerate(nodes)
+    ]
+    table.once("node", stands, "another node than in row {}: each stands once in a mode")
+    place: dict[int, dict[Node, int]] = {mode: {} for mode in rows}
+    for i, stand in enumerate(stands):
+        if stand is not None:
+            place[stand[0]][stand[1]] = i
     if not complete or None in nodes:
         return place
     for mode, mine in place.items():
-        lost = [str(node) for node in known if node not in mine]
+        lost = [str(node) for node in _different(nodes) if node not in mine]
         if lost:
             expected = f"mode {mode} at node {listing(lost, 'and')} too: every mode needs the same nodes"
-            problems.add(table.source, table.rows[rows[mode][-1]], "node", None, expected)
+            table.problems.add(table.source, table.rows[rows[mode][-1]], "node", None, expected)
     return place
 
 
 def _complain_about_missing_pairs(
-    table: Table, known: tuple[Node, ...], first: dict[tuple[Node, Node], int], problems: Problems
+    table: Table, known: tuple[Node, ...], first: dict[tuple[Node, Node], int]
 ) -> None:
     pairs = [(a, b) for p, a in enumerate(known) for b in known[p:]]
     lost = [f"{a} with {b}" for a, b in pairs if (a, b) not in first and (b, a) not in first]
-    if lost and not len(problems):
+    if lost and not len(table.problems):
         expected = f"a row for every pair of nodes; missing: {listing(lost, 'and')}"
-        problems.add(table.source, None, table.fields["compliance"].name, None, expected)
+        table.as_whole(table.fields["compliance"].name, expected)
 
 
-def _complain_about_indefinite(
-    table: Table, known: tuple[Node, ...], alpha: FloatArray, problems: Problems
-) -> None:
+def _complain_about_indefinite(table: Table, known: tuple[Node, ...], alpha: FloatArray) -> None:
     """Every set of forces works on a shaft on springs: its compliance is positive definite."""
     size = np.sqrt(np.diag(alpha))
     scaled = alpha / np.outer(size, size)
@@ -343,4 +308,4 @@ def _complain_about_indefinite(
     else:
         involved = [str(node) for node, x in zip(known, vectors[:, 0], strict=True) if abs(x) > 0.1]
         expected += f". Check those between nodes {listing(involved, 'and')}"
-    problems.add(table.source, None, table.fields["compliance"].name, None, expected)
+    table.as_whole(table.fields["compliance"].name, expected)

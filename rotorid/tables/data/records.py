@@ -76,18 +76,14 @@ def read_record(
     from rotorid.timedomain.models.record import Record
 
     problems = Problems()
-    grid = read_grid(Path(path), "record", problems, first=True)
-    table = None
-    if grid is not None:
-        _explain_states(grid, model, problems)
-        grid = _blank(grid, (*model.outputs, *_deviations(model).values())) if allow_missing else grid
-        table = make_table(grid, _columns(model, allow_missing=allow_missing), problems)
-    if table is None:
-        problems.stop()
-        raise AssertionError("no table and no problem")
-    _complain_about_times(table, problems)
-    _complain_about_outputs(table, model, problems, allow_missing=allow_missing)
-    _complain_about_deviations(table, model, problems, stated=sigma is not None)
+    grid = problems.need(read_grid(Path(path), "record", problems, first=True))
+    _explain_states(grid, model, problems)
+    if allow_missing:
+        grid = _blank(grid, (*model.outputs, *_deviations(model).values()))
+    table = problems.need(make_table(grid, _columns(model, allow_missing=allow_missing), problems))
+    _complain_about_times(table)
+    _complain_about_outputs(table, model, allow_missing=allow_missing)
+    _complain_about_deviations(table, model, stated=sigma is not None)
     problems.stop()
     t = table.numbers("t")
     if not allow_missing:
@@ -156,43 +152,38 @@ def _blank(grid: Grid, columns: tuple[str, ...]) -> Grid:
     return replace(grid, rows=tuple((number, emptied(cells)) for number, cells in grid.rows))
 
 
-def _complain_about_times(table: Table, problems: Problems) -> None:
+def _complain_about_times(table: Table) -> None:
     t = table.numbers("t")
     for i in np.flatnonzero(np.diff(t) <= 0) + 1:
-        before, row = table.shown("t", int(i) - 1), table.rows[i - 1]
+        before, row = table.shown("t", i - 1), table.rows[i - 1]
         if t[i] == t[i - 1]:
             expected = f"each time once, and row {row} has it too; repeated runs are records of their own"
         else:
             expected = f"times that increase, and row {row} has {before}; sort the rows by time"
-        table.complain(problems, int(i), "t", expected)
+        table.complain(i, "t", expected)
 
 
-def _complain_about_outputs(
-    table: Table, model: OdeModel, problems: Problems, *, allow_missing: bool
-) -> None:
+def _complain_about_outputs(table: Table, model: OdeModel, *, allow_missing: bool) -> None:
     names = [name for name in model.outputs if name in table]
-    if not names and not len(problems):
+    if not names and not len(table.problems):
         expected = f"a column for at least one output of the model: {listing(model.outputs)}"
-        problems.add(table.source, table.header_row, None, None, expected)
+        table.in_header(None, expected)
     for name in names:
-        blank = np.array([cell == "" for cell in table.fields[name].cells])
-        if allow_missing:
-            if blank.all():
-                expected = "a number in at least one row, or no such column"
-                problems.add(table.source, None, name, None, expected)
-            continue
-        for i in np.flatnonzero(blank):
-            table.complain(problems, int(i), name, "a number (--allow-missing: blanks were not measured)")
+        blank = table.is_blank(name)
+        if not allow_missing:
+            table.complain_where(blank, name, "a number (--allow-missing: blanks were not measured)")
+        elif blank.all():
+            table.as_whole(name, "a number in at least one row, or no such column")
 
 
-def _complain_about_deviations(table: Table, model: OdeModel, problems: Problems, *, stated: bool) -> None:
+def _complain_about_deviations(table: Table, model: OdeModel, *, stated: bool) -> None:
     """Standard deviations of all outputs or of none, above 0 wherever something was measured."""
-    clear = not len(problems)  # otherwise a misspelt column would be called missing
+    clear = not len(table.problems)  # otherwise a misspelt column would be called missing
     columns = _deviations(model)
     found = [column for column in columns.values() if column in table]
     if found and stated:
         expected = "no such column together with --sigma: leave out one of the two"
-        problems.add(table.source, table.header_row, found[0], None, expected)
+        table.in_header(found[0], expected)
         return
     for name in model.outputs if found else ():
         column = columns.get(name, name + STD)
@@ -201,21 +192,16 @@ def _complain_about_deviations(table: Table, model: OdeModel, problems: Problems
                 expected = (
                     f"such a column, as {found[0]} is there: standard deviations of all outputs or none"
                 )
-                problems.add(table.source, table.header_row, column, None, expected)
+                table.in_header(column, expected)
             continue
         if name not in table:
             expected = f"a column {name} beside it, whose standard deviations these are"
-            problems.add(table.source, table.header_row, column, None, expected)
+            table.in_header(column, expected)
             continue
-        _complain_about_sizes(table, name, column, problems)
-
-
-def _complain_about_sizes(table: Table, name: str, column: str, problems: Problems) -> None:
-    sizes, blank = table.numbers(column), np.array([cell == "" for cell in table.fields[column].cells])
-    unreadable = np.isnan(sizes) & ~blank  # has been reported
-    for i in np.flatnonzero(~np.isnan(table.numbers(name)) & ~(sizes > 0) & ~unreadable):
-        expected = f"a standard deviation above 0 wherever {name} was measured"
-        table.complain(problems, int(i), column, expected)
+        sizes = table.numbers(column)
+        unreadable = np.isnan(sizes) & ~table.is_blank(column)  # has been reported
+        wrong = ~np.isnan(table.numbers(name)) & ~(sizes > 0) & ~unreadable
+        table.complain_where(wrong, column, f"a standard deviation above 0 wherever {name} was measured")
 
 
 def _warn_of_gaps(table: Table) -> None:

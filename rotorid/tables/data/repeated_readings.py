@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
-from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.problems import TableWarning
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
@@ -23,15 +23,7 @@ ENOUGH_REPEATS = 10
 """With fewer repeated readings (beyond the first of each) their scatter is a poor measure of the errors."""
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Rows that are readings of one experiment."""
-
-    name: str
-    rows: list[int]
-
-
-def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel, problems: Problems) -> Experiments:
+def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel) -> Experiments:
     """Repeated readings become their mean; without stated errors their scatter gives the errors.
 
     Parameters
@@ -42,24 +34,27 @@ def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel, problem
         One experiment per row of the table.
     model
         Knows inputs and outputs.
-    problems
-        Collects the complaints.
 
     Returns
     -------
     Experiments
         One per group of repeats, with the covariance of each mean.
+
+    Raises
+    ------
+    InputError
+        Where rows of one experiment differ in more than what was read.
     """
-    groups = _groups(table, rows, model, problems)
-    problems.stop()
-    members = [group.rows for group in groups]
+    members = _groups(table, rows, model)
+    table.problems.stop()
+    own = "experiment" in table
     signals = {}
     for name, z in rows.signals.items():
         means = [z[m][~np.isnan(z[m])] for m in members]
         signals[name] = np.array([np.mean(m) if len(m) else complex(np.nan, np.nan) for m in means])
     merged = replace(
         rows,
-        names=tuple(group.name for group in groups),
+        names=tuple(rows.names[m[0]] if own else str(number) for number, m in enumerate(members, start=1)),
         frequencies=np.array([rows.frequencies[m].mean() for m in members]),
         signals=signals,
         free=np.array([rows.free[m].all() for m in members]),
@@ -76,7 +71,8 @@ def merge_repeats(table: Table, rows: Experiments, model: HarmonicModel, problem
     return replace(merged, errors=rows.errors, covariances=covariances)
 
 
-def _groups(table: Table, rows: Experiments, model: HarmonicModel, problems: Problems) -> list[_Group]:
+def _groups(table: Table, rows: Experiments, model: HarmonicModel) -> list[list[int]]:
+    """Rows that are readings of one experiment."""
     named = "experiment" in table
     found: dict[tuple[object, ...], list[int]] = defaultdict(list)
     for i, name in enumerate(rows.names):
@@ -85,37 +81,30 @@ def _groups(table: Table, rows: Experiments, model: HarmonicModel, problems: Pro
         key = (name,) if named else (float(rows.frequencies[i]), *map(str, excitation))
         found[key].append(i)
     labels = table.texts("repeat")
+    of_row = {i: key for key, group in found.items() for i in group}
+    readings = [(of_row[i], label) if label else None for i, label in enumerate(labels)]
+    table.once("repeat", readings, "another repeat than in row {}, the same reading")
     for group in found.values():
-        first: dict[str, int] = {}
-        for i in group:
-            if labels[i] and first.setdefault(labels[i], i) != i:
-                same = table.rows[first[labels[i]]]
-                table.complain(problems, i, "repeat", f"another repeat than in row {same}, the same reading")
-        _complain_about_changes(table, rows, group, model, problems)
-    return [
-        _Group(rows.names[group[0]] if named else str(number), group)
-        for number, group in enumerate(found.values(), start=1)
-    ]
+        _complain_about_changes(table, rows, group, model)
+    return list(found.values())
 
 
-def _complain_about_changes(
-    table: Table, rows: Experiments, group: list[int], model: HarmonicModel, problems: Problems
-) -> None:
+def _complain_about_changes(table: Table, rows: Experiments, group: list[int], model: HarmonicModel) -> None:
     head = group[0]
     stem = next(stem for stem in FREQUENCIES if stem in table)
     for i in group[1:]:
         if abs(rows.frequencies[i] - rows.frequencies[head]) > 1e-9 * rows.frequencies[head]:
             expected = f"the frequency of row {table.rows[head]}, the same experiment"
-            table.complain(problems, i, stem, expected)
+            table.complain(i, stem, expected)
         for name, values in rows.varying.items():
             if values[i] != values[head]:
-                table.complain(problems, i, name, f"the value of row {table.rows[head]}, the same experiment")
+                table.complain(i, name, f"the value of row {table.rows[head]}, the same experiment")
         for name in model.inputs:
             a, b = rows.signals[name][head], rows.signals[name][i]
             column = next((f"{name}_{p}" for p in ("amplitude", "re") if f"{name}_{p}" in table), None)
             if column is not None and not (a == b or (np.isnan(a) and np.isnan(b))):
                 expected = f"the excitation of row {table.rows[head]}: repeats have the same"
-                table.complain(problems, i, column, expected)
+                table.complain(i, column, expected)
 
 
 def _scatter(

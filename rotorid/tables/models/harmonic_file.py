@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.expressions import ExpressionError, is_name, parse_equation
+from rotorid.expressions import ExpressionError, parse_equation
 from rotorid.tables.models.ode_file import read_time_form
-from rotorid.tables.models.shared_keys import pair, read_errors
+from rotorid.tables.models.shared_keys import (
+    BOUNDS,
+    NAMES,
+    NUMBERS,
+    STATED_ERRORS,
+    is_missing,
+    limits,
+    names_in,
+    unlike,
+    unlike_a_name,
+)
 from rotorid.tables.reader.problems import Problems, TableWarning
+from rotorid.tables.reader.settings_keys import Key, Kind, take
 from rotorid.tables.reader.toml_file import Section, read_toml
 
 if TYPE_CHECKING:
@@ -92,45 +102,45 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     """
     path = Path(path)
     problems = Problems()
-    data = read_toml(path, problems)
-    if data is None:
-        problems.stop()
-        raise AssertionError("no file and no problem")
-    section = Section(str(path), data, problems)
+    section = Section(str(path), problems.need(read_toml(path, problems)), problems)
     section.limit_names()
     problems.stop()
     if "equations" not in section and any(key in section for key in _IN_TIME):
         return _from_time(section, path, problems)
-    equations = _equations(section)
-    estimate = _names(section, "estimate", 'such as estimate = ["c", "b"]', required=True)
-    inputs = _names(section, "inputs", 'such as inputs = ["F"]', required=False)
-    varying = _names(section, "varying", 'such as varying = ["Omega"]', required=False)
-    known = _numbers(section, "known")
+    said = take(section, HARMONIC)
+    if is_missing(said, "equations"):
+        section.missing("equations", f"a list of equations, equations = [{_EXAMPLE}]")
+    if is_missing(said, "estimate"):
+        section.missing("estimate", f"a list of names, {_SUCH_AS['estimate']}")
+    estimate = said["estimate"]
+    known = _numbers(said["known"], None)
     for name in estimate or ():
         if name in known:
             section.complain("estimate", f"{name} either here or under known, not both")
-    bounds = _bounds(section, estimate)
-    start = _numbers(section, "start", estimate)
+    table = said["bounds"]
+    given = {name: limits(table, name) for name in _own_names(table, estimate)}
+    bounds = {name: found for name, found in given.items() if found is not None}
+    start = _numbers(said["start"], estimate)
     for name, value in start.items():
         low, high = bounds.get(name, (-math.inf, math.inf))
         if not low <= value <= high:
             section.complain("start", f"{name} within its bounds, {low:g} to {high:g}")
-    errors = read_errors(section)
-    section.finish()
-    model = None
-    if not len(problems) and equations is not None and estimate is not None:
-        from rotorid.harmonic.operator_equations import harmonic_model
-
-        try:
-            model = harmonic_model(
-                equations, known=known, estimate=estimate, inputs=inputs, varying=varying or ()
-            )
-        except ValueError as error:
-            section.complain("equations", f"a usable model: {error}", value=False)
     problems.stop()
-    if model is None:
-        raise AssertionError("no model and no problem")
-    return HarmonicFile(model, bounds, start, errors, path)
+    from rotorid.harmonic.operator_equations import harmonic_model
+
+    try:
+        model = harmonic_model(
+            said["equations"],
+            known=known,
+            estimate=estimate,
+            inputs=said["inputs"],
+            varying=said["varying"] or (),
+        )
+    except ValueError as error:
+        section.complain("equations", f"a usable model: {error}", value=False)
+        problems.stop()
+        raise
+    return HarmonicFile(model, bounds, start, said["errors"], path)
 
 
 def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile:
@@ -142,7 +152,6 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
     from rotorid.harmonic.operator_equations import harmonic_model
     from rotorid.harmonic.unmeasured_amplitudes import without
 
-    model = None
     try:
         operators = operator_form(form)
         start = dict(operators.estimate)
@@ -160,9 +169,8 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
             )
     except ValueError as error:
         problems.add(str(path), None, None, None, f"a linear model of amplitudes: {error}")
-    problems.stop()
-    if model is None:
-        raise AssertionError("no model and no problem")
+        problems.stop()
+        raise
     if operators.left_out:
         lost = listing(operators.left_out, "and")
         stand = "stands" if len(operators.left_out) == 1 else "stand"
@@ -172,94 +180,67 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
     return HarmonicFile(model, bounds, start, form.errors, path)
 
 
-def _equations(section: Section) -> list[str] | None:
-    value = section.take("equations")
-    if value is None:
-        if not any(did_you_mean(key, ["equations"]) for key in section.keys):
-            section.missing("equations", f"a list of equations, equations = [{_EXAMPLE}]")
-        return None
+def _equations(section: Section, key: str) -> list[str] | None:
+    value = section.take(key)
     if not isinstance(value, list) or not value:
-        section.complain("equations", f"a list of texts, equations = [{_EXAMPLE}]")
+        section.complain(key, f"a list of texts, equations = [{_EXAMPLE}]")
         return None
-    good = True
     for number, text in enumerate(value, start=1):
         if not isinstance(text, str):
-            section.complain("equations", f"a text in quotes as equation {number}, not {text!r}", value=False)
-            good = False
+            section.complain(key, f"a text in quotes as equation {number}, not {text!r}", value=False)
             continue
         try:
             parse_equation(text, where=f"equation {number}")
         except ExpressionError as error:
-            section.complain("equations", f"an equation that can be read: {error}", value=False)
-            good = False
-    return list(value) if good else None
+            section.complain(key, f"an equation that can be read: {error}", value=False)
+    return None if key in section.refused else value
 
 
-def _names(section: Section, key: str, example: str, *, required: bool) -> list[str] | None:
+def _names(section: Section, key: str) -> list[str] | None:
     value = section.take(key)
-    if value is None:
-        if required and not any(did_you_mean(other, [key]) for other in section.keys):
-            section.missing(key, f"a list of names, {example}")
-        return None
-    if not isinstance(value, list) or (required and not value):
+    if not isinstance(value, list) or (key == "estimate" and not value):
         more = "; starting values go into [start]" if isinstance(value, dict) and key == "estimate" else ""
-        section.complain(key, f"a list of names, {example}{more}")
+        section.complain(key, f"a list of names, {_SUCH_AS[key]}{more}")
         return None
-    good = True
     for item in value:
-        if not isinstance(item, str) or not is_name(item) or item == "p":
-            section.complain(key, f"{_what_a_name_is()}; {item!r} is none", value=False)
-            good = False
+        if wrong := unlike_a_name(item, "p"):
+            section.complain(key, f"{wrong}; {item!r} is none", value=False)
     repeated = next((item for i, item in enumerate(value) if item in value[:i]), None)
-    if good and repeated is not None:
+    if key not in section.refused and repeated is not None:
         section.complain(key, f"every name once, not {repeated} twice", value=False)
-        good = False
-    return list(value) if good else None
+    return None if key in section.refused else value
 
 
-def _what_a_name_is() -> str:
-    return "names: a letter, then letters, digits and _; not p and no function"
-
-
-def _numbers(section: Section, key: str, allowed: list[str] | None = None) -> dict[str, float]:
+def _numbers(section: Section | None, allowed: list[str] | None) -> dict[str, float]:
     """A table of numbers; of allowed names only, where they are given."""
-    inner = section.section(key)
-    found: dict[str, float] = {}
-    if inner is None:
-        return found
-    for name in inner.keys:
-        if _refused(inner, name, allowed):
-            continue
-        value = inner.number(name)
-        if value is not None:
-            found[name] = value
-    return found
+    values = {name: section.number(name) for name in _own_names(section, allowed)} if section else {}
+    return {name: value for name, value in values.items() if value is not None}
 
 
-def _bounds(section: Section, allowed: list[str] | None) -> dict[str, tuple[float, float]]:
-    inner = section.section("bounds")
-    found: dict[str, tuple[float, float]] = {}
-    if inner is None:
-        return found
-    for name in inner.keys:
-        if _refused(inner, name, allowed):
-            continue
-        limits = pair(inner.take(name))
-        if limits is None:
-            inner.complain(name, "two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
-        else:
-            found[name] = limits
-    return found
+def _own_names(section: Section | None, allowed: list[str] | None) -> Iterator[str]:
+    if allowed is None:
+        return names_in(section, lambda name: unlike_a_name(name, "p"))
+    return names_in(section, lambda name: unlike(name, allowed, "estimate"))
 
 
-def _refused(inner: Section, name: str, allowed: list[str] | None) -> bool:
-    """Complain about a key that is no name, or none of those allowed."""
-    if allowed is not None and name not in allowed:
-        inner.take(name)
-        inner.complain(name, f"a name of estimate{did_you_mean(name, allowed)}", value=False)
-        return True
-    if not is_name(name) or name == "p":
-        inner.take(name)
-        inner.complain(name, _what_a_name_is(), value=False)
-        return True
-    return False
+_LIST = Kind(_names, NAMES)
+_SUCH_AS = {
+    "estimate": 'such as estimate = ["c", "b"]',
+    "inputs": 'such as inputs = ["F"]',
+    "varying": 'such as varying = ["Omega"]',
+}
+HARMONIC = (
+    Key("equations", Kind(_equations, NAMES, example=_EXAMPLE), "texts with `=`"),
+    Key("estimate", _LIST, "names"),
+    Key("inputs", _LIST, "amplitudes that excite; without it those that stand only on right sides"),
+    Key(
+        "varying",
+        _LIST,
+        "known quantities that change from row to row, such as a speed; without it names that stand only as "
+        "factors of an amplitude",
+    ),
+    Key("known", NUMBERS, "names with their numbers"),
+    BOUNDS,
+    Key("start", NUMBERS, "guesses, for output error, `--design`, and models with several solutions"),
+    STATED_ERRORS,
+)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rotorid.expressions import is_name
+from rotorid.tables.reader.settings_keys import Key, Kind, Said
 from rotorid.tables.reader.toml_file import Section
 
 Matrix = list[list[float | str]]
@@ -33,21 +34,51 @@ class Matrices:
         return {name: "0" for y in self.coordinates for name in (y, f"v_{y}")}
 
 
-def read_matrices(section: Section) -> Matrices | None:
-    """`M`, `C`, `K` and `coordinates`; None where the file has none of them."""
-    if not any(key in section for key in ("M", "C", "K")):
+def _matrix(section: Section, key: str) -> Matrix | None:
+    value = section.take(key)
+    rows = value if isinstance(value, list) else []
+    good = bool(rows) and all(isinstance(row, list) and len(row) == len(rows) for row in rows)
+    if not good or not all(_entry(x) for row in rows for x in row):
+        section.complain(
+            key, f"a square matrix of numbers and expressions in quotes, such as {_example(key)}"
+        )
         return None
-    if "states" in section:
-        section.take("states")
-        section.complain("states", "either [states] or M, C and K, not both", value=False)
-    mass, stiffness = (_matrix(section, key, None) for key in ("M", "K"))
+    return [[x if isinstance(x, str) else float(x) for x in row] for row in rows]
+
+
+def _example(key: str) -> str:
+    return f'{key} = [["a", 0], [0, 2.5]]'
+
+
+def _needed(key: str) -> str:
+    return f"a square matrix, such as {_example(key)}, above the first [table]"
+
+
+_ROW = {"type": "array", "items": {"type": ["number", "string"]}}
+_MATRIX = Kind(_matrix, {"type": "array", "items": _ROW, "minItems": 1})
+_NAMES = Kind(lambda section, key: section.take(key), {"type": "array", "items": {"type": "string"}})
+MATRICES = (
+    Key("M", _MATRIX, "matrix of M y'' + C y' + K y = f: numbers and expressions", required=_needed("M")),
+    Key("K", _MATRIX, "likewise", required=_needed("K")),
+    Key("C", _MATRIX, "likewise; it may be absent"),
+    Key("coordinates", _NAMES, "names of y; `y1`, `y2`, … by default. The velocity of `y1` is `v_y1`"),
+)
+
+
+def has_matrices(section: Section) -> bool:
+    """Whether a file has any of M, C and K."""
+    return any(key in section for key in ("M", "C", "K"))
+
+
+def matrices_of(said: Said) -> Matrices:
+    """`M`, `C`, `K` and `coordinates`, zeros for a matrix that is absent or unusable."""
+    section = said.section
+    mass, damping, stiffness = (said[key] for key in ("M", "C", "K"))
     n = len(mass or stiffness or ())
-    nothing: Matrix = [[0.0] * n for _ in range(n)]
-    damping = _matrix(section, "C", nothing)
     for key, matrix in (("C", damping), ("K", stiffness)):
         if mass and matrix and len(matrix) != len(mass):
             section.complain(key, f"{len(mass)} rows as in M", value=False)
-    names = section.take("coordinates")
+    names = said["coordinates"]
     usual = [f"y{i + 1}" for i in range(n)]
     if names is None:
         names = usual
@@ -58,22 +89,8 @@ def read_matrices(section: Section) -> Matrices | None:
     ):
         section.complain("coordinates", f"a list of {n} names, such as {usual}")
         names = usual
+    nothing: Matrix = [[0.0] * n for _ in range(n)]
     return Matrices(mass or nothing, damping or nothing, stiffness or nothing, tuple(names))
-
-
-def _matrix(section: Section, key: str, default: Matrix | None) -> Matrix | None:
-    value = section.take(key)
-    example = f'{key} = [["a", 0], [0, 2.5]]'
-    if value is None:
-        if default is None:
-            section.missing(key, f"a square matrix, such as {example}, above the first [table]")
-        return default
-    rows = value if isinstance(value, list) else []
-    good = bool(rows) and all(isinstance(row, list) and len(row) == len(rows) for row in rows)
-    if not good or not all(_entry(x) for row in rows for x in row):
-        section.complain(key, f"a square matrix of numbers and expressions in quotes, such as {example}")
-        return default
-    return [[x if isinstance(x, str) else float(x) for x in row] for row in rows]
 
 
 def _entry(value: object) -> bool:

@@ -46,11 +46,7 @@ def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> 
     """
     path = Path(path)
     problems = Problems()
-    data = read_toml(path, problems)
-    if data is None:
-        problems.stop()
-        raise AssertionError("no file and no problem")
-    section = Section(str(path), data, problems)
+    section = Section(str(path), problems.need(read_toml(path, problems)), problems)
     form = read_time_form(section, problems)
     problems.stop()
     constants = form.known | form.estimate | _values(form, values or {})
@@ -70,11 +66,10 @@ def read_motion(path: str | Path, values: Mapping[str, float] | None = None) -> 
                     f"force.{name}", f"no {used[0]} in it: what depends on motion into C or K", value=False
                 )
     problems.stop()
-    if form.matrices is None:
-        raise AssertionError("no matrices and no problem")
+    matrices = problems.need(form.matrices)
     from fem.matrices.equations_of_motion import Motion
 
-    return Motion(found["M"], found["C"], found["K"], form.matrices.coordinates, form.speed)
+    return Motion(**found, coordinates=matrices.coordinates, speed=form.speed)
 
 
 def _values(form: TimeForm, values: Mapping[str, float]) -> dict[str, float]:

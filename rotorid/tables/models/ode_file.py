@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,35 +9,28 @@ from typing import TYPE_CHECKING, Any
 from rotorid import expressions
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
-from rotorid.expressions import LARGEST, ExpressionError, is_name
-from rotorid.tables.models.matrix_form import Matrices, read_matrices
-from rotorid.tables.models.shared_keys import pair, read_errors
+from rotorid.expressions import LARGEST, ExpressionError
+from rotorid.tables.models.matrix_form import MATRICES, Matrices, has_matrices, matrices_of
+from rotorid.tables.models.shared_keys import (
+    BOUNDS,
+    NAMES,
+    NUMBERS,
+    STATED_ERRORS,
+    TEXTS,
+    is_missing,
+    limits,
+    names_in,
+    unlike,
+    unlike_a_name,
+)
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.value_kinds import FLAG, number, table
 
 if TYPE_CHECKING:
     from rotorid.harmonic.experiments import AmplitudeErrors
     from rotorid.timedomain.models.ode_model import OdeModel
-
-_KEYS = (
-    "M",
-    "C",
-    "K",
-    "coordinates",
-    "force",
-    "inputs",
-    "per_record",
-    "states",
-    "initial",
-    "outputs",
-    "estimate",
-    "known",
-    "bounds",
-    "errors",
-    "nuisance",
-    "speed_rad_s",
-)
-_A_NAME = "names: a letter, then letters, digits and _; not t and no function"
 
 
 @dataclass(frozen=True)
@@ -117,43 +109,35 @@ def read_ode_model(path: str | Path) -> OdeModel:
     """
     path = Path(path)
     problems = Problems()
-    data = read_toml(path, problems)
-    if data is None:
-        problems.stop()
-        raise AssertionError("no file and no problem")
-    section = Section(str(path), data, problems)
+    section = Section(str(path), problems.need(read_toml(path, problems)), problems)
     section.limit_names()
     problems.stop()
     form = read_time_form(section, problems)
-    model = None
-    if not len(problems):
-        from rotorid.timedomain.models.ode_model import ode_model
-        from rotorid.timedomain.models.second_order import second_order
-        from rotorid.timedomain.models.sensor_offset_drift import with_nuisance
-
-        names = form.states if form.matrices is None else form.matrices.coordinates
-        outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)
-        given: dict[str, Any] = {
-            "initial": form.initial,
-            "outputs": outputs if factors else form.outputs or None,
-            "estimate": form.estimate | dict.fromkeys(factors, 0.0),
-            "known": form.known,
-            "inputs": form.inputs,
-            "bounds": form.bounds,
-            "per_record": [*form.per_record, *factors],
-        }
-        try:
-            if form.matrices is None:
-                model = ode_model(form.states, **given)
-            else:
-                m = form.matrices
-                model = second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
-        except ValueError as error:
-            problems.add(str(path), None, None, None, f"a usable model: {error}")
     problems.stop()
-    if model is None:
-        raise AssertionError("no model and no problem")
-    return model
+    from rotorid.timedomain.models.ode_model import ode_model
+    from rotorid.timedomain.models.second_order import second_order
+    from rotorid.timedomain.models.sensor_offset_drift import with_nuisance
+
+    names = form.states if form.matrices is None else form.matrices.coordinates
+    outputs, factors = with_nuisance(form.outputs or {name: name for name in names}, *form.nuisance)
+    given: dict[str, Any] = {
+        "initial": form.initial,
+        "outputs": outputs if factors else form.outputs or None,
+        "estimate": form.estimate | dict.fromkeys(factors, 0.0),
+        "known": form.known,
+        "inputs": form.inputs,
+        "bounds": form.bounds,
+        "per_record": [*form.per_record, *factors],
+    }
+    try:
+        if form.matrices is None:
+            return ode_model(form.states, **given)
+        m = form.matrices
+        return second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
+    except ValueError as error:
+        problems.add(str(path), None, None, None, f"a usable model: {error}")
+        problems.stop()
+        raise
 
 
 def read_time_form(section: Section, problems: Problems, *, initial: bool = True) -> TimeForm:
@@ -168,30 +152,25 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     initial
         Whether every state of `[states]` needs its initial value.
     """
-    inputs = _names(
-        section,
-        "inputs",
-        'a list of names, such as inputs = ["u"], at the top of the file',
-        lambda item: "" if _usable(item) else _A_NAME,
-    )
-    known = _numbers(section, "known")
-    estimate = _numbers(section, "estimate")
-    others = [key for key in section.keys if key not in _KEYS]
-    if "estimate" not in section and not any(did_you_mean(key, ["estimate"]) for key in others):
+    in_matrices = has_matrices(section)
+    if in_matrices and "states" in section:
+        section.complain("states", "either [states] or M, C and K, not both", value=False)
+    said = take(section, TIME_MATRICES if in_matrices else TIME_STATES)
+    inputs, own = said["inputs"], said["per_record"]
+    known, estimate = _numbers(said["known"]), _numbers(said["estimate"])
+    if is_missing(said, "estimate"):
         section.missing(
             "estimate",
             "[estimate] with name = starting value for at least one parameter (an empty [estimate] where the "
             "model is only to be simulated)",
         )
-    own = _names(
-        section,
-        "per_record",
-        'a list of names of [estimate], such as per_record = ["x0"]',
-        lambda item: "" if item in estimate else f"names of [estimate]{did_you_mean(item, estimate)}",
-    )
-    matrices = read_matrices(section)
-    states = _texts(section, "states") if matrices is None else matrices.rates
-    outputs = _texts(section, "outputs")
+    for item in own:
+        if item not in estimate:
+            hint = did_you_mean(item, estimate)
+            section.complain("per_record", f"names of [estimate]{hint}; {item!r} is none", value=False)
+    matrices = matrices_of(said) if in_matrices else None
+    states = _texts(said["states"]) if matrices is None else matrices.rates
+    outputs = _texts(said["outputs"])
     if not states and not outputs and not len(problems):
         section.missing("states", '[states] with name = "rate of change", such as x = "-a*x", or [outputs]')
     _once(section, {"states": states, "estimate": estimate, "known": known, "inputs": inputs})
@@ -199,19 +178,14 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
     everything = ["t", *states, *constants, *inputs]
     _readable(section, "states", states, everything, problems)
     _readable(section, "outputs", outputs, everything, problems)
-    begin = _initial(section, states, constants, problems, complete=initial and matrices is None)
-    force = {} if matrices is None else _texts(section, "force")
+    begin = _initial(said, states, constants, problems, complete=initial and matrices is None)
+    force = {} if matrices is None else _texts(said["force"])
     _readable(section, "force", force, everything, problems)
     for name in force:
         if matrices is not None and name not in matrices.coordinates:
             hint = did_you_mean(name, matrices.coordinates)
             expected = f"a name of coordinates{hint}; they are {listing(matrices.coordinates, 'and')}"
             section.complain(f"force.{name}", expected, value=False)
-    bounds = _bounds(section, estimate)
-    errors = read_errors(section)
-    speed = section.number("speed_rad_s", 0.0, low=0.0) or 0.0
-    nuisance = _nuisance(section)
-    section.finish()
     return TimeForm(
         states=states,
         matrices=matrices,
@@ -221,74 +195,70 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
         estimate=estimate,
         known=known,
         inputs=inputs,
-        per_record=own,
-        bounds=bounds,
-        errors=errors,
-        speed=speed,
-        nuisance=nuisance,
+        per_record=[item for item in own if item in estimate],
+        bounds=_bounds(said["bounds"], estimate),
+        errors=said["errors"],
+        speed=said["speed_rad_s"],
+        nuisance=said["nuisance"],
     )
 
 
-def _entries(section: Section, table: str, *, named: bool = True) -> Iterator[tuple[Section, str]]:
-    """A table with each of its keys; with `named` those that are names, and a complaint of the others."""
-    inner = section.section(table)
-    if inner is None:
-        return
-    for key in inner.keys:
-        if not named or _usable(key):
-            yield inner, key
-        else:
-            inner.take(key)
-            inner.complain(key, _A_NAME, value=False)
-
-
-def _usable(name: str) -> bool:
-    return is_name(name) and name != "t"
-
-
-def _numbers(section: Section, table: str) -> dict[str, float]:
+def _numbers(section: Section | None) -> dict[str, float]:
     # zero stands for a value that has been complained about: its name stays known
-    return {name: inner.number(name, 0.0) or 0.0 for inner, name in _entries(section, table)}
+    return (
+        {
+            name: section.number(name, 0.0) or 0.0
+            for name in names_in(section, lambda name: unlike_a_name(name, "t"))
+        }
+        if section
+        else {}
+    )
 
 
-def _texts(section: Section, table: str) -> dict[str, str]:
+def _texts(section: Section | None) -> dict[str, str]:
     """Expressions by name; a plain number is one, too."""
     found: dict[str, str] = {}
-    for inner, name in _entries(section, table):
-        value = inner.take(name)
+    if section is None:
+        return found
+    for name in names_in(section, lambda name: unlike_a_name(name, "t")):
+        value = section.take(name)
         if isinstance(value, str) and value.strip():
             found[name] = value
         elif _is_number(value):
             found[name] = repr(float(value))
         else:
-            inner.complain(name, 'an expression in quotes, such as "-a*x"')
+            section.complain(name, 'an expression in quotes, such as "-a*x"')
             found[name] = "0"
     return found
 
 
-def _names(section: Section, key: str, expected: str, wrong: Callable[[str], str]) -> list[str]:
-    """A list of names; `wrong` says what is expected instead of one, or nothing."""
+def _list(section: Section, key: str) -> list[str] | None:
     value = section.take(key)
-    if value is None:
-        return []
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        section.complain(key, expected)
-        return []
-    for item in value:
-        if words := wrong(item):
-            section.complain(key, f"{words}; {item!r} is none", value=False)
-    return [item for item in value if not wrong(item)]
+        section.complain(key, f"a list of names{_SUCH_AS[key]}")
+        return None
+    return value
+
+
+def _inputs(section: Section, key: str) -> list[str]:
+    good = []
+    for item in _list(section, key) or ():
+        if wrong := unlike_a_name(item, "t"):
+            section.complain(key, f"{wrong}; {item!r} is none", value=False)
+        else:
+            good.append(item)
+    return good
 
 
 def _once(section: Section, groups: dict[str, dict[str, str] | dict[str, float] | list[str]]) -> None:
     """Complain about a name that means two things."""
     seen: dict[str, str] = {}
-    for table, names in groups.items():
+    for group, names in groups.items():
         for name in names:
             if name in seen:
-                place = table if table == "inputs" else f"{table}.{name}"
+                place = group if group == "inputs" else f"{group}.{name}"
                 section.complain(place, f"another name: {name} stands in {seen[name]} already", value=False)
-            seen.setdefault(name, table)
+            seen.setdefault(name, group)
 
 
 def _readable(
@@ -311,13 +281,13 @@ def _readable(
 
 
 def _initial(
-    section: Section, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
+    said: Said, states: dict[str, str], constants: list[str], problems: Problems, *, complete: bool
 ) -> dict[str, float | str]:
     """Initial values, `complete` if those of all states must be given, and the time they belong to."""
     found: dict[str, float | str] = {}
-    given: list[str] = []
-    for inner, name in _entries(section, "initial", named=False):
-        given.append(name)
+    section, inner = said.section, said["initial"]
+    given = () if inner is None else inner.keys
+    for name in given:
         value = inner.take(name)
         if name == "t0" and name not in states:
             found[name] = value
@@ -343,30 +313,81 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= LARGEST
 
 
-def _nuisance(section: Section) -> tuple[bool, bool, list[float]]:
-    inner = section.section("nuisance")
-    if inner is None:
-        return False, False, []
-    value = inner.take("hum_Hz")
-    hum = value if isinstance(value, list) else [] if value is None else [value]
+def _hum(section: Section, key: str) -> list[float] | None:
+    value = section.take(key)
+    hum = value if isinstance(value, list) else [value]
     if not all(_is_number(one) and one > 0 for one in hum) or len(set(hum)) < len(hum):
-        inner.complain("hum_Hz", "a frequency above 0, or a list of different ones, such as hum_Hz = 50")
-        hum = []
-    offset, drift = inner.flag("offset"), inner.flag("drift")
-    inner.finish()
-    return offset, drift, [float(one) for one in hum]
+        section.complain(key, "a frequency above 0, or a list of different ones, such as hum_Hz = 50")
+        return None
+    return [float(one) for one in hum]
 
 
-def _bounds(section: Section, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:
+def _bounds(section: Section | None, estimate: dict[str, float]) -> dict[str, tuple[float, float]]:
     found: dict[str, tuple[float, float]] = {}
-    for inner, name in _entries(section, "bounds", named=False):
-        limits = pair(inner.take(name))
-        if name not in estimate:
-            inner.complain(name, f"a name of [estimate]{did_you_mean(name, estimate)}", value=False)
-        elif limits is None:
-            inner.complain(name, "two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
-        elif not limits[0] <= estimate[name] <= limits[1]:
-            inner.complain(name, f"limits that hold the starting value {estimate[name]:g}")
-        else:
-            found[name] = limits
+    if section is None:
+        return found
+    for name in names_in(section, lambda name: unlike(name, estimate, "[estimate]")):
+        own = limits(section, name)
+        if own is not None and not own[0] <= estimate[name] <= own[1]:
+            section.complain(name, f"limits that hold the starting value {estimate[name]:g}")
+        elif own is not None:
+            found[name] = own
     return found
+
+
+_SUCH_AS = {
+    "inputs": ', such as inputs = ["u"], at the top of the file',
+    "per_record": ' of [estimate], such as per_record = ["x0"]',
+}
+_FREQUENCY = {"type": "number", "exclusiveMinimum": 0}
+NUISANCE = (
+    Key(
+        "hum_Hz",
+        Kind(_hum, {"anyOf": [_FREQUENCY, {"type": "array", "items": _FREQUENCY}]}),
+        "a frequency or a list of them (parameters `hum50_cos_NAME`, `hum50_sin_NAME`)",
+        default=[],
+    ),
+    Key("offset", FLAG, "a constant (`offset_NAME`)", default=False),
+    Key("drift", FLAG, "a rate per second (`drift_NAME`)", default=False),
+)
+
+
+def _nuisance(section: Section) -> tuple[bool, bool, list[float]]:
+    hum, offset, drift = take(section, NUISANCE).values()
+    return offset, drift, hum
+
+
+_FIRST = (
+    Key("inputs", Kind(_inputs, NAMES), "names of measured inputs, columns of the record", default=[]),
+    Key("known", NUMBERS, "name = number"),
+    Key("estimate", NUMBERS, "name = starting value"),
+    Key(
+        "per_record", Kind(_list, NAMES), "parameters that each of several records has for itself", default=[]
+    ),
+)
+_STATES = (Key("states", TEXTS, 'name = "its rate of change", with the time as `t`'),)
+_OUTPUTS = (
+    Key("outputs", TEXTS, 'name = "expression" of states; default: the states'),
+    Key(
+        "initial",
+        TEXTS,
+        "name = number, or an expression of parameters; `t0`: the time they belong to, in s, perhaps before "
+        'the record, or `"first"`: the first time of each record (the default, which asks where a record '
+        "does not begin at 0)",
+    ),
+)
+FORCE = (Key("force", TEXTS, 'with matrices: coordinate = "expression" of time and inputs'),)
+_LAST = (
+    BOUNDS,
+    STATED_ERRORS,
+    Key("speed_rad_s", number(0.0), "the speed at which matrices of a rotor hold", default=0.0),
+    Key(
+        "nuisance",
+        table(NUISANCE, _nuisance),
+        "what sensors add to every output, estimated anew for every record",
+        default=(False, False, []),
+    ),
+)
+TIME_STATES = (*_FIRST, *_STATES, *_OUTPUTS, *_LAST)
+TIME_MATRICES = (*_FIRST, *MATRICES, *_OUTPUTS, *FORCE, *_LAST)
+"""Keys of both forms of a model in time."""

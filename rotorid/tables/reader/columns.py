@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import SupportsIndex
 
 import numpy as np
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.suggestions import suggest
 from rotorid.base.text import listing
 from rotorid.tables.reader.decimal_numbers import (
@@ -89,6 +90,10 @@ class Table:
         Row numbers in the file.
     fields
         By stem of the column's name.
+    problems
+        Collects the complaints.
+    misspelt
+        Stems that unknown columns were probably meant to have; they have been reported, with that suggestion.
     comments
         Comment lines.
     complete
@@ -99,6 +104,8 @@ class Table:
     header_row: int
     rows: tuple[int, ...]
     fields: Mapping[str, Field]
+    problems: Problems
+    misspelt: frozenset[str] = frozenset()
     comments: tuple[str, ...] = ()
     complete: bool = True
 
@@ -129,14 +136,70 @@ class Table:
             raise KeyError(stem)
         return unit
 
-    def shown(self, stem: str, index: int) -> str:
+    def shown(self, stem: str, index: SupportsIndex) -> str:
         """A cell as it stood in the file."""
         return show(self.fields[stem].cells[index])
 
-    def complain(self, problems: Problems, index: int, stem: str, expected: str) -> None:
+    def is_blank(self, stem: str) -> BoolArray:
+        """Which cells of a column are empty, shape (rows,); none if the table has no such column."""
+        cells = self.fields[stem].cells if stem in self.fields else self.rows
+        return np.array([cell == "" for cell in cells], dtype=bool)
+
+    def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
         """Note a problem with one cell."""
         field = self.fields[stem]
-        problems.add(self.source, self.rows[index], field.name, self.shown(stem, index), expected)
+        self.problems.add(self.source, self.rows[index], field.name, self.shown(stem, index), expected)
+
+    def complain_where(self, wrong: BoolArray, stem: str, expected: str) -> None:
+        """Note a problem with each of these cells of a column."""
+        for index in np.flatnonzero(wrong):
+            self.complain(index, stem, expected)
+
+    def in_header(self, column: str | None, expected: str) -> None:
+        """Note a problem with the header: a column that it lacks, or has too much."""
+        self.problems.add(self.source, self.header_row, column, None, expected)
+
+    def as_whole(self, column: str | None, expected: str) -> None:
+        """Note a problem of no single row."""
+        self.problems.add(self.source, None, column, None, expected)
+
+    def must_be(self, stem: str, allowed: FloatArray | Iterable[bool], expected: str) -> None:
+        """Complain about every number of a column that is not allowed; unreadable ones have been reported."""
+        if stem not in self:
+            return
+        bad = ~np.fromiter(allowed, dtype=bool, count=len(self)) & ~np.isnan(self.numbers(stem))
+        self.complain_where(bad, stem, expected)
+
+    def only(self, stems: Sequence[str], usual: str, missing: str, several: str = "") -> str | None:
+        """The one column that there is of several; else None and a problem, if none is only misspelt.
+
+        Parameters
+        ----------
+        stems
+            Of the columns.
+        usual
+            The full name of one, for the message.
+        missing, several
+            What is expected where there is none, and where there are several (default: the same).
+        """
+        present = [stem for stem in stems if stem in self]
+        if len(present) == 1:
+            return present[0]
+        if present:
+            self.in_header(self.fields[present[1]].name, several or missing)
+        elif self.misspelt.isdisjoint(stems):
+            self.in_header(usual, missing)
+        return None
+
+    def once(self, stem: str, values: Iterable[Hashable], expected: str) -> None:
+        """Complain about each row of a value that stood before; `expected` has {} for the row of the first.
+
+        Values None and "" do not count.
+        """
+        first: dict[Hashable, int] = {}
+        for index, value in enumerate(values):
+            if value not in (None, "") and first.setdefault(value, index) != index:
+                self.complain(index, stem, expected.format(self.rows[first[value]]))
 
 
 def read_table(
@@ -207,7 +270,8 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
         _complain_about_header(grid, columns, problems)
         return None
     found = _match(grid, columns, problems)
-    _complain_about_missing(grid, columns, found, problems)
+    misspelt = _misspelt(grid, columns)
+    _complain_about_missing(grid, columns, {*found, *misspelt}, problems)
     comma = decimal_comma(
         (
             cell
@@ -225,7 +289,7 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
     if any(column.required and column.stem not in found for column in columns):
         return None
     rows = tuple(number for number, _ in grid.rows)
-    return Table(grid.source, grid.header_row, rows, fields, grid.comments, grid.complete)
+    return Table(grid.source, grid.header_row, rows, fields, problems, misspelt, grid.comments, grid.complete)
 
 
 _Match = tuple[int, Column, Unit | None]
@@ -310,18 +374,19 @@ def _known(columns: Sequence[Column]) -> str:
     return listing([example for column in columns for example in column.names], "and")
 
 
+def _misspelt(grid: Grid, columns: Sequence[Column]) -> frozenset[str]:
+    """Stems of the columns that unknown ones were probably meant to be."""
+    names = [name for name in grid.header if name and not name.casefold().startswith(REMARKS)]
+    near = [nearest(name, columns) for name in names if _column_of(name, columns) is None]
+    close = [_column_of(name, columns) for name in near if name]
+    return frozenset(column.stem for column in close if column is not None)
+
+
 def _complain_about_missing(
-    grid: Grid, columns: Sequence[Column], found: Mapping[str, _Match], problems: Problems
+    grid: Grid, columns: Sequence[Column], there: Collection[str], problems: Problems
 ) -> None:
-    unknown = [
-        name
-        for name in grid.header
-        if name and not name.casefold().startswith(REMARKS) and _column_of(name, columns) is None
-    ]
-    close = [_column_of(near, columns) for name in unknown if (near := nearest(name, columns))]
-    misspelt = {column.stem for column in close if column is not None}
     for column in columns:
-        if column.required and column.stem not in found and column.stem not in misspelt:
+        if column.required and column.stem not in there:
             present = listing([name for name in grid.header if name], "and")
             expected = f"a column {listing(column.names)}; the columns are {present}"
             problems.add(grid.source, grid.header_row, column.names[0], None, expected)
@@ -384,14 +449,3 @@ def _name(text: str) -> str:
     if not text.isprintable():
         raise NotANumber("a name without line breaks and control characters")
     return text
-
-
-def must_be(
-    table: Table, stem: str, allowed: FloatArray | Iterable[bool], expected: str, problems: Problems
-) -> None:
-    """Complain about every number of a column that is not allowed (unreadable cells have been reported)."""
-    if stem not in table:
-        return
-    bad = ~np.fromiter(allowed, dtype=bool, count=len(table)) & ~np.isnan(table.numbers(stem))
-    for index in np.flatnonzero(bad):
-        table.complain(problems, int(index), stem, expected)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 from rotorid.base.suggestions import suggest
 from rotorid.tables.reader.input_file import STANDARD_INPUT
@@ -11,6 +12,7 @@ from rotorid.tables.reader.input_file import STANDARD_INPUT
 __all__ = ["InputError", "Problem", "Problems", "TableWarning"]
 __all__ += ["printable", "quote", "suggest"]
 
+_T = TypeVar("_T")
 LONGEST_VALUE = 60
 FEW = 3
 """So many equal complaints about a column stand alone; more share a line."""
@@ -80,6 +82,13 @@ class Problems:
     def extend(self, more: Iterable[Problem]) -> None:
         """Note those of another file, or of an `InputError`."""
         self._items.extend(more)
+
+    def need(self, value: _T | None) -> _T:
+        """What was read; raises `InputError` where that is nothing, for which there is a problem then."""
+        if value is None:
+            self.stop()
+            raise AssertionError("nothing and no problem")
+        return value
 
     def __iter__(self) -> Iterator[Problem]:
         return iter(self._items)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find, names
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, Kind, take
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.reader.units import one_of
+from rotorid.tables.reader.value_kinds import TEXT, choice, number, plain_number
 
 SCALARS = {"stiffness": "stiffness_N_per_m", "damping": "damping_N_s_per_m"}
 ENTRIES = {
@@ -30,6 +32,55 @@ DIAGONAL = ("kxx", "kyy", "cxx", "cyy")
 OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
 TILTING = "tilting_stiffness_N_m_per_rad"
 PEDESTAL = ("pedestal_mass_kg", "pedestal_stiffness_N_per_m", "pedestal_damping_N_s_per_m")
+NODE = Kind(
+    lambda section, key: section.take(key), {"type": ["integer", "string"], "minimum": 1}, "a node or station"
+)
+NAME = Kind(lambda section, key: section.name(key), {"type": "string"}, "text", cell="name")
+
+
+def _one_or_two(section: Section, key: str) -> Pair | None:
+    """A number, or `[x, y]`."""
+    value = section.take(key)
+    if not isinstance(value, list):
+        return section.number(key, low=0.0)
+    good = [float(item) for item in value if plain_number(item) is not None and item >= 0]
+    if len(value) != 2 or len(good) != 2:
+        section.complain(key, "a finite number, 0 or more, or two of them: [x, y]")
+        return None
+    return good[0], good[1]
+
+
+_NUMBER = {"type": "number", "minimum": 0}
+_TWO = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
+PAIR = Kind(_one_or_two, {"anyOf": [_NUMBER, _TWO]}, "a number, or [x, y]")
+
+
+def _coefficient_keys(quantity: str, motion: str) -> Iterator[Key]:
+    yield Key(SCALARS[quantity], number(), f"{quantity}, the same in all directions")
+    for short, full in ENTRIES[quantity].items():
+        yield Key(short, number(), f"`{full}` in short")
+        yield Key(full, number(), f"force in {short[1]} against a {motion} in {short[2]}")
+
+
+_PLACE = (
+    Key("node", NODE, "the node, a number from 1, or a station"),
+    Key("name", NAME, "a name", default=""),
+    Key(TILTING, number(0.0), "moment against a tilt of the shaft", default=0.0),
+)
+_STAND = (
+    Key("kind", choice(names(KINDS)), "one of the kinds, where it is another one", default=KINDS[0].name),
+    Key(PEDESTAL[0], number(0.0), "mass of what it stands on", default=0.0),
+    Key(PEDESTAL[1], PAIR, "its stiffness; one number, or two for x and y", default=0.0),
+    Key(PEDESTAL[2], PAIR, "its damping; one number, or two for x and y", default=0.0),
+)
+_COEFFICIENTS = (
+    *_coefficient_keys("stiffness", "displacement"),
+    *_coefficient_keys("damping", "velocity"),
+    Key("table", TEXT, "a table of these coefficients over speed"),
+)
+KEYS_OF = {kind.name: (*_PLACE, *(_STAND if kind is KINDS[0] else ()), *_COEFFICIENTS) for kind in KINDS}
+"""Of a `[[bearing]]` and the others of `KINDS`."""
+_SETTLED = {key.name for key in (*_PLACE, *_STAND)}
 _STIFFNESS, _DAMPING = one_of(units.STIFFNESS), one_of(units.DAMPING)
 COLUMNS = (
     Column("speed", one_of(units.SPEED), ("speed_rpm", "speed_rad_s", "speed_Hz")),
@@ -69,18 +120,13 @@ def read_support(
         Collects the complaints.
     """
     before = len(problems)
+    said = take(section, KEYS_OF[kind])
     where = node(section)
-    name = section.name("name")
-    tilting = section.number(TILTING, 0.0, low=0.0)
-    if kind == "bearing":
-        kind = section.choice("kind", names(KINDS), kind)
-        pedestal = _pedestal(section)
-    else:
-        pedestal = None
+    kind = said.get("kind", kind)
+    pedestal = _pedestal(section, said)
     settled = len(problems)
-    coefficients = _coefficients(section, folder, kind, problems)
-    section.finish()
-    if coefficients is None or len(problems) > settled:
+    coefficients = _coefficients(section, said, folder, kind, problems)
+    if coefficients is None or len(problems) > settled or section.refused - _SETTLED:
         return None  # what is missing may be what is misspelt
     stiffness = _quantity("stiffness", coefficients)
     damping = _quantity("damping", coefficients)
@@ -96,11 +142,11 @@ def read_support(
             where,
             stiffness,
             0.0 if damping is None else damping,
-            name,
+            said["name"],
             speeds=coefficients.speeds,
             pedestal=None if pedestal is None else Pedestal(*pedestal),
             kind=kind,
-            tilting_stiffness=tilting or 0.0,
+            tilting_stiffness=said[TILTING],
         )
     except ValueError as error:
         section.refuse(f"a possible {kind}: {error}")
@@ -119,44 +165,47 @@ def bearing_tables(data: Mapping[str, object]) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def _coefficients(section: Section, folder: Path, kind: str, problems: Problems) -> _Coefficients | None:
+def _coefficients(
+    section: Section, said: Mapping[str, Any], folder: Path, kind: str, problems: Problems
+) -> _Coefficients | None:
     values: dict[str, float | FloatArray] = {}
     complain: dict[str, Callable[[str], None]] = {}
     low = find(KINDS, kind, "kind").function
     for quantity, scalar in SCALARS.items():
-        _take(section, quantity, (scalar,), low, values, complain)
+        _note(section, said, quantity, (scalar,), low, values, complain)
         for name, full in ENTRIES[quantity].items():
-            _take(section, name, (full, name), low if name in DIAGONAL else -math.inf, values, complain)
-    file = section.text("table")
+            lowest = low if name in DIAGONAL else -math.inf
+            _note(section, said, name, (full, name), lowest, values, complain)
+    file = said["table"]
     if file is None:
         return None if "table" in section else _Coefficients(values, complain, section.missing)
     table = read_table(folder / file, kind, COLUMNS, problems, first=True)
     if table is None:
         return None
-    _check_speeds(table, problems)
+    speed = table.numbers("speed")
+    table.must_be("speed", speed >= 0, "a speed of 0 or more")
+    rising = np.insert(~(np.diff(speed) <= 0), 0, True)
+    table.must_be("speed", rising, "a speed above that of the row before (ascending, each once)")
     present = [column.stem for column in COLUMNS[1:] if column.stem in table]
     if not present:
         expected = f"a column of coefficients, such as {listing(c.names[0] for c in COLUMNS[1:4])}"
-        problems.add(table.source, table.header_row, COLUMNS[1].names[0], None, expected)
+        table.in_header(COLUMNS[1].names[0], expected)
         return None
     for name in (*SCALARS, *DIAGONAL):
-        must_be(table, name, table.numbers(name) >= low, OUTWARDS, problems)
+        table.must_be(name, table.numbers(name) >= low, OUTWARDS)
     if len(table) == 1:
-        table.complain(problems, 0, "speed", "two speeds at least: a table says how coefficients change")
+        table.complain(0, "speed", "two speeds at least: a table says how coefficients change")
     for name in present:
         if name in values:
             complain[name](f"nothing: {table.source} has a column {table.fields[name].name}")
         values[name] = table.numbers(name)
-        complain[name] = _in_header(table, name, problems)
-
-    def missing(name: str, expected: str) -> None:
-        problems.add(table.source, table.header_row, name, None, expected)
-
-    return _Coefficients(values, complain, missing, tuple(table.numbers("speed").tolist()))
+        complain[name] = _in_header(table, name)
+    return _Coefficients(values, complain, table.in_header, tuple(table.numbers("speed").tolist()))
 
 
-def _take(
+def _note(
     section: Section,
+    said: Mapping[str, Any],
     name: str,
     keys: tuple[str, ...],
     low: float,
@@ -165,7 +214,7 @@ def _take(
 ) -> None:
     """One constant; `kxx` alone is `kxx_N_per_m`."""
     for key in keys:
-        value = section.number(key)
+        value = said[key]
         if value is not None and value < low:
             section.complain(key, OUTWARDS)
         if value is None:
@@ -176,16 +225,9 @@ def _take(
         complain[name] = lambda expected, key=key: section.complain(key, expected)  # type: ignore[misc]
 
 
-def _in_header(table: Table, name: str, problems: Problems) -> Callable[[str], None]:
-    field = table.fields[name]
-    return lambda expected: problems.add(table.source, table.header_row, field.name, field.name, expected)
-
-
-def _check_speeds(table: Table, problems: Problems) -> None:
-    speed = table.numbers("speed")
-    must_be(table, "speed", speed >= 0, "a speed of 0 or more", problems)
-    rising = np.insert(~(np.diff(speed) <= 0), 0, True)
-    must_be(table, "speed", rising, "a speed above that of the row before (ascending, each once)", problems)
+def _in_header(table: Table, name: str) -> Callable[[str], None]:
+    column = table.fields[name].name
+    return lambda expected: table.problems.add(table.source, table.header_row, column, column, expected)
 
 
 def _quantity(quantity: str, given: _Coefficients) -> Coefficient | tuple[Coefficient, ...] | None:
@@ -225,27 +267,10 @@ def _over_speed(
     return tuple(build(k) for k in range(len(given.speeds))) if given.speeds else build(0)
 
 
-def _pedestal(section: Section) -> tuple[float, Pair, Pair] | None:
-    mass = section.number(PEDESTAL[0], 0.0, low=0.0)
-    stiffness, damping = _pair(section, PEDESTAL[1]), _pair(section, PEDESTAL[2])
-    if not any(key in section for key in PEDESTAL):
+def _pedestal(section: Section, said: Mapping[str, Any]) -> tuple[float, Pair, Pair] | None:
+    if not any(key in said and key in section for key in PEDESTAL):
         return None
     if PEDESTAL[1] not in section:
         section.missing(PEDESTAL[1], "the stiffness of the pedestal")
-    return mass or 0.0, 0.0 if stiffness is None else stiffness, 0.0 if damping is None else damping
-
-
-def _pair(section: Section, key: str) -> Pair | None:
-    """A number, or `[x, y]`."""
-    value = section.take(key)
-    if not isinstance(value, list):
-        return section.number(key, low=0.0)
-    good = [
-        float(item)
-        for item in value
-        if isinstance(item, (int, float)) and not isinstance(item, bool) and 0 <= item <= sys.float_info.max
-    ]
-    if len(value) != 2 or len(good) != 2:
-        section.complain(key, "a finite number, 0 or more, or two of them: [x, y]")
-        return None
-    return good[0], good[1]
+    mass, stiffness, damping = (said[key] for key in PEDESTAL)
+    return mass, stiffness, damping

@@ -7,18 +7,76 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from fem.model.rotor import Disc, Model, Rotor
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.model.supports import KINDS
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, take
 from rotorid.tables.reader.toml_file import Section, read_toml
-from rotorid.tables.rotor.bearing import bearing_tables, read_support
+from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
+from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
 from rotorid.tables.rotor.rotor_plausibility import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
 
-_TINY = sys.float_info.min
-_GEOMETRY = ("width_m", "outer_diameter_m", "inner_diameter_m", "density_kg_per_m3")
-_INERTIA = ("mass_kg", "polar_inertia_kg_m2", "diametral_inertia_kg_m2")
+
+def _material(section: Section) -> Material:
+    said = take(section, MATERIAL)
+    for stem, key in (("youngs_modulus", "youngs_modulus_Pa"), ("density", "density_kg_per_m3")):
+        warn_of_value(section.source, f"[material] {key}", stem, said[key])
+    return Material(*said.values())
+
+
+_SIZE = number(0.0)
+MATERIAL = (
+    Key("youngs_modulus_Pa", ABOVE_ZERO, "Young's modulus", default=STEEL_MODULUS),
+    Key("density_kg_per_m3", _SIZE, "density", default=STEEL_DENSITY),
+    Key("poisson_ratio", number(-1.0 + 1e-9, 0.5), "Poisson's ratio", default=STEEL_POISSON),
+    Key("material_damping_s", _SIZE, "loss per stress rate: the stress is E (ε + τ dε/dt)", default=0.0),
+)
+"""In the order of `Material`."""
+MODEL = (
+    Key("shear", FLAG, "shear deformation (Timoshenko)", default=False),
+    Key("rotary_inertia", FLAG, "inertia of tilting sections and discs", default=False),
+    Key("gyroscopic", FLAG, "gyroscopic moments of shaft and discs", default=False),
+)
+STATION = (
+    Key("name", NAME, "the name, which stands wherever a node may", default=""),
+    Key("node", NODE, "the node, a number from 1"),
+)
+DISC = (
+    Key("node", NODE, "the node, a number from 1, or a station"),
+    Key("name", NAME, "a name", default=""),
+    Key("mass_kg", _SIZE, "mass; with moments of inertia or alone"),
+    Key("polar_inertia_kg_m2", _SIZE, "about the shaft's line"),
+    Key("diametral_inertia_kg_m2", _SIZE, "across it"),
+    Key("width_m", ABOVE_ZERO, "of a disc by geometry, with `outer_diameter_m`"),
+    Key("outer_diameter_m", ABOVE_ZERO, "of a disc by geometry"),
+    Key("inner_diameter_m", _SIZE, "bore of a disc by geometry; default: none"),
+    Key("density_kg_per_m3", _SIZE, "of a disc by geometry; default: the material's"),
+)
+INERTIA, _GEOMETRY = ([key.name for key in part] for part in (DISC[2:5], DISC[5:]))
+ROTOR = (
+    Key(
+        "shaft",
+        TEXT,
+        "the rotor table, relative to this file; required",
+        required='the file of the shaft, shaft = "shaft.csv"',
+    ),
+    Key("material", table(MATERIAL, _material), "of elements whose row says nothing", default=Material()),
+    Key(
+        "model",
+        table(MODEL),
+        "effects that count, true or false; an inertia that is thereby ignored gives a warning",
+        default={},
+    ),
+    Key("disc", each(DISC, lambda section: section), "a disc, as many as there are", default=()),
+    Key("station", each(STATION, lambda section: section), "a name for a node", default=()),
+    *(
+        Key(kind.name, each(KEYS_OF[kind.name], lambda section: section), kind.about, default=())
+        for kind in KINDS
+    ),
+)
+"""Of a rotor file; sections that name nodes are read when the shaft and the stations are known."""
 
 
 def read_rotor(path: str | Path) -> Rotor:
@@ -50,39 +108,33 @@ def read_rotor(path: str | Path) -> Rotor:
         return read_rotor_file(path, problems)
     shaft = read_shaft(path, Material(), problems)
     problems.stop()
-    assert shaft is not None
-    return build(str(path), shaft, {}, problems)
+    return build(str(path), problems.need(shaft), {}, problems)
 
 
 def read_rotor_file(path: Path, problems: Problems) -> Rotor:
     """Read a rotor file; raises `InputError` with the problems of the file and of the tables it names."""
-    data = read_toml(path, problems)
-    problems.stop()
-    top = Section(str(path), data or {}, problems)
-    shaft_name = top.text("shaft")
-    if "shaft" not in top:
-        top.missing("shaft", 'the file of the shaft, shaft = "shaft.csv"')
-    material = _material(top.section("material"), str(path))
-    model = _model(top.section("model"))
-    discs, stations = top.sections("disc"), top.sections("station")
-    supports = [(kind.name, section) for kind in KINDS for section in top.sections(kind.name)]
-    top.finish()
-    shaft = read_shaft(path.parent / shaft_name, material, problems) if shaft_name else None
+    top = Section(str(path), problems.need(read_toml(path, problems)), problems)
+    said = take(top, ROTOR)
+    shaft = read_shaft(path.parent / said["shaft"], said["material"], problems) if said["shaft"] else None
     n_nodes = len(shaft.length) + 1 if shaft else sys.maxsize
-    names = _stations(stations, n_nodes)
+    names = _stations(said["station"], n_nodes)
 
     def node(section: Section) -> int | None:
         return _node(section, names, n_nodes)
 
-    more_discs = [_disc(section, node, material) for section in discs]
-    more_supports = [read_support(section, node, path.parent, kind, problems) for kind, section in supports]
+    discs = [_disc(section, node, said["material"]) for section in said["disc"]]
+    supports = [
+        read_support(section, node, path.parent, kind.name, problems)
+        for kind in KINDS
+        for section in said[kind.name]
+    ]
     problems.stop()
-    assert shaft is not None
+    shaft = problems.need(shaft)
     whole = dataclasses.replace(
         shaft,
-        discs=(*shaft.discs, *(disc for disc in more_discs if disc)),
-        supports=(*shaft.supports, *(support for support in more_supports if support)),
-        model=model,
+        discs=(*shaft.discs, *filter(None, discs)),
+        supports=(*shaft.supports, *filter(None, supports)),
+        model=Model(**said["model"]),
     )
     return build(str(path), whole, names, problems)
 
@@ -108,46 +160,13 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     return (path, *(path.parent / table for table in [*tables, *bearing_tables(data)]))
 
 
-def _material(section: Section | None, source: str) -> Material:
-    default = Material()
-    if section is None:
-        return default
-    modulus = section.number("youngs_modulus_Pa", default.youngs_modulus, low=_TINY)
-    density = section.number("density_kg_per_m3", default.density, low=0.0)
-    poisson = section.number("poisson_ratio", default.poisson_ratio, low=-1.0 + 1e-9, high=0.5)
-    damping = section.number("material_damping_s", default.material_damping, low=0.0)
-    section.finish()
-    for stem, key, value in (
-        ("youngs_modulus", "youngs_modulus_Pa", modulus),
-        ("density", "density_kg_per_m3", density),
-    ):
-        if value is not None:
-            warn_of_value(source, f"[material] {key}", stem, value)
-    return Material(
-        *(
-            getattr(default, field.name) if value is None else value
-            for field, value in zip(
-                dataclasses.fields(Material), (modulus, density, poisson, damping), strict=True
-            )
-        )
-    )
-
-
-def _model(section: Section | None) -> Model:
-    if section is None:
-        return Model()
-    flags = [section.flag(effect) for effect in ("shear", "rotary_inertia", "gyroscopic")]
-    section.finish()
-    return Model(*flags)
-
-
 def _stations(sections: list[Section], n_nodes: int) -> dict[str, int]:
     names: dict[str, int] = {}
     for section in sections:
-        name, node = section.name("name"), _node(section, {}, n_nodes)
+        name = take(section, STATION)["name"]
+        node = _node(section, {}, n_nodes)
         if not name.strip():
             section.complain("name", "a name for the node", value="name" in section)
-        section.finish()
         if name in names:
             section.complain("name", "a name that no other station has")
         elif name.strip().isdecimal():
@@ -177,13 +196,11 @@ def _node(section: Section, names: dict[str, int], n_nodes: int) -> int | None:
 
 def _disc(section: Section, read_node: Callable[[Section], int | None], material: Material) -> Disc | None:
     """Mass and inertias, or a geometry; its density is the material's unless it says another."""
-    node, name = read_node(section), section.name("name")
-    mass, polar, diametral = (section.number(key, low=0.0) for key in _INERTIA)
-    width, outer = (section.number(key, low=_TINY) for key in _GEOMETRY[:2])
-    inner, density = (section.number(key, low=0.0) for key in _GEOMETRY[2:])
-    section.finish()
+    said = take(section, DISC)
+    node = read_node(section)
+    mass, polar, diametral, width, outer, inner, density = (said[key] for key in (*INERTIA, *_GEOMETRY))
     by_geometry = [key for key in _GEOMETRY if key in section]
-    by_inertia = [key for key in _INERTIA if key in section]
+    by_inertia = [key for key in INERTIA if key in section]
     if by_geometry and by_inertia:
         section.complain(
             by_inertia[0], f"either mass and moments of inertia or a geometry, which {by_geometry[0]} gives"
@@ -194,7 +211,7 @@ def _disc(section: Section, read_node: Callable[[Section], int | None], material
             section.missing("mass_kg", "the mass of the disc (or its geometry: width_m, outer_diameter_m)")
         if node is None or mass is None:
             return None
-        return Disc(node, mass, polar or 0.0, diametral or 0.0, name)
+        return Disc(node, mass, polar or 0.0, diametral or 0.0, said["name"])
     for key in _GEOMETRY[:2]:
         if key not in section:
             section.missing(key, "the disc's width and outer diameter")
@@ -202,7 +219,7 @@ def _disc(section: Section, read_node: Callable[[Section], int | None], material
         return None
     density = material.density if density is None else density
     try:
-        return Disc.from_geometry(node, width, outer, inner or 0.0, density, name=name)
+        return Disc.from_geometry(node, width, outer, inner or 0.0, density, name=said["name"])
     except ValueError as error:
         section.refuse(f"a possible disc: {error}")
         return None

@@ -5,43 +5,43 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, Disc, Model, Rotor, Support
-from rotorid.base.arrays import BoolArray, FloatArray
+from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
+from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.rotor.rotor_plausibility import warn_of_rotor, warn_of_table
 
 _LENGTH = one_of(units.LENGTH)
 _INERTIA = one_of(units.INERTIA)
-ATTACHED = {
-    "mass": "mass_kg",
-    "polar_inertia": "polar_inertia_kg_m2",
-    "diametral_inertia": "diametral_inertia_kg_m2",
-    "support_stiffness": "support_stiffness_N_per_m",
-    "support_damping": "support_damping_N_s_per_m",
-}
-COLUMNS = (
-    Column("length", _LENGTH, ("length_m", "length_mm")),
-    Column("diameter", _LENGTH, ("diameter_m", "diameter_mm"), blank=True),
-    Column("inner_diameter", _LENGTH, ("inner_diameter_m",), required=False, blank=True),
-    Column("element", required=False, blank=True),
+ATTACHED = (
     Column("mass", one_of(units.MASS), ("mass_kg",), required=False),
     Column("polar_inertia", _INERTIA, ("polar_inertia_kg_m2",), required=False),
     Column("diametral_inertia", _INERTIA, ("diametral_inertia_kg_m2",), required=False),
     Column("support_stiffness", one_of(units.STIFFNESS), ("support_stiffness_N_per_m",), required=False),
     Column("support_damping", one_of(units.DAMPING), ("support_damping_N_s_per_m",), required=False),
+)
+OF_ELEMENTS = (
     Column("youngs_modulus", one_of(units.MODULUS), ("youngs_modulus_Pa",), required=False, blank=True),
     Column("density", one_of(units.DENSITY), ("density_kg_per_m3",), required=False, blank=True),
     Column("poisson_ratio", units.ratio, required=False, blank=True),
     Column("material_damping", one_of(units.TIME), ("material_damping_s",), required=False, blank=True),
 )
+"""In the order of `Material`."""
+COLUMNS = (
+    Column("length", _LENGTH, ("length_m", "length_mm")),
+    Column("diameter", _LENGTH, ("diameter_m", "diameter_mm"), blank=True),
+    Column("inner_diameter", _LENGTH, ("inner_diameter_m",), required=False, blank=True),
+    Column("element", required=False, blank=True),
+    *ATTACHED,
+    *OF_ELEMENTS,
+)
 PLAIN = Model()
-OF_ELEMENTS = ("youngs_modulus", "density", "poisson_ratio", "material_damping")
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Material:
 
     youngs_modulus: float = STEEL_MODULUS
     density: float = STEEL_DENSITY
-    poisson_ratio: float = 0.3
+    poisson_ratio: float = STEEL_POISSON
     material_damping: float = 0.0
 
 
@@ -79,62 +79,45 @@ def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | No
     last = len(table) - 1
     end_row = bool(length[last] == 0.0)
     elements = np.arange(len(table)) < len(table) - end_row
-    must_be(
-        table,
+    table.must_be(
         "length",
         (length > 0) | ~elements,
         "a length above 0 (0 only in the last row, which then attaches to the right end)",
-        problems,
     )
     if not elements.any():
         expected = "at least one row with a length above 0"
-        problems.add(table.source, table.header_row, table.fields["length"].name, None, expected)
-    for stem in ("diameter", "inner_diameter", *OF_ELEMENTS):
-        _complain_about_blanks(table, stem, elements, problems)
+        table.in_header(table.fields["length"].name, expected)
     diameter, inner = table.numbers("diameter"), table.numbers("inner_diameter", 0.0)
-    must_be(table, "diameter", (diameter > 0) | ~elements, "a diameter above 0", problems)
-    must_be(table, "inner_diameter", (inner >= 0) | ~elements, "a diameter of 0 or more", problems)
-    fits = ~(inner >= diameter) | ~(diameter > 0) | ~elements
-    must_be(table, "inner_diameter", fits, "less than the outer diameter", problems)
-    modulus, density = table.numbers("youngs_modulus"), table.numbers("density")
-    must_be(table, "youngs_modulus", (modulus > 0) | ~elements, "a number above 0", problems)
-    must_be(table, "density", (density >= 0) | ~elements, "a number of 0 (no mass) or more", problems)
-    poisson, damping = table.numbers("poisson_ratio"), table.numbers("material_damping")
-    possible = (poisson > -1) & (poisson <= 0.5)
-    must_be(table, "poisson_ratio", possible | ~elements, "a number above -1, up to 0.5", problems)
-    must_be(table, "material_damping", (damping >= 0) | ~elements, "a time of 0 or more", problems)
-    for stem in ATTACHED:
+    material_of = {column.stem: table.numbers(column.stem) for column in OF_ELEMENTS}
+    modulus, density, poisson, damping = material_of.values()
+    for stem in ("diameter", "inner_diameter", *material_of):
+        # blank only in a last row without an element
+        table.complain_where(elements & table.is_blank(stem), stem, "a number")
+    for stem, fits, expected in (
+        ("diameter", diameter > 0, "a diameter above 0"),
+        ("inner_diameter", inner >= 0, "a diameter of 0 or more"),
+        ("inner_diameter", ~(inner >= diameter) | ~(diameter > 0), "less than the outer diameter"),
+        ("youngs_modulus", modulus > 0, "a number above 0"),
+        ("density", density >= 0, "a number of 0 (no mass) or more"),
+        ("poisson_ratio", (poisson > -1) & (poisson <= 0.5), "a number above -1, up to 0.5"),
+        ("material_damping", damping >= 0, "a time of 0 or more"),
+    ):
+        table.must_be(stem, fits | ~elements, expected)
+    for stem in (column.stem for column in ATTACHED):
         outwards = "; what pushes outwards, or drives, is a [[seal]] of a rotor file" * ("support" in stem)
-        must_be(table, stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}", problems)
+        table.must_be(stem, table.numbers(stem) >= 0, f"0 (nothing attached) or more{outwards}")
     warn_of_table(table, elements)
-    return Shaft(
-        length[elements],
-        diameter[elements],
-        inner[elements],
-        table.numbers("youngs_modulus", material.youngs_modulus)[elements],
-        table.numbers("density", material.density)[elements],
-        table.numbers("poisson_ratio", material.poisson_ratio)[elements],
-        table.numbers("material_damping", material.material_damping)[elements],
-        *_attached(table),
-    )
+    own: dict[str, Any] = {
+        stem: table.numbers(stem, getattr(material, stem))[elements] for stem in material_of
+    }
+    discs, supports = _attached(table)
+    return Shaft(length[elements], diameter[elements], inner[elements], discs=discs, supports=supports, **own)
 
 
 def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problems) -> Rotor:
     """Make the rotor; what it refuses becomes a problem of the file."""
     try:
-        rotor = Rotor(
-            length=shaft.length,
-            outer_diameter=shaft.outer_diameter,
-            inner_diameter=shaft.inner_diameter,
-            youngs_modulus=shaft.youngs_modulus,
-            density=shaft.density,
-            poisson_ratio=shaft.poisson_ratio,
-            material_damping=shaft.material_damping,
-            discs=shaft.discs,
-            supports=shaft.supports,
-            stations=stations,
-            model=shaft.model,
-        )
+        rotor = Rotor(**vars(shaft), stations=stations)
     except ValueError as error:
         problems.add(source, None, None, None, f"a possible rotor: {error}")
         problems.stop()
@@ -143,20 +126,11 @@ def build(source: str, shaft: Shaft, stations: dict[str, int], problems: Problem
     return rotor
 
 
-def _complain_about_blanks(table: Table, stem: str, elements: BoolArray, problems: Problems) -> None:
-    """Optional only in a last row without an element."""
-    if stem not in table:
-        return
-    for index, needed in enumerate(elements):
-        if needed and not table.shown(stem, index):
-            table.complain(problems, index, stem, "a number")
-
-
 def _attached(table: Table) -> tuple[tuple[Disc, ...], tuple[Support, ...]]:
-    values = {stem: table.numbers(stem, 0.0) for stem in ATTACHED}
+    values = [table.numbers(column.stem, 0.0) for column in ATTACHED]
     discs, supports = [], []
     for index in range(len(table)):
-        mass, polar, diametral, stiffness, damping = (float(column[index]) for column in values.values())
+        mass, polar, diametral, stiffness, damping = (float(column[index]) for column in values)
         if any(math.isnan(value) or value < 0 for value in (mass, polar, diametral, stiffness, damping)):
             continue  # reported
         if mass or polar or diametral:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,11 @@ from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
 from rotorid.tables.reader.table_writing import Value, csv_bytes, write_files
 from rotorid.tables.rotor.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
+from rotorid.tables.rotor.rotor_file import INERTIA, MODEL
 from rotorid.tables.rotor.rotor_table import ATTACHED, OF_ELEMENTS, Material
 
-_UNITS = {
-    "youngs_modulus": "youngs_modulus_Pa",
-    "density": "density_kg_per_m3",
-    "poisson_ratio": "poisson_ratio",
-    "material_damping": "material_damping_s",
-}
-_EFFECTS = ("shear", "rotary_inertia", "gyroscopic")
+_OF_ELEMENTS = {column.stem: column.names[0] for column in OF_ELEMENTS}
+"""Full names by attribute of a rotor."""
 
 
 def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
@@ -64,7 +60,7 @@ def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
                 f"{path}: a rotor table cannot hold {listing(beyond, 'and')}; "
                 f"write a rotor file, {path.with_suffix('.toml').name}"
             )
-        files = {path: _shaft_table(rotor, OF_ELEMENTS, attached=True)}
+        files = {path: _shaft_table(rotor, _OF_ELEMENTS, attached=True)}
     else:
         files = _rotor_file(path, rotor)
     write_files(files)
@@ -100,15 +96,15 @@ def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     default = Material()
     shaft = path.with_name(f"{path.stem}_shaft.csv")
     document: dict[str, Any] = {"shaft": shaft.name}
-    uniform = [name for name in OF_ELEMENTS if np.ptp(getattr(rotor, name)) == 0]
+    uniform = [name for name in _OF_ELEMENTS if np.ptp(getattr(rotor, name)) == 0]
     values = {name: float(getattr(rotor, name)[0]) for name in uniform}
-    material = {_UNITS[name]: v for name, v in values.items() if v != getattr(default, name)}
+    material = {_OF_ELEMENTS[name]: v for name, v in values.items() if v != getattr(default, name)}
     if material:
         document["material"] = material
-    model = {effect: True for effect in _EFFECTS if getattr(rotor.model, effect)}
+    model = {key.name: True for key in MODEL if getattr(rotor.model, key.name)}
     if model:
         document["model"] = model
-    files = {shaft: _shaft_table(rotor, [name for name in OF_ELEMENTS if name not in uniform])}
+    files = {shaft: _shaft_table(rotor, [name for name in _OF_ELEMENTS if name not in uniform])}
     if rotor.discs:
         document["disc"] = [_disc(disc) for disc in rotor.discs]
     kinds = [support.kind for support in rotor.supports]
@@ -141,7 +137,7 @@ def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     return files
 
 
-def _shaft_table(rotor: Rotor, properties: Sequence[str], *, attached: bool = False) -> bytes:
+def _shaft_table(rotor: Rotor, properties: Iterable[str], *, attached: bool = False) -> bytes:
     """The elements, and with `attached` what stands at their left nodes, which must fit."""
     default = Material()
     n = rotor.n_elements
@@ -155,7 +151,7 @@ def _shaft_table(rotor: Rotor, properties: Sequence[str], *, attached: bool = Fa
     for name in properties:
         values = getattr(rotor, name)
         if (values != getattr(default, name)).any():
-            columns[_UNITS[name]] = values.tolist()
+            columns[_OF_ELEMENTS[name]] = values.tolist()
     rows = [list(row) for row in zip(*columns.values(), strict=True)]
     if not attached:
         return _table(list(columns), rows)
@@ -168,7 +164,7 @@ def _shaft_table(rotor: Rotor, properties: Sequence[str], *, attached: bool = Fa
     if at_nodes[n].any():
         # The last row is no element: its length is 0, and so is whatever else must be a number.
         rows.append(["end", 0.0, *[""] * (len(columns) - 2)])
-    names = [*columns, *np.array(list(ATTACHED.values()))[used].tolist()]
+    names = [*columns, *(ATTACHED[place].names[0] for place in used)]
     return _table(names, [[*row, *extra[used].tolist()] for row, extra in zip(rows, at_nodes)])  # noqa: B905
 
 
@@ -192,12 +188,9 @@ def _check_sizes(values: Mapping[str, Any]) -> None:
 
 def _disc(disc: Disc) -> dict[str, Any]:
     section: dict[str, Any] = {"name": disc.name} if disc.name else {}
-    section |= {"node": disc.node, "mass_kg": disc.mass}
-    if disc.polar_inertia:
-        section["polar_inertia_kg_m2"] = disc.polar_inertia
-    if disc.diametral_inertia:
-        section["diametral_inertia_kg_m2"] = disc.diametral_inertia
-    return section
+    section["node"] = disc.node
+    mass, *inertias = zip(INERTIA, (disc.mass, disc.polar_inertia, disc.diametral_inertia), strict=True)
+    return section | dict([mass, *((key, value) for key, value in inertias if value)])
 
 
 def _support(support: Support, table: Path | None, *, mixed: bool) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from balancing.data.conventions import polar
 from fem.model.rotor import Rotor
 from rotorid.base.suggestions import did_you_mean
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, must_be, nearest, read_table
+from rotorid.tables.reader.columns import Column, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN
@@ -23,6 +23,19 @@ COLUMNS = (
     Column("unbalance", one_of(units.UNBALANCE), ("unbalance_g_mm", "unbalance_kg_m"), required=False),
     Column("angle", one_of(units.ANGLE), ("angle_deg",)),
 )
+
+
+def node_at(table: Table, stem: str, index: int, rotor: Rotor) -> int | None:
+    """The node in a cell, by number or by the name of a station; None where it is none, which is noted."""
+    name = table.texts(stem)[index]
+    if not name:
+        return None
+    try:
+        return rotor.node(name)
+    except ValueError:
+        expected = f"a node from 1 to {rotor.n_nodes} or a station{did_you_mean(name, rotor.stations)}"
+        table.complain(index, stem, expected)
+        return None
 
 
 def read_unbalance(path: str | Path, rotor: Rotor) -> dict[int, complex]:
@@ -49,36 +62,19 @@ def read_unbalance(path: str | Path, rotor: Rotor) -> dict[int, complex]:
         With all problems of the file.
     """
     problems = Problems()
-    table = read_table(path, "unbalance", COLUMNS, problems, first=True)
-    if table is None:
-        problems.stop()
-        raise AssertionError("no table and no problem")
-    # A misspelt column has been reported, with a suggestion: that is enough.
-    near = {(nearest(str(p.column), COLUMNS) or "").split("_")[0] for p in problems.of(table.source)}
-    where = [stem for stem in ("plane", "node") if stem in table]
-    if len(where) != 1 and not near & {"plane", "node"}:
-        expected = "one column plane or node" + (", not both" if where else ": a node or a station")
-        problems.add(table.source, table.header_row, where[-1] if where else "plane", None, expected)
-    ways = {"mass", "radius", "unbalance"} & set(table.fields)
-    if ways not in ({"unbalance"}, {"mass", "radius"}) and not near & {"mass", "radius", "unbalance"}:
-        problems.add(
-            table.source,
-            table.header_row,
-            "unbalance_g_mm",
-            None,
-            "either a column unbalance_<unit>, or both mass_<unit> and radius_<unit>",
-        )
+    table = problems.need(read_table(path, "unbalance", COLUMNS, problems, first=True))
+    missing, several = "one column plane or node: a node or a station", "one column plane or node, not both"
+    where = table.only(("plane", "node"), "plane", missing, several)
+    sizes = {"mass", "radius", "unbalance"}
+    ways = sizes & set(table.fields)
+    if ways not in ({"unbalance"}, {"mass", "radius"}) and table.misspelt.isdisjoint(sizes):
+        expected = "either a column unbalance_<unit>, or both mass_<unit> and radius_<unit>"
+        table.in_header("unbalance_g_mm", expected)
     for stem in ways:
-        must_be(table, stem, table.numbers(stem) > 0, "a number above 0", problems)
+        table.must_be(stem, table.numbers(stem) > 0, "a number above 0")
     angle = table.numbers("angle")
-    must_be(table, "angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees", problems)
-    nodes = []
-    for index, name in enumerate(table.texts(where[0]) if where else ()):
-        try:
-            nodes.append(rotor.node(name) if name else 0)
-        except ValueError:
-            expected = f"a node from 1 to {rotor.n_nodes} or a station{did_you_mean(name, rotor.stations)}"
-            table.complain(problems, index, where[0], expected)
+    table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
+    nodes = [node_at(table, where, index, rotor) or 0 for index in range(len(table))] if where else []
     problems.stop()
     mass, radius = table.numbers("mass"), table.numbers("radius")
     size = table.numbers("unbalance") if "unbalance" in ways else mass * radius

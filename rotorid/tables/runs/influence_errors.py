@@ -24,7 +24,7 @@ from balancing.coefficients.influence import Influence
 from balancing.coefficients.run_errors import marginal
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.tables.reader.columns import Column, Table, must_be
+from rotorid.tables.reader.columns import Column, Table
 from rotorid.tables.reader.decimal_numbers import SMALLEST
 from rotorid.tables.reader.grid import Grid, show
 from rotorid.tables.reader.problems import Problems
@@ -97,12 +97,12 @@ def read_covariance(
     before = len(problems)
     for part in PARTS:
         std = table.numbers(f"std_{part}")
-        must_be(table, f"std_{part}", std >= 0, "a standard deviation of 0 or more", problems)
+        table.must_be(f"std_{part}", std >= 0, "a standard deviation of 0 or more")
         for other in PARTS:
             for plane in planes:
                 stem = _correlation(part, other, plane)
                 small = np.abs(table.numbers(stem)) <= 1 + _ROUNDING
-                must_be(table, stem, small, "a correlation from -1 to 1", problems)
+                table.must_be(stem, small, "a correlation from -1 to 1")
     if len(problems) > before:
         return None
     S, C, P = places.shape
@@ -125,7 +125,7 @@ def read_covariance(
         if np.linalg.eigvalsh(own[s, c] / np.outer(scale[s, c], scale[s, c]))[0] < -_INDEFINITE:
             stem = next(name for name in table.fields if name.startswith("common_"))
             expected = "no more in common than the standard deviations and correlations of this row say"
-            table.complain(problems, int(places[s, c, 0]), stem, expected)
+            table.complain(int(places[s, c, 0]), stem, expected)
             return None
     return covariance, common
 
@@ -149,9 +149,7 @@ def _check_correlations(
     diagonal = np.abs(np.einsum("scii->sci", R) - 1) > _ROUNDING
     for s, c, i in np.argwhere(diagonal):
         stem = _correlation(PARTS[i % 2], PARTS[i % 2], planes[i // 2])
-        table.complain(
-            problems, int(places[s, c, i // 2]), stem, "1, the correlation of a number with itself"
-        )
+        table.complain(int(places[s, c, i // 2]), stem, "1, the correlation of a number with itself")
     unequal = np.abs(R - np.swapaxes(R, -1, -2)) > _ROUNDING
     for s, c, i, j in np.argwhere(np.triu(unequal)):
         stem = _correlation(PARTS[j % 2], PARTS[i % 2], planes[i // 2])
@@ -160,7 +158,7 @@ def _check_correlations(
         expected = (
             f"the same correlation as in row {table.rows[row]}, column {other}: {table.shown(other, row)}"
         )
-        table.complain(problems, int(places[s, c, j // 2]), stem, expected)
+        table.complain(int(places[s, c, j // 2]), stem, expected)
     for s, c in np.ndindex(S, C):
         if diagonal[s, c].any() or unequal[s, c].any():
             continue
@@ -172,7 +170,7 @@ def _check_correlations(
                 "correlations that can stand together: those of this sensor and speed are no covariance "
                 f"(smallest eigenvalue {smallest:.3g})"
             )
-            table.complain(problems, int(places[s, c, i // 2]), stem, expected)
+            table.complain(int(places[s, c, i // 2]), stem, expected)
 
 
 def error_values(influence: Influence, labels: Labels, rows: Sequence[str]) -> Mapping[str, FloatArray]:

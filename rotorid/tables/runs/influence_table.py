@@ -16,7 +16,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, make_table, must_be, read_grid
+from rotorid.tables.reader.columns import Column, Source, make_table, read_grid
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.table_writing import table_bytes, write_bytes
 from rotorid.tables.reader.units import Unit, UnitError
@@ -140,9 +140,9 @@ def load_influence(
         return None
     said = read_conventions(table.source, table.comments, problems)
     speed, size, angle = (table.numbers(stem) for stem in ("speed", "influence", "phase"))
-    must_be(table, "speed", speed > 0, "a speed above 0", problems)
-    must_be(table, "influence", size >= 0, "a coefficient of 0 or more", problems)
-    must_be(table, "phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    table.must_be("speed", speed > 0, "a speed above 0")
+    table.must_be("influence", size >= 0, "a coefficient of 0 or more")
+    table.must_be("phase", np.abs(angle) <= FULL_TURN, "a phase from -360 to 360 degrees")
     sensor, plane = table.texts("sensor"), table.texts("plane")
     sensors = tuple(dict.fromkeys(name for name in sensor if name))
     planes = tuple(sorted({name: 0 for name in plane if name}, key=lambda name: name != BASELINE))
@@ -157,7 +157,7 @@ def load_influence(
             expected = (
                 f"one coefficient per speed, sensor and plane (row {table.rows[seen[key]]} has the same)"
             )
-            table.complain(problems, i, "plane", expected)
+            table.complain(i, "plane", expected)
         seen.setdefault(key, i)
     if len(problems) > before:
         return None
@@ -168,7 +168,7 @@ def load_influence(
         if (s, c, p) not in seen:
             shown = show_speed(speeds[s], table.unit("speed"))
             expected = f"a coefficient of sensor {sensors[c]!r} and plane {planes[p]!r} at {shown}"
-            problems.add(table.source, None, "plane", None, expected)
+            table.as_whole("plane", expected)
     if len(problems) > before:
         return None
     written = Labels(phase=as_phase(said.get("phase") or phase or "lead"))

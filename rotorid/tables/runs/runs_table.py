@@ -10,7 +10,7 @@ import numpy as np
 from balancing.data.trials import Trials
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, Table, must_be, read_table
+from rotorid.tables.reader.columns import Column, Source, Table, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import one_of
 from rotorid.tables.runs.speed_merging import merge_speeds, same_speed, show_speed
@@ -50,9 +50,9 @@ def read_runs(
     if table is None:
         return None, None
     speed, amplitude, phase = (table.numbers(stem) for stem in ("speed", "amplitude", "phase"))
-    must_be(table, "speed", speed > 0, "a speed above 0", problems)
-    must_be(table, "amplitude", amplitude >= 0, "an amplitude of 0 or more", problems)
-    must_be(table, "phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees", problems)
+    table.must_be("speed", speed > 0, "a speed above 0")
+    table.must_be("amplitude", amplitude >= 0, "an amplitude of 0 or more")
+    table.must_be("phase", np.abs(phase) <= FULL_TURN, "a phase from -360 to 360 degrees")
     run, sensor = table.texts("run"), table.texts("sensor")
     usable = [i for i in range(len(table)) if run[i] and sensor[i] and speed[i] > 0]
     start = len(problems)
@@ -112,16 +112,14 @@ def _complain_about_repeats(table: Table, cells: list[list[int]], problems: Prob
                     f"one reading per run, speed and sensor (row {table.rows[rows[0]]} has the same); "
                     "repeated readings need a column repeat"
                 )
-                table.complain(problems, row, "sensor", expected)
+                table.complain(row, "sensor", expected)
             continue
         first: dict[str, int] = {}
         for row in rows:
             label = table.texts("repeat")[row]
             if label and first.setdefault(label, row) != row:
                 same = table.rows[first[label]]
-                table.complain(
-                    problems, row, "repeat", f"another repeat than in row {same}, the same reading"
-                )
+                table.complain(row, "repeat", f"another repeat than in row {same}, the same reading")
 
 
 def _complain_about_gaps(
@@ -146,7 +144,7 @@ def _complain_about_gaps(
         run, at = runs[r], sorted(read[r])
         if len(speeds) - len(at) > _SPEEDS_NAMED:
             expected = f"readings of run {run!r} at all {len(speeds)} speeds of the runs; it has {len(at)}"
-            problems.add(table.source, None, table.fields["speed"].name, None, expected)
+            table.as_whole(table.fields["speed"].name, expected)
             continue
         for s, speed in enumerate(speeds):
             shown = show_speed(speed, unit)
@@ -156,7 +154,7 @@ def _complain_about_gaps(
                 if same_speed(speed, speeds[near], 10.0):
                     hint += f", speeds count as one within {conventions.speed_tolerance_percent:g} %"
                 expected = f"readings of run {run!r} at {shown}, as other runs have{hint}"
-                problems.add(table.source, None, table.fields["speed"].name, None, expected)
+                table.as_whole(table.fields["speed"].name, expected)
                 continue
             for c, sensor in enumerate(sensors):
                 if c not in read[r][s]:
@@ -166,7 +164,7 @@ def _complain_about_gaps(
                             f"a reading of sensor {sensor!r} in run {run!r} at {shown}: every run needs "
                             "every sensor at every speed"
                         )
-                    problems.add(table.source, None, "sensor", None, expected)
+                    table.as_whole("sensor", expected)
     if len(wanting) > _RUNS_NAMED:
         expected = f"as many readings of {len(wanting) - _RUNS_NAMED} further runs"
-        problems.add(table.source, None, None, None, expected)
+        table.as_whole(None, expected)

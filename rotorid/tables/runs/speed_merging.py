@@ -68,14 +68,14 @@ def merge_speeds(
         if len(first) > 1:
             row = list(first.values())[1]
             other = table.shown("speed", next(iter(first.values())))
-            table.complain(problems, row, "speed", f"one speed: run {run!r} has {other} as well, {remedy}")
+            table.complain(row, "speed", f"one speed: run {run!r} has {other} as well, {remedy}")
             clear.discard(group)
     for g, members in enumerate(groups):
         if g in clear and not same_speed(members[0], members[-1], tolerance_percent):
             shown = [show_speed(speed, unit) for speed in members]
             chain = ", ".join(shown if len(shown) < 8 else [*shown[:3], "…", *shown[-3:]])
             expected = f"speeds that are clearly the same or not: {chain} form a chain, neighbours {remedy}"
-            problems.add(table.source, None, name, None, expected)
+            table.as_whole(name, expected)
     each: list[list[float]] = [[] for _ in groups]
     for (group, _), first in of_run.items():
         each[group].extend(first)

@@ -10,7 +10,7 @@ from rotorid.base.arrays import ComplexArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Source, must_be, nearest, read_table
+from rotorid.tables.reader.columns import Column, Source, read_table
 from rotorid.tables.reader.problems import Problems
 from rotorid.tables.reader.units import Unit, one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN, Conventions
@@ -54,27 +54,18 @@ def read_weights(
     table = read_table(source, "weights", COLUMNS, problems, may_be_empty=True)
     if table is None:
         return None
-    present = [stem for stem in ("mass", "unbalance") if stem in table]
-    if len(present) != 1:
-        expected = "one column of weights, mass_<unit> or unbalance_<unit>" + (
-            ", not both" if present else ", such as mass_g or unbalance_g_mm"
-        )
-        column = table.fields["unbalance"].name if present else "mass_g"
-        # A misspelt column has been reported as unknown, with a suggestion: that is enough.
-        near = [nearest(str(problem.column), COLUMNS) or "" for problem in problems.of(table.source)]
-        if present or not any(name.startswith(("mass", "unbalance")) for name in near):
-            problems.add(table.source, table.header_row, column, None, expected)
+    missing = "one column of weights, mass_<unit> or unbalance_<unit>, such as mass_g or unbalance_g_mm"
+    several = "one column of weights, mass_<unit> or unbalance_<unit>, not both"
+    what = table.only(("mass", "unbalance"), "mass_g", missing, several)
+    if what is None:
         return None
-    what = present[0]
     size, angle = table.numbers(what), table.numbers("angle")
-    must_be(
-        table,
+    table.must_be(
         what,
         size > 0,
         "a weight above 0 (a run without weights has no row here; what was removed is a weight 180° away)",
-        problems,
     )
-    must_be(table, "angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees", problems)
+    table.must_be("angle", np.abs(angle) <= FULL_TURN, "an angle from -360 to 360 degrees")
     run, plane = table.texts("run"), table.texts("plane")
     planes = tuple(dict.fromkeys(name for name in plane if name))
     values = conventions.labels.weight_from(size, angle)
@@ -87,14 +78,14 @@ def read_weights(
             expected = (
                 f"a run of the runs table{did_you_mean(run[i], runs)}; its runs are {listing(runs, 'and')}"
             )
-            table.complain(problems, i, "run", expected)
+            table.complain(i, "run", expected)
             continue
         if not (run[i] and plane[i] and size[i] > 0 and np.isfinite(angle[i])):
             continue
         key = (run[i], plane[i], complex(values[i]))
         if key in seen:
             expected = f"each weight once (row {table.rows[seen[key]]} says the same)"
-            table.complain(problems, i, "run", expected)
+            table.complain(i, "run", expected)
             continue
         seen[key] = i
         if runs is not None:

@@ -116,7 +116,11 @@ def _times(P: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _distinct(steps: FloatArray, tolerance: float) -> tuple[FloatArray, IndexArray]:
-    """Steps that differ by more than the tolerance, and which of them each step is."""
+    """Steps that differ by more than the tolerance, and which of them each step is.
+
+    Of those that differ by rounding it is their mean: an error of one would add up over the record.
+    """
     kinds = np.round((steps - steps[:1]) / tolerance)
-    _, first, which = np.unique(kinds, return_index=True, return_inverse=True)
-    return steps[first], which
+    _, first, which, count = np.unique(kinds, return_index=True, return_inverse=True, return_counts=True)
+    one = steps[first]
+    return one + np.bincount(which, steps - one[which]) / count, which

@@ -88,7 +88,9 @@ def test_corrections_that_were_mounted():
     np.testing.assert_array_equal(made.weights[-1], proposed.weights)
     with pytest.raises(ValueError, match="what was mounted in the check run 'run 0' is not known"):
         history(trials, silent)
-    with pytest.raises(ValueError, match="the trial runs have no sensor 'x'; they have 's0', 's1'"):
+    with pytest.raises(
+        ValueError, match="sensor 'x', which the trial runs do not have; they have those of 's0', 's1'"
+    ):
         history(trials, replace(silent, sensors=("x", "s1")), corrections={})
     assert history(silent, silent, corrections={}).weights.shape == (2, 0)
 

@@ -161,7 +161,7 @@ def test_pieces_against_each_other_are_said(cli, tmp_path):
     """Without a stock the least vibration may take many pieces that make little."""
     for name in ("runs.csv", "weights.csv"):
         (tmp_path / name).write_bytes((TURBO / name).read_bytes())
-    plane = "holes = 5\navailable_g_mm = [100, 200]\nper_hole = 2\n"
+    plane = "holes = 5\navailable_g_mm = [150, 350, 600]\nper_hole = 2\n"
     text = 'runs = "runs.csv"\nweights = "weights.csv"\n'
     text += "".join(f"[planes.{name}]\n{plane}" for name in ("left", "middle", "right"))
     (tmp_path / "job.toml").write_text(text)

@@ -10,7 +10,8 @@ import pytest
 from cases import each_of
 from matplotlib.figure import Figure
 
-from rotorid.report.page import Shown, fixed, inline_svg, json_inside, render, render_report, significant
+from rotorid.report.document import Document, fixed, significant
+from rotorid.report.page import inline_svg, json_inside, render, render_report
 
 PROVENANCE = {
     "program": "rotorid",
@@ -156,7 +157,7 @@ def test_digits_after_the_point():
 
 
 def test_numbers_are_shown_with_the_path_at_which_the_document_has_them():
-    show = Shown({"rows": [{"mass": 416.9288, "angle": 359.99, "std": None, "ok": True}], "n": 20})
+    show = Document({"rows": [{"mass": 416.9288, "angle": 359.99, "std": None, "ok": True}], "n": 20}).show
     assert show("rows.0.mass", digits=4) == '<span data-key="rows.0.mass">416.9</span>'
     assert show("rows.0.angle", decimals=1, unit="°") == '<span data-key="rows.0.angle">0.0°</span>'
     assert show("rows.0.mass", digits=2, unit="g") == '<span data-key="rows.0.mass">420\u202fg</span>'

@@ -8,7 +8,8 @@ import pytest
 from sheets import COMMANDS, Shown, disagreement, disagreements, make, read_sheet, run
 
 import fem
-from rotorid.report.number_tables import Numbers, evenly, every_warning
+from rotorid.report.document import Document
+from rotorid.report.number_tables import evenly, every_warning
 from rotorid.report.rotor import critical_report
 from rotorid.report.rotor_description import rotor_sheet, unbalance_table
 from rotorid.samples import sample_data
@@ -244,7 +245,7 @@ def test_measured_modes_have_no_rotor_on_the_sheet():
 
 
 def test_numbers_carry_their_place_and_factor():
-    show = Numbers({"a": [{"b": -1.25e-6}, None], "c": 2.2e-16})
+    show = Document({"a": [{"b": -1.25e-6}, None], "c": 2.2e-16}).show
     assert show("a.0.b", 3, scale=1e6) == '<span data-key="a.0.b" data-scale="1000000.0">−1.25</span>'
     assert show("a.1") == '<span data-key="a.1">–</span>'
     assert show("c", decimals=3, sign=True) == '<span data-key="c">0.000</span>'

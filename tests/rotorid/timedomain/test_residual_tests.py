@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
+import time
+
 import numpy as np
 import pytest
 
@@ -67,6 +70,28 @@ def test_outputs_of_unequal_precision_are_said_and_weighed():
     assert weighed.warnings == ()
     assert weighed.std[0] < 0.2 * plain.std[0]
     assert "used as weights" in weighed.summary()
+
+
+def test_time_that_runs_out_while_outputs_are_weighed_ends_the_fit(monkeypatch):
+    """Once, and with the limit that was set, not with what was left of it."""
+    module = importlib.import_module("rotorid.timedomain.fit")
+    errors, now, rounds = module.output_errors, [0.0], []
+
+    def late(*given):
+        now[0] += 100.0
+        rounds.append(given)
+        return errors(*given)
+
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module, "output_errors", late)
+    model = ode_model({"x": "-a*x"}, initial={"x": 1.0}, outputs={"x": "x", "q": "x**2"}, estimate={"a": 0.5})
+    t, rng = np.linspace(0, 3, 40), np.random.default_rng(1)
+    x = np.exp(-0.8 * t)
+    record = Record(t, {"x": x + 0.002 * rng.normal(size=40), "q": x**2 + 0.1 * rng.normal(size=40)})
+    found = fit(model, record, weigh=True, max_seconds=60.0)
+    assert not found.converged
+    assert len(rounds) == 2
+    assert "stopped after 60 s" in found.message
 
 
 def test_intervals_of_weighed_outputs_hold_the_truth():

@@ -1,4 +1,4 @@
-"""The JSON schema of a job file: sample jobs keep to it, and what the reader refuses it refuses."""
+"""JSON schemas of job and rotor files: sample files keep to them, and what the reader refuses they refuse."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from rotorid.samples import sample_data
 from rotorid.tables.job.job_keys import JOB, PLANE
 from rotorid.tables.schema import FILES, schema
 
-JOBS = sorted(
-    path for path in sample_data().glob("*/*.toml") if "runs" in tomllib.loads(path.read_text("utf-8"))
-)
+FILES_OF = {
+    kind: sorted(p for p in sample_data().glob("*/*.toml") if key in tomllib.loads(p.read_text("utf-8")))
+    for kind, key in (("job", "runs"), ("rotor", "shaft"))
+}
 TYPES = {
     "object": dict,
     "array": list,
@@ -72,9 +73,33 @@ def fits_table(value, rule):
     return True
 
 
-@each_of("path", JOBS)
-def test_every_sample_job_keeps_to_it(path):
-    assert fits(tomllib.loads(path.read_text("utf-8")), schema("job"))
+@each_of("kind", FILES_OF)
+def test_every_sample_keeps_to_it(kind):
+    assert FILES_OF[kind]
+    for path in FILES_OF[kind]:
+        assert fits(tomllib.loads(path.read_text("utf-8")), schema(kind)), path
+
+
+ROTOR = 'shaft = "shaft.csv"\n'
+
+
+@each_of(
+    "text",
+    [
+        "",
+        ROTOR + "shft = 2",
+        ROTOR + "[material]\npoisson_ratio = 0.6",
+        ROTOR + "[model]\nshear = 1",
+        ROTOR + "[[disc]]\nnode = 2\nmass_kg = -1",
+        ROTOR + "[[bearing]]\nnode = 0",
+        ROTOR + "[[bearing]]\nnode = 1\nkind = 'seel'",
+        ROTOR + "[[bearing]]\nnode = 1\npedestal_stiffness_N_per_m = [1, 2, 3]",
+        ROTOR + "[[seal]]\nnode = 1\nkind = 'seal'",
+        ROTOR + "[[seal]]\nnode = 1\nkxx = '2'",
+    ],
+)
+def test_what_no_rotor_file_may_say_does_not_keep_to_it(text):
+    assert not fits(tomllib.loads(text), schema("rotor"))
 
 
 def test_it_is_json_with_every_key_in_every_unit():

@@ -150,6 +150,20 @@ def test_uneven_times_do_not_matter(make):
         np.testing.assert_allclose(run.S[i], alone.S[1], atol=1e-12)
 
 
+@pytest.mark.parametrize("begin", [1e3, 1e6, 1.7e9])
+def test_time_stamps_far_from_zero_cost_no_more_than_their_digits(begin):
+    """Steps between such times are rounded; the error of one must not add up over the record."""
+    model = ode_model(
+        {"x": "v", "v": "-1e4*x - a*v"}, initial={"x": 1, "v": 0, "t0": "first"}, estimate={"a": 2.0}
+    )
+    t = begin + 1e-3 * np.arange(1001)
+    run = simulate(model, [2.0], t)
+    passed, w = t - t[0], np.sqrt(1e4 - 1)
+    assert run.method == "expm"
+    x = np.exp(-passed) * (np.cos(w * passed) + np.sin(w * passed) / w)
+    np.testing.assert_allclose(run.x[:, 0], x, atol=2e-16 * begin * w + 1e-10)
+
+
 def test_constant_rates_are_part_of_the_exact_solution():
     """A mass falling in a fluid: v = (g/c)(1 − e^{−ct}), with g and c unknown."""
     model = ode_model({"v": "g - c*v"}, initial={"v": 0}, estimate={"g": 9.81, "c": 0.5})
