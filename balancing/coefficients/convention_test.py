@@ -59,8 +59,8 @@ def convention_test(trials: Trials) -> ConventionTest:
 
     One reading of them is contradicted where its χ² is beyond what errors explain (p < 0.001) while the other
     one fits (p > 0.01) and leaves less than half; or where the other one leaves less than a tenth, which
-    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.data.reading_errors`; unknown ones
-    are taken as 2 % and 2°.
+    errors of any size hardly do (F test, 0.001). Errors are those of `balancing.data.reading_errors`; unknown
+    ones are taken as 2 % and 2°.
 
     Parameters
     ----------

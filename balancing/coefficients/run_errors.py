@@ -7,9 +7,9 @@ sensor; common to the sensors at a speed; common to the run. What is common chan
 (p), as other weights do (w), or as further unbalances in the planes do (f). On a real rig nearly all of it is
 common (`sample_data/rk4`): errors taken as independent then cover single planes, but not their sum.
 
-How large they are is estimated in `balancing.coefficients.run_error_estimate`, which keeps what the data leave
-open as points of a grid. A covariance of n numbers, with the eigenvalues λ relative to the one stated, is
-passed on with degrees of freedom ν:
+How large they are is estimated in `balancing.coefficients.run_error_estimate`, which keeps what the data
+leave open as points of a grid. A covariance of n numbers, with the eigenvalues λ relative to the one stated,
+is passed on with degrees of freedom ν:
 
     log s² = E[mean log λ],   n F(n, ν; 95 %) = the 95 % quantile of the mixture of Σ λ χ²(1), over s².
 """

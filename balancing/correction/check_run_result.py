@@ -165,7 +165,7 @@ class CheckComparison:
         R, S, C = self.achieved.shape
         labels = self.labels
         before = np.broadcast_to(self.before, (R, S, C))
-        dust = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
+        rounding = ROUNDING * float(np.abs(self.before).max()) * labels.vibration_scale
         blocks: Sequence[Any] | FloatArray = [None] * (R * S * C)
         if self.covariance is not None:
             blocks = labels.vibration_covariance(self.covariance).reshape(-1, 2, 2)

@@ -23,8 +23,8 @@ from balancing.correction.correction_warnings import (
     reading_names,
     warnings_of,
 )
-from balancing.correction.mount_decision import Stakes, coarse, judged, remedies
-from balancing.correction.region_coverage import optimism, uncertain
+from balancing.correction.mount_decision import Inputs, coarse, decide_to_mount, remedies
+from balancing.correction.region_coverage import too_small, uncertain
 from balancing.correction.selected_planes import plane_indices, rows_of
 from balancing.data.limits import Limits
 from balancing.data.trials import Trials
@@ -92,7 +92,7 @@ def correct(  # noqa: PLR0913
     UndeterminedError
         Where the readings do not tell the planes apart; says which act alike, and what to do instead. With
         stated or measured errors by a χ² test at 95 % (`balancing.coefficients.identifiability`). Errors that
-        are assumed refuse nothing (`Correction.decision` tells what they mean): the digits of the readings do,
+        are assumed refuse nothing (`Correction.decision` says what they mean): the digits of the readings do,
         or, without an end of them, a condition number above 1000, which no instrument supports.
     ValueError
         For an unknown plane, speed or method, a missing or unfit baseline, limits that cannot be met.
@@ -175,10 +175,10 @@ def correct(  # noqa: PLR0913
     )
     std, factor = result.mass_std, result.coverage_factor
     widths = None if std is None or factor is None else factor * std
-    result = replace(result, decision=judged(stakes, D, widths, soft=soft, remove=remove))
+    result = replace(result, decision=decide_to_mount(inputs, D, widths, soft=soft, remove=remove))
     warnings, words = influence.warnings + start.warnings, influence.notes
     if result.decision.word == "mount":
-        warnings += unclear + unclear_regions + fitted.warnings + cautions(result, felt, alike=not unclear)
+        warnings += unclear + unclear_regions + fitted.warnings + warnings_of(result, felt, alike=not unclear)
         warnings += left_out(influence, start.readings, chosen, used, D, start.labels, limits)
         words += notes(result) + coarse(influence)
     else:  # the decision says what these would

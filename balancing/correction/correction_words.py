@@ -29,7 +29,7 @@ _SOURCES = {
 
 
 def method_words(name: str, *, weighted: bool) -> str:
-    """What a method of `balancing.solvers.correction_methods` makes small; `weighted`: readings count differently."""
+    """What a method of correction makes small; `weighted`: readings count differently."""
     every: tuple[Method[Any], ...] = (*METHODS, *VARIANTS)
     method = find(every, name, "method")
     about = method.about.replace("amplitude", "weighted amplitude") if weighted else method.about

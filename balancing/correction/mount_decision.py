@@ -268,17 +268,17 @@ def decide_to_mount(
     whole = inputs.choice(range(len(weights)), weights)
     fewer = inputs.fewer()
     calm = [c for c in fewer if c.expected <= whole.expected + HARDLY * before]
-    fighting = any(_effect(whole, stakes) >= FIGHTING * _effect(c, stakes) for c in calm)
-    if not weights.any() or (stakes.sound(whole) and not fighting):
+    fighting = any(_effect(whole, inputs) >= FIGHTING * _effect(c, inputs) for c in calm)
+    if not weights.any() or (inputs.sound(whole) and not fighting):
         return MountDecision("mount", before=before, expected=whole.expected, choices=fewer)
-    contradictions = stakes.influence.contradictions
+    contradictions = inputs.influence.contradictions
     instead: tuple[str, ...]
     if contradictions:
         instead = ("Instead: mend the table, or measure these runs again until they agree.",)
-        cause = "; ".join((*contradictions, _outlook(whole, stakes)))
+        cause = "; ".join((*contradictions, _outlook(whole, inputs)))
         return MountDecision("measure again", cause, instead, before, whole.expected, fewer)
-    cause = "; ".join((*_causes(stakes, weights, widths, remove), _outlook(whole, stakes)))
-    instead = remedies(stakes, fewer, soft=soft)
+    cause = "; ".join((*_causes(inputs, weights, widths, remove), _outlook(whole, inputs)))
+    instead = remedies(inputs, fewer, soft=soft)
     return MountDecision("do not mount", cause, instead, before, whole.expected, fewer)
 
 

@@ -315,10 +315,10 @@ def _moved(alone: Influence, refined: Influence) -> tuple[str, ...]:
     words = []
     for p, plane in enumerate(alone.planes):
         old, new = alone.W[..., p], refined.W[..., refined.planes.index(plane)]
-        dust = _ROUNDING * max(float(np.abs(old).max()), float(np.abs(new).max()))
-        for s, c in np.argwhere((np.abs(old) > dust) | (np.abs(new) > dust)):
-            change = abs(new[s, c]) / max(abs(old[s, c]), dust) - 1.0
-            both = min(abs(old[s, c]), abs(new[s, c])) > dust
+        rounding = _ROUNDING * max(float(np.abs(old).max()), float(np.abs(new).max()))
+        for s, c in np.argwhere((np.abs(old) > rounding) | (np.abs(new) > rounding)):
+            change = abs(new[s, c]) / max(abs(old[s, c]), rounding) - 1.0
+            both = min(abs(old[s, c]), abs(new[s, c])) > rounding
             turn = float(np.angle(new[s, c] * np.conj(old[s, c]))) if both else 0.0
             if abs(change) <= MOVED_AMPLITUDE and abs(turn) <= MOVED_ANGLE:
                 continue

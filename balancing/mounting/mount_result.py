@@ -19,7 +19,6 @@ from balancing.mounting.discrete_weights import Discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm
 from rotorid.base.text import figures, wrap
 
 if TYPE_CHECKING:

@@ -47,7 +47,7 @@ class Planes:
     A: Matrices
     planes: int
     rows: IndexArray
-    feet: IndexArray
+    pedestals: IndexArray
     pedestal_mass: FloatArray
     pedestal_stiffness: FloatArray
     pedestal_damping: FloatArray
@@ -161,7 +161,7 @@ def both_planes(rotor: Rotor, *, complex_coordinate: bool | None = None) -> Plan
         A=A,
         planes=p,
         rows=np.array([A.stride * (s.node - 1) for s in supports], dtype=np.intp),
-        feet=np.array([i for i, _ in stands], dtype=np.intp),
+        pedestals=np.array([i for i, _ in stands], dtype=np.intp),
         pedestal_mass=np.array([[pedestal.mass] * p for _, pedestal in stands]).reshape(-1, p),
         pedestal_stiffness=np.array([pedestal.xy("stiffness")[:p] for _, pedestal in stands]).reshape(-1, p),
         pedestal_damping=np.array([pedestal.xy("damping")[:p] for _, pedestal in stands]).reshape(-1, p),
@@ -190,7 +190,7 @@ def project(P: Planes, basis: FloatArray) -> Quadratic:
         whole = np.zeros((p * (d + f), p * (d + f)), dtype=sides.dtype)
         both = sides[:, None, :, None] * ((shaft + shaft.T) / 2)[:, None]  # plane, unknown, plane, unknown
         whole[: p * d, : p * d] = both.reshape(p * d, p * d)
-        np.fill_diagonal(whole[p * d :, p * d :], feet.T.ravel())
+        np.fill_diagonal(whole[p * d :, p * d :], pedestals.T.ravel())
         return whole
 
     along, none = np.eye(p), np.zeros((f, p))

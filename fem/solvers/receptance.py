@@ -1,10 +1,10 @@
 """Response to forces that rotate with the rotor, per unit of force.
 
-The fast way takes the receptance of the conservative rotor on reference springs (`fem.matrices.undamped_matrices`) from
-its lowest modes, adds the static contribution of all others as a power series in ω², and brings in what the
-supports do besides as a change of low rank: one per supported node, two where forward and backward whirl are
-coupled. A bound on what the series leaves out decides how long it must be. The exact way is
-`fem.solvers.synchronous_banded`; it takes over where the fast one loses digits.
+The fast way takes the receptance of the conservative rotor on reference springs
+(`fem.matrices.undamped_matrices`) from its lowest modes, adds the static contribution of all others as a
+power series in ω², and brings in what the supports do besides as a change of low rank: one per supported
+node, two where forward and backward whirl are coupled. A bound on what the series leaves out decides how long
+it must be. The exact way is `fem.solvers.synchronous_banded`; it takes over where the fast one loses digits.
 """
 
 from __future__ import annotations

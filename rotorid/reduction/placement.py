@@ -58,7 +58,7 @@ def rank_nodes(
     check
         How many of the first modes are compared, 1 … n; default n.
     normalise, rows
-        As in `rotorid.reduction.equivalent.equivalent_masses_formula_50.design`. With "first" the first mass is the leftmost one.
+        As in `rotorid.reduction.equivalent_masses`. With "first" the first mass is the leftmost one.
     speed
         Where tables of supports are read, rad/s; by default their lowest common speed.
 

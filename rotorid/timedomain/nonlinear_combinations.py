@@ -16,6 +16,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.search import RCOND
+from rotorid.regression.undetermined_combinations import Combination, echelon
 from rotorid.timedomain.methods.least_squares_problem import Problem
 
 REACH = 0.2

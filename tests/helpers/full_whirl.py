@@ -46,7 +46,7 @@ def exact_modes(P: Planes, speed: float, n: int) -> tuple[ComplexArray, ComplexA
 def _arnoldi(
     P: Planes, speed: float, n: int, scale: float
 ) -> tuple[ComplexArray, ComplexArray, FloatArray, int]:
-    """Largest μ of the inverse form (`fem.solvers.quadratic_eigenvalues`) by Arnoldi's method, with sparse factors."""
+    """Largest μ of the inverse form by Arnoldi's method, with sparse factors."""
     from scipy.sparse import coo_array, csc_array
     from scipy.sparse.linalg import LinearOperator, eigs, splu
 

@@ -3,19 +3,19 @@
 import re
 
 from rotorid.samples import sample_data
-from rotorid.tables.job import keys
+from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys
 from rotorid.tables.reader.settings_keys import key_lines
 from rotorid.tables.rotor import bearing, rotor_file
 
 PAGE = sample_data().parent / "docs" / "files.md"
 TABLES = {
-    "key": keys.JOB,
-    "key of [errors]": keys.ERRORS,
-    "key of [key_phasor]": keys.KEY_PHASOR,
-    "key of [slow_roll.SENSOR]": keys.VECTOR,
-    "key of [planes.NAME]": keys.PLANE,
-    "key of [sensors.NAME]": keys.SENSOR,
+    "key": job_keys.JOB,
+    "key of [errors]": job_keys.ERRORS,
+    "key of [key_phasor]": job_keys.KEY_PHASOR,
+    "key of [slow_roll.SENSOR]": job_keys.VECTOR,
+    "key of [planes.NAME]": job_keys.PLANE,
+    "key of [sensors.NAME]": job_keys.SENSOR,
     "key of a model file for harmonic tests": harmonic_file.HARMONIC,
     "key of a model file with states": ode_file.TIME_STATES,
     "further key with matrices": (*matrix_form.MATRICES, *ode_file.FORCE),

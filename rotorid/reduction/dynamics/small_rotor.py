@@ -241,7 +241,7 @@ class SmallRotor:
 
     def _order(self) -> list[tuple[str, int]]:
         """Names of the unknowns, and where they stand in `quadratic`."""
-        d, n, feet = len(self.kept), len(self.nodes), self.quadratic.P.pedestals
+        d, n, pedestals = len(self.kept), len(self.nodes), self.quadratic.P.pedestals
         out = [
             (f"{axis}{self.kept[k]}", plane * d + k)
             for part in (range(n), range(n, d))

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 def equations(small: SmallRotor) -> Quadratic:
     """λ² M + λ D(Ω) + K(Ω) of a small rotor: of z = x + i y if the rotor is symmetric, else of both planes.
 
-    In this form `fem.solvers.quadratic_eigenvalues`, `fem.solvers.mode_tracking` and `fem.solvers.crossing` take it for the
+    In this form `quadratic_eigenvalues`, `mode_tracking` and `crossing` of `fem.solvers` take it for the
     full rotor's equations in a basis of the shaft, and both models are solved in the same way. Modal damping
     is the same in both planes and does not couple them, so that its block of one plane damps z, too.
     """
     Q = small.quadratic
     if not small.rotor.symmetric:
         return replace(Q, D0=Q.D0 + small.external)
-    d, feet = Q.basis.shape[1], len(Q.P.pedestals)
-    in_x = np.concatenate((np.arange(d), 2 * d + np.arange(feet)))
+    d, pedestals = Q.basis.shape[1], len(Q.P.pedestals)
+    in_x = np.concatenate((np.arange(d), 2 * d + np.arange(pedestals)))
     pick = np.ix_(in_x, in_x)
     one = project(both_planes(small.rotor), Q.basis)
     return replace(one, M=Q.M[pick], D0=one.D0 + small.external[pick])

@@ -1,7 +1,7 @@
 """Uncertainty of the masses of formula (50) and of the small model's frequencies, from errors of the inputs.
 
-All of this is first order (derivatives: `rotorid.reduction.equivalent.mass_sensitivity`); the result compares it
-with exact recomputation and says where it is poor.
+All of this is first order (derivatives: `rotorid.reduction.equivalent.mass_sensitivity`); the result compares
+it with exact recomputation and says where it is poor.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rotorid.base.suggestions import did_you_mean
 from rotorid.expressions import is_name
-from rotorid.tables.reader import kinds
+from rotorid.tables.reader import value_kinds
 from rotorid.tables.reader.decimal_numbers import LARGEST
 from rotorid.tables.reader.settings_keys import Key, Kind, Said, take
 from rotorid.tables.reader.toml_file import Section
@@ -47,13 +47,13 @@ def _errors(section: Section) -> AmplitudeErrors | None:
 NUMBERS = by_own_name({"type": "number"})
 TEXTS = by_own_name({"type": ["string", "number"]})
 ERRORS = (
-    Key("amplitude_percent", kinds.number(0.0, 1000.0), "of an amplitude, percent of it", default=0.0),
-    Key("phase_deg", kinds.number(0.0, 360.0), "of a phase, degrees", default=0.0),
-    Key("floor", kinds.number(0.0), "at amplitude 0, in the unit of the model", default=0.0),
+    Key("amplitude_percent", value_kinds.number(0.0, 1000.0), "of an amplitude, percent of it", default=0.0),
+    Key("phase_deg", value_kinds.number(0.0, 360.0), "of a phase, degrees", default=0.0),
+    Key("floor", value_kinds.number(0.0), "at amplitude 0, in the unit of the model", default=0.0),
 )
 """One standard deviation of a reading."""
 STATED_ERRORS = Key(
-    "errors", kinds.table(ERRORS, _errors), "of readings of amplitudes, one standard deviation"
+    "errors", value_kinds.table(ERRORS, _errors), "of readings of amplitudes, one standard deviation"
 )
 BOUNDS = Key("bounds", by_own_name(_LIMITS), "name = [lowest, highest], `inf` for none")
 

@@ -9,7 +9,7 @@ from cases import each_of
 
 from balancing import Influence, Limits, ReadingErrors, UndeterminedError, correct, estimate_influence
 from balancing.coefficients.baseline import starting_point
-from balancing.correction.mount_decision import Stakes, remedies
+from balancing.correction.mount_decision import Inputs, remedies
 from balancing.data.reading_errors import reading_covariance
 from balancing.solvers.error_propagation import error_form, prediction_covariance
 

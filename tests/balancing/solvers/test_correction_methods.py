@@ -18,7 +18,7 @@ from balancing import (
     unbalance,
 )
 from balancing.correction import correction_words
-from balancing.solvers import methods
+from balancing.solvers import correction_methods
 from balancing.solvers.effective_variance import effective_variance
 from fem.model import supports
 from rotorid.base.registry import Method
@@ -264,8 +264,8 @@ def test_a_method_is_one_entry(monkeypatch):
         "the answer is that of least squares",
         correction_methods.find(correction_methods.METHODS, "least-squares", "").function,
     )
-    for module in (methods, correction_words):
-        monkeypatch.setattr(module, "METHODS", (*methods.METHODS, mine))
+    for module in (correction_methods, correction_words):
+        monkeypatch.setattr(module, "METHODS", (*correction_methods.METHODS, mine))
     trials, _ = job()
     influence = estimate_influence(trials)
     found = correct(influence, method="mine")

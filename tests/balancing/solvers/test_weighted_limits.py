@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from balancing import Limits
-from balancing.solvers import likelihood, methods, weighted_limits
+from balancing.solvers import correction_methods, likelihood, weighted_limits
 from balancing.solvers.correction_methods import fit_weights
 from rotorid.regression import stretch
 from tests.helpers.limited_problems import global_search, problem

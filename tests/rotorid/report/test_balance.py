@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from balance_sheets import DATA, hard, on_top, parts_of, sheet_of, value_at
 
-from rotorid.report import balance, conventions, document, grids
+from rotorid.report import balance, conventions_explained, document, number_tables
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import plane_figure, residual_figure
 
@@ -348,7 +348,7 @@ def test_a_reader_can_predict_a_reading_by_hand(phase, angles, turn):
 
 
 def test_examples_in_the_docstrings():
-    for module in (document, conventions, grids):
+    for module in (document, conventions_explained, number_tables):
         failed, tried = doctest.testmod(module)
         assert failed == 0
         assert tried > 0

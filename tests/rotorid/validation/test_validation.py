@@ -260,7 +260,12 @@ def unstretched(function):
             "masses",
             8,
         ),
-        ("rotorid.validation.formula_50.natural_frequencies", lambda f: scaled(f, 1.00001), "masses", 6),
+        (
+            "rotorid.validation.formula_50.natural_frequencies",
+            lambda f: scaled(f, 1.00001),
+            "masses",
+            6,
+        ),
         ("rotorid.harmonic.regression_rows.Rows.real_rows", unstretched, "lessons", 15),
         ("rotorid.harmonic.operator_model.HarmonicModel.predict", conjugate, "lessons", 8),
         ("rotorid.validation.identification.natural_modes", lambda f: scaled(f, 1.0001), "lessons", 4),

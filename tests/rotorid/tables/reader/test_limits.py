@@ -10,7 +10,7 @@ import pytest
 from tables_data import RUNS, WEIGHTS, complaints, write_book, write_csv
 
 from rotorid.tables import read_harmonic_model, read_ode_model, read_rotor, read_trials
-from rotorid.tables.reader import grid, input_file, text_file, workbook
+from rotorid.tables.reader import excel_workbook, grid, input_file, text_file
 from rotorid.tables.reader.excel_workbook import read_workbook
 from rotorid.tables.reader.input_file import each_file_once, file_content
 from rotorid.tables.reader.problems import Problems
