@@ -123,6 +123,13 @@ def test_what_a_few_pieces_make_is_no_better_where_not_every_choice_can_be_tried
     assert found.bound <= abs(found.error) <= min(abs(one.error) for one in fewer_pieces(found))
 
 
+def test_a_scarce_stock_among_many_holes_out_of_reach_is_answered():
+    holes = from_list(equal_holes(36), [1.5, 7.5], stock=[8, 2])
+    found = split(42.63 * np.exp(1j * np.radians(20.0)), holes)
+    assert (found.mounting.counts.sum(axis=0) <= [8, 2]).all()
+    assert found.bound <= abs(found.error) < 42.63 - 26.0
+
+
 def test_fewer_pieces_are_worse_in_order():
     found = split(0.035 * np.exp(2.1j), from_list(equal_holes(24), [0.01, 0.02]))
     ladder = fewer_pieces(found)
