@@ -63,7 +63,9 @@ class FreeAmounts:
     def aim(self, z: complex) -> None:
         """See `Attainable`; nothing needs to be listed."""
 
-    def near(self, z: complex, low: float, high: float, most: int) -> tuple[ComplexArray, IntArray] | None:
+    def near(
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
+    ) -> tuple[ComplexArray, IntArray] | None:
         """See `Attainable`."""
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
         inner = low if middle == z else -1.0

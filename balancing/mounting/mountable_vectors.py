@@ -56,8 +56,13 @@ class Attainable(Protocol):
     def aim(self, z: complex) -> None:
         """Get ready to look vectors up; where not all can be, those near z."""
 
-    def near(self, z: complex, low: float, high: float, most: int) -> tuple[ComplexArray, IntArray] | None:
-        """Vectors with low < |d − z| ≤ high, nearest first, and keys (n, 3); None if there may be > most."""
+    def near(
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
+    ) -> tuple[ComplexArray, IntArray] | None:
+        """Vectors with low < |d − z| ≤ high, nearest first, and keys (n, 3); None if there may be > most.
+
+        `fitting` counts only what fits the limits of pieces, which takes longer.
+        """
 
     def lowest(self, g: complex) -> float:
         """Lower bound of Re(ḡ d) over the set (also over what was left out)."""
@@ -77,23 +82,25 @@ def nearest(one: Attainable, z: complex, slack: float = 0.0) -> tuple[ComplexArr
     ValueError
         Where the set is empty, or too dense for a search.
     """
-    low = apart(one, z)
+    low, fitting = apart(one, z), False
     radius = max(low, 0.0) + one.spacing
     furthest = abs(z) + abs(one.mounted) + one.reach
     while radius < 4 * furthest:
-        hit = one.near(z, low, radius, MOST)
+        hit = one.near(z, low, radius, MOST, fitting=fitting)
         inner = max(low, 0.0)
-        if hit is None:
-            if radius - inner < _THIN * furthest:
-                raise ValueError(
-                    "there are too many combinations near this weight: allow fewer pieces or fewer holes, or "
-                    "take a larger step"
-                )
+        if hit is None and radius - inner >= _THIN * furthest:
             radius = inner + (radius - inner) / 8
+        elif hit is None and not fitting:  # what fits no stock may crowd the way
+            fitting, radius = True, inner + one.spacing
+        elif hit is None:
+            raise ValueError(
+                "there are too many combinations near this weight: allow fewer pieces or fewer holes, or "
+                "take a larger step"
+            )
         elif len(hit[0]):
             least = float(np.abs(hit[0][0] - z))
             if least + slack > radius:
-                hit = one.near(z, low, least + slack, MOST) or hit
+                hit = one.near(z, low, least + slack, MOST, fitting=fitting) or hit
             tied = np.abs(hit[0] - z) <= least + slack
             return hit[0][tied], hit[1][tied]
         else:

@@ -166,7 +166,9 @@ class PieceSums:
         aside = abs(nearest_allowed(z, self.mounted, self.max_weight) - z)
         return max(self._relaxed(z)[0] - SAME * self.reach, apart(self, z), aside)
 
-    def near(self, z: complex, low: float, high: float, most: int) -> tuple[ComplexArray, IntArray] | None:
+    def near(
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
+    ) -> tuple[ComplexArray, IntArray] | None:
         """See `Attainable`."""
         first, second = self.halves
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
@@ -177,12 +179,10 @@ class PieceSums:
         to, reach = middle - self.fixed - first.sums[rows], np.full(len(rows), float(radius))
         if radius > _WIDE * self._radius:
             to, reach = lens(to, float(radius), self._centre, self._radius)
-        start, count, order = self._lines(to, reach)
-        total = int(count.sum())
-        if total > most:
+        pairs = self._fitting(rows, to, reach, most) if fitting else self._pairs(rows, to, reach, most)
+        if pairs is None:
             return None
-        i = np.repeat(np.tile(rows, 3), count)
-        j = order[np.arange(total) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)]
+        i, j = pairs
         d = first.sums[i] + second.sums[j] + self.fixed
         distance = np.abs(d - z)
         good = (
@@ -194,14 +194,54 @@ class PieceSums:
         one = one[np.argsort(distance[one], kind="stable")]
         return d[one], np.column_stack((i[one], j[one], np.zeros(len(one), dtype=np.int64)))
 
-    def _lines(self, z: ComplexArray, radius: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    def _pairs(
+        self,
+        rows: IndexArray,
+        to: ComplexArray,
+        reach: FloatArray,
+        most: int,
+        partners: BoolArray | None = None,
+    ) -> tuple[IndexArray, IndexArray] | None:
+        """Rows of the first half with those of the second (`partners` alone) that may be within reach."""
+        start, count, order = self._lines(to, reach, partners)
+        total = int(count.sum())
+        if total > most:
+            return None
+        there = np.arange(total) - np.repeat(np.cumsum(count) - count, count) + np.repeat(start, count)
+        return np.repeat(np.tile(rows, 3), count), order[there]
+
+    def _fitting(
+        self, rows: IndexArray, to: ComplexArray, reach: FloatArray, most: int
+    ) -> tuple[IndexArray, IndexArray] | None:
+        """The same, of pairs alone that are within the limits together."""
+        first, second = self.halves
+        i, j = [], []
+        kinds, which = np.unique(first.used[rows], axis=0, return_inverse=True)
+        for n, used in enumerate(kinds):
+            own = which.ravel() == n
+            partners = (used + second.used <= self.limits).all(axis=1)
+            pairs = self._pairs(rows[own], to[own], reach[own], most, partners)
+            if pairs is None:
+                return None
+            i.append(pairs[0])
+            j.append(pairs[1])
+            most -= len(pairs[0])
+        none = np.zeros(0, dtype=np.intp)
+        return np.concatenate([none, *i]), np.concatenate([none, *j])
+
+    def _lines(
+        self, z: ComplexArray, radius: FloatArray, partners: BoolArray | None = None
+    ) -> tuple[IntArray, IntArray, IntArray]:
         """Where, and how many, sums of the second half may be within a radius of points, on three lines each.
 
         They are sorted by lines of a height h ≥ radius and by their real part within them; `order` is that.
+        `partners` (n,): only these sums.
         """
         order, keys, h, origin, width = self._grid(float(radius.max(initial=0.0)))
         z = z - origin
         pad = 1e-14 * (abs(keys[-1]) + width)
+        if partners is not None:
+            order, keys = order[partners[order]], keys[partners[order]]
         lowest = np.floor((z.imag - radius) / h)
         starts, counts = [], []
         x0 = np.clip(z.real - radius - pad, -pad, width)

@@ -1,11 +1,10 @@
 """Split of one given weight on the holes of one plane: the nearest vector that can be mounted.
 
-The vector Σ_h a_h e^{iφ_h} nearest to a target, where a_h is what can stand in hole h, is found exactly: the
-free holes are dealt in turn to two halves, all sums of each half are listed (equal ones once, with the fewest
-pieces), and for every sum of one half a tree finds the nearest partner in the other. Where even the halves
-are too many (some thirty holes at odd angles with several sizes of pieces), only so many holes vary about the
-rounded answer of the continuous problem, and `bound`, the error with free amounts up to the largest content
-of each hole, says how much better anything could be.
+The vector Σ_h a_h e^{iφ_h} nearest to a target, where a_h is what can stand in hole h, is found exactly
+(`balancing.mounting.piece_sums`). Where there are too many of them (some thirty holes at odd angles with
+several sizes of pieces), only so many holes vary about the rounded answer of the continuous problem; what a
+few pieces make in all holes is tried besides, and `bound`, the error with free amounts up to the largest
+content of each hole, says how much better anything could be.
 
 This minimises the error of one weight. What is left of the vibration is minimised over all planes together in
 `balancing.mounting.discrete_weights`.
@@ -27,6 +26,8 @@ from rotorid.base.text import percent
 
 _PROVEN = 1e-9
 _TIE = 1e-10
+_FEW = 4
+"""So many pieces are tried in all holes where not every choice can be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,10 +251,23 @@ def _mounted(target: complex, holes: Holes, most_pieces: int | None) -> tuple[Mo
     if not holes.free_amounts:
         sums = PieceSums(holes, holes.free, holes.max_weight, most_pieces)
         sums.aim(target)
-        return _fewest(sums, target, scale), np.inf if sums.complete else sums.bound(target)
+        found = _fewest(sums, target, scale)
+        if sums.complete:
+            return found, np.inf
+        if most_pieces is None or most_pieces > _FEW:
+            found = min((*_of_few(target, holes), found), key=lambda one: abs(one.vector - target))
+        return found, sums.bound(target)
     needed = np.inf if np.isfinite(holes.max_weight) else 2 * scale
     amounts = FreeAmounts(holes, holes.free, holes.max_weight, needed)
     return _fewest(amounts, target, scale) if holes.step else amounts.place_nearest(target), np.inf
+
+
+def _of_few(target: complex, holes: Holes) -> tuple[Mounting, ...]:
+    """The nearest vector of a few pieces, if these make the plane light enough."""
+    try:
+        return (_mounted(target, holes, _FEW)[0],)
+    except ValueError:
+        return ()
 
 
 def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
@@ -268,7 +282,7 @@ def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
     return min((one.mount(key) for key in nearest(one, target, _TIE * scale)[1]), key=cost)
 
 
-def fewer_pieces(found: Split, most: int = 4) -> list[Split]:
+def fewer_pieces(found: Split, most: int = _FEW) -> list[Split]:
     """The nearest vectors with 1, 2, … `most` pieces, as long as these are fewer than `found` has.
 
     Each is listed only where it is nearer to the target than those with fewer pieces; empty for free amounts.

@@ -115,6 +115,22 @@ def test_more_than_can_be_listed_has_an_honest_bound():
     assert far.bound <= abs(far.error)
 
 
+def test_what_a_few_pieces_make_is_no_better_where_not_every_choice_can_be_tried():
+    holes = from_list(equal_holes(36, np.radians(200.0)), [3.0, 24.0])
+    target = 6.863 * np.exp(1j * np.radians(286.8)) - 19.56
+    found = split(target, holes, most_pieces=6)
+    assert not found.proven
+    assert found.bound <= abs(found.error) <= min(abs(one.error) for one in fewer_pieces(found))
+
+
+def test_a_scarce_stock_among_many_holes_out_of_reach_is_answered():
+    holes = from_list(equal_holes(36), [1.5, 7.5], stock=[8, 2])
+    turned = np.exp(1j * np.radians([20.0, 292.0, 200.0]))
+    found = split(complex([42.63, -9.0, -6.0] @ turned), holes)
+    assert (found.mounting.counts.sum(axis=0) <= [8, 2]).all()
+    assert found.bound <= abs(found.error) < 27.41
+
+
 def test_fewer_pieces_are_worse_in_order():
     found = split(0.035 * np.exp(2.1j), from_list(equal_holes(24), [0.01, 0.02]))
     ladder = fewer_pieces(found)
