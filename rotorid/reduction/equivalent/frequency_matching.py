@@ -20,6 +20,9 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.reduction.equivalent.small_model_modes import natural_frequencies
 
+FARTHEST = 300.0
+"""Largest logarithm of a mass in a trial step, which float64 can square."""
+
 MOST = 3
 """Masses up to which elimination gives one polynomial."""
 
@@ -174,7 +177,7 @@ def _refined(shape: FloatArray, z: FloatArray, start: FloatArray) -> FloatArray:
     tiny = np.finfo(float).tiny
 
     def spectrum(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        root = np.exp(x / 2)
+        root = np.exp(np.clip(x, -FARTHEST, FARTHEST) / 2)
         lam, V = np.linalg.eigh(root[:, None] * shape * root)
         return np.log(np.maximum(lam[::-1], tiny)) - np.log(z), V[:, ::-1].T ** 2
 

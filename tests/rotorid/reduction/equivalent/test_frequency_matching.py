@@ -253,3 +253,23 @@ def test_trade_off_names_what_it_leaves_out():
 def test_trade_off_refuses_bad_nodes(rotor, nodes, message):
     with pytest.raises(ValueError, match=message):
         trade_off(rotor, nodes)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("alpha", "omega"),
+    [
+        (
+            [[1, -0.6612, 1.3792], [-0.6612, 1.0457, -1.5606], [1.3792, -1.5606, 3.3518]],
+            [1, 2.6936, 232.9631],
+        ),
+        ([[1, 0.1593, -1.0076], [0.1593, 0.4319, -0.314], [-1.0076, -0.314, 1.7292]], [1, 1.2874, 38.7023]),
+        ([[1, 0.2127, 0.3258], [0.2127, 0.1234, 0.1822], [0.3258, 0.1822, 0.3322]], [1, 1.9623, 91.1191]),
+        ([[1, 1.0403, 2.0046], [1.0403, 1.1589, 1.9398], [2.0046, 1.9398, 6.595]], [1, 2.8907, 79.0464]),
+        ([[1, 1.8816, 0.142], [1.8816, 4.6643, 1.1891], [0.142, 1.1891, 2.9523]], [1, 2.8783, 134.5128]),
+    ],
+)
+def test_steps_to_masses_beyond_all_bounds_say_nothing(alpha, omega):
+    """Far frequencies: a trial step may leave what float64 can square."""
+    for masses in matching_masses(alpha, omega):
+        np.testing.assert_allclose(natural_frequencies(alpha, masses)[0], omega, rtol=1e-8)
