@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 import fem
 from benchmarks.rotors import ROSS, SIZES, Bearing, ross, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, relative_difference
-from rotorid.reduction.methods import guyan
+from rotorid.reduction.guyan_irs_serep import guyan
 from rotorid.reduction.placement import rank_nodes
 
 MASSES, MODES = 3, 2

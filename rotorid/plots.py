@@ -74,7 +74,7 @@ def _balancing() -> Pictures:
 def _reduction() -> Pictures:
     from rotorid.reduction import placement_plot, plots
     from rotorid.reduction.dynamics import comparison_plots, response_comparison, stability_comparison
-    from rotorid.reduction.methods_result import Methods
+    from rotorid.reduction.guyan_irs_serep_result import Methods
     from rotorid.reduction.placement_result import Placement
     from rotorid.reduction.result import Reduction
 

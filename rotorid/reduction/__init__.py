@@ -16,8 +16,8 @@ from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
     separate,
     separated_compliance,
 )
-from rotorid.reduction.methods import compare_methods, guyan, irs, serep
-from rotorid.reduction.methods_result import Method, Methods
+from rotorid.reduction.guyan_irs_serep import compare_methods, guyan, irs, serep
+from rotorid.reduction.guyan_irs_serep_result import Method, Methods
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.reduction.placement_result import Placement
 from rotorid.reduction.reduce_rotor import reduce, reduce_measured

@@ -15,7 +15,7 @@ from rotorid.base.rpm import RPM
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from rotorid.reduction.methods_result import Methods
+    from rotorid.reduction.guyan_irs_serep_result import Methods
     from rotorid.reduction.result import Reduction
 
 

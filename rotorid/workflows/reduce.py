@@ -43,7 +43,7 @@ View = Literal["shapes", "methods", "placement", "response", "stability"]
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
     """What `methods` compares."""
-    from rotorid.reduction.methods import METHODS
+    from rotorid.reduction.guyan_irs_serep import METHODS
 
     return {"methods": METHODS}
 

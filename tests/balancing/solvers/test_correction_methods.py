@@ -22,7 +22,7 @@ from balancing.solvers import correction_methods
 from balancing.solvers.effective_variance import effective_variance
 from fem.model import supports
 from rotorid.base.registry import Method
-from rotorid.reduction import methods as reduction
+from rotorid.reduction import guyan_irs_serep as reduction
 
 ERRORS = ReadingErrors(0.02, 0.02)
 S, C, P = 3, 4, 2

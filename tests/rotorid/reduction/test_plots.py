@@ -13,7 +13,7 @@ import fem
 from rotorid.plots import plot
 from rotorid.reduction import reduce
 from rotorid.reduction.dynamics.comparison_plots import plot_running, plot_stability
-from rotorid.reduction.methods import compare_methods
+from rotorid.reduction.guyan_irs_serep import compare_methods
 from rotorid.reduction.placement_plot import plot_placement
 from rotorid.reduction.plots import plot_methods, plot_reduction
 

@@ -43,7 +43,7 @@ from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
 )
 from rotorid.reduction.equivalent.plane_at_rest import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.small_model_modes import like, mac, natural_frequencies
-from rotorid.reduction.methods_result import Method, Methods
+from rotorid.reduction.guyan_irs_serep_result import Method, Methods
 
 DEPENDENT = 1e-6
 """Shapes whose smallest combination at the masters is below this share of their largest entries are one."""

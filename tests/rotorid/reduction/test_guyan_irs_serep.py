@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 import fem
 from rotorid.reduction import reduce
 from rotorid.reduction.equivalent.plane_at_rest import plane_at_rest
-from rotorid.reduction.methods import compare_methods, guyan, irs, serep
+from rotorid.reduction.guyan_irs_serep import compare_methods, guyan, irs, serep
 
 MASTERS = (7, 12, 18)
 

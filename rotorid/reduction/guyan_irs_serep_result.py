@@ -29,7 +29,7 @@ class Method:
     Attributes
     ----------
     name
-        As titled in `METHODS` of `rotorid.reduction.methods`; "regression, k modes".
+        As titled in `METHODS` of `rotorid.reduction.guyan_irs_serep`; "regression, k modes".
     M, K
         Mass, kg, and stiffness, N/m, shape (n, n); None where the method fails at these masters.
     T
