@@ -1,4 +1,4 @@
-"""Reduced models of one rotor at the same nodes, side by side."""
+"""Reduced models of one rotor by Guyan, IRS, SEREP and regression, side by side: result, text and JSON."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ ROTOR = 'shaft = "shaft.csv"\n'
     "text",
     [
         "",
-        ROTOR + "shft = 2",
+        ROTOR + "shafty = 2",
         ROTOR + "[material]\npoisson_ratio = 0.6",
         ROTOR + "[model]\nshear = 1",
         ROTOR + "[[disc]]\nnode = 2\nmass_kg = -1",
