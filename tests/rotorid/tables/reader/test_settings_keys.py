@@ -97,7 +97,7 @@ def test_a_reader_of_units_takes_every_unit_that_it_knows():
         ({"taken": {"3": 0}}, "taken", "a number above 0 for '3', not 0: weights, such as { \"3\" = 10 }"),
         ({"model": {}}, "model.size", "the size"),
         ({"planes": {"left": {"size": 11}}}, "planes.left.size", "a number from 0 to 10"),
-        ({"disc": [{"size": 1}, {"sizze": 1}]}, "disc[2].sizze", "a known key (did you mean 'size'?); known are"),
+        ({"disc": [{"size": 1}, {"sze": 1}]}, "disc[2].sze", "a known key (did you mean 'size'?); known are"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_key(data, column, expected):
