@@ -92,17 +92,17 @@ def test_shares_are_of_largest_remainders():
     assert mutation.shares(7, {"a": 60, "b": 25, "c": 15}) == {"a": 4, "b": 2, "c": 1}
 
 
-def of_function(function, path="fem/api684_peaks.py"):
+def of_function(function, path="fem/peaks.py"):
     return mutation.Mutation(path, 1, 0, 1, "+", "-", function)
 
 
 def test_tests_of_the_module_come_first_and_short_ones_before_long_ones():
     names = ["tests/test_cli.py::c", "tests/fem/test_peaks.py::long", "tests/test_fem_peaks.py::short"]
     seconds = dict(zip(names, (0.1, 9.0, 0.5), strict=True)) | {"tests/fem/test_speed.py::uses": 0.2}
-    everything = {"fem/api684_peaks.py::f": set(seconds), "fem/api684_peaks.py::g": {names[1]}}
+    everything = {"fem/peaks.py::f": set(seconds), "fem/peaks.py::g": {names[1]}}
     suite = mutants.Suite(seconds | {"tests/test_other.py::no": 0.1, names[1] + "er": 1.0}, everything)
     imports = {name.partition("::")[0]: set() for name in suite.seconds}
-    imports["tests/fem/test_speed.py"] = {"fem.api684_peaks"}
+    imports["tests/fem/test_speed.py"] = {"fem.peaks"}
     beside = names[1] + "er"
     found = mutants.order(of_function("f"), suite, imports)
     assert found == [names[2], names[1], "tests/fem/test_speed.py::uses", names[0], beside]
