@@ -335,7 +335,7 @@ def _force_warning(fraction: float) -> tuple[str, ...]:
 def _check_limit(plane: str, amount: float, limit: float, labels: Labels, remedy: str) -> None:
     positive("largest weight of the plane", limit if math.isfinite(limit) else 1.0)
     if amount > limit * (1 + 1e-12):
-        shown = (f"{x * labels.weight_scale:.4g} {labels.weight_unit}" for x in (amount, limit))
+        shown = (f"{x * labels.weight_scale:.4g} {labels.weight_in}" for x in (amount, limit))
         first, second = shown
         raise ValueError(
             f"the trial weight of {first} is larger than the largest weight of plane {plane!r}, "

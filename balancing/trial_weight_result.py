@@ -127,7 +127,7 @@ class TrialWeight:
             share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
             lines.append(f"Force at {found['speed_rpm']:.6g} rpm: {self.force:.4g} N{share}")
         if found["expected"]:
-            unit = self.labels.vibration_unit or "-"
+            unit = self.labels.vibration_in or "-"
             lines += ["", f"{'Expected':24} {'now':>18} {'with it':>18} {'change':>10}   {unit}"]
         for row in found["expected"] or ():
             name = f"{row['sensor']}, {row['speed_rpm']:.6g} rpm"

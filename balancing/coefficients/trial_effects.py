@@ -59,7 +59,7 @@ def check_effects(
         own = slice(2 + 2 * p, 4 + 2 * p)
         if covariance is not None and not _significant(W[..., p], covariance[..., own, own]):
             size = np.abs(trials.weights[run, p]) * CLEAR / clearness(W[..., p], covariance[..., own, own])
-            larger = f"{float(f'{size * trials.labels.weight_scale:.2g}'):g} {trials.labels.weight_unit}"
+            larger = f"{float(f'{size * trials.labels.weight_scale:.2g}'):g} {trials.labels.weight_in}"
             remedy = f"repeat the run with a larger trial weight, at least {larger}".rstrip()
             raise UndeterminedError(
                 f"{words} changed the readings by no more than their errors explain: its effect is not "

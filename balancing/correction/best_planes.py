@@ -107,7 +107,7 @@ class Subsets:
 
     def summary(self) -> str:
         """Table of 80 columns, the best choice first."""
-        scale, unit = self.labels.vibration_scale, self.labels.vibration_unit
+        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
         nothing = (("(none)",), self.rms_before * scale, None, self.largest_before * scale, None, None)
         shown = [
             replace(column, values=[first, *column.values])
@@ -125,7 +125,7 @@ class Subsets:
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale
-        heaviest = "largest weight" + (f", {labels.weight_unit}" if labels.weight_unit else "")
+        heaviest = "largest weight" + (f", {labels.weight_in}" if labels.weight_in else "")
         mass = np.abs(self.weights).max(axis=1) * labels.weight_scale
         return (
             Column("planes", self.planes, ", ".join),

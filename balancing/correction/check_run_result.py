@@ -201,7 +201,7 @@ class CheckComparison:
         else:
             foot = "\nstd: the difference in its standard deviations"
             foot += " (95 % of all below 2.4)" if self.dof is None else ""
-        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
+        unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         return f"Vibration{unit}, predicted and achieved\n{text(list(shown.values()), left=2)}{foot}"
 
 
@@ -215,7 +215,7 @@ def _verdict_words(c: CheckComparison) -> str:
         size = c.labels.vibration(c.difference)[0][r, s, k]
         return (
             "no verdict: the errors of the readings are not known (state them, or repeat readings); "
-            f"{where} differs most, by {figures(size, 3)} {c.labels.vibration_unit}".rstrip()
+            f"{where} differs most, by {figures(size, 3)} {c.labels.vibration_in}".rstrip()
         )
     errors = "stated" if c.dof is None else "estimated"
     chance = "" if c.probability is None else f" (probability {_percent(c.probability)})"
@@ -225,7 +225,7 @@ def _verdict_words(c: CheckComparison) -> str:
         mass, angle = c.labels.weight(c.change)
         largest = mass.max()
         parts = [
-            f"{figures(mass[p], 3)} {c.labels.weight_unit} at {angle[p]:.0f}° in plane {plane!r}"
+            f"{figures(mass[p], 3)} {c.labels.weight_in} at {angle[p]:.0f}° in plane {plane!r}"
             for p, plane in enumerate(c.planes)
             if mass[p] > 0.1 * largest
         ]

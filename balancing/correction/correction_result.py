@@ -386,7 +386,7 @@ class Correction:
         return Column("plane", [f"{p} (remove)" if p in self.remove else p for p in planes], str)
 
     def _corrections_text(self) -> str:
-        unit, mass = self.labels.weight_unit, self.labels.weight(self.weights)[0]
+        unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
         columns = [
             self._plane_column(self.planes),
             Column(unit, mass, figures),
@@ -411,7 +411,7 @@ class Correction:
             return ""
         run, planes, weights = self.mounted
         (mass, angle), more = self.labels.weight(weights), self.labels.weight(self.to_add)[0]
-        unit = self.labels.weight_unit
+        unit = self.labels.weight_in
         columns = [
             self._plane_column(planes),
             Column(f"mounted {unit}", mass, figures),
@@ -438,7 +438,7 @@ class Correction:
         if self.after_covariance is not None:
             within = self.within(self.after_covariance)
             columns.append(Column("95 % within", within, lambda reach: f"± {figures(reach, 2)}"))
-        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
+        unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         head = f"Vibration{unit}, bare rotor before and predicted after"
         return "\n".join([head, text(columns, left=2), wrap(self._rms_words(), "")])
 

@@ -153,7 +153,7 @@ def _rising(
     places.sort(key=lambda place: old[place] - new[place])
     words = [
         f"the vibration of sensor {sensors[c]!r} at {rpm_text(speeds[s])}{where} is predicted "
-        f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_unit}".rstrip()
+        f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_in}".rstrip()
         for s, c in places[:_RISES_NAMED]
     ]
     if len(places) > _RISES_NAMED:

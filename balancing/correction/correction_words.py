@@ -42,7 +42,7 @@ def error_words(
     """Errors of a reading and between runs in one or two sentences."""
     words = (
         f"One standard deviation of a reading: "
-        f"{describe_errors(errors, labels.vibration_unit, labels.vibration_scale)} "
+        f"{describe_errors(errors, labels.vibration_in, labels.vibration_scale)} "
         f"({_SOURCES[source]}){_between_runs(run, labels)}."
     )
     return words if dof is None or dof >= 200 else f"{words} Degrees of freedom: {dof:.3g}."
@@ -77,7 +77,7 @@ def _between_runs(run: RunErrors, labels: Labels) -> str:
     p, w, f = _sizes(run)
     if run.origin == "none" or not (p or w or f):
         return ""
-    floor = f"{figures(f * labels.vibration_scale, 2)} {labels.vibration_unit}".rstrip()
+    floor = f"{figures(f * labels.vibration_scale, 2)} {labels.vibration_in}".rstrip()
     shown = (
         (p > SMALL, f"{100 * p:.2g} % of it"),
         (w > SMALL, f"{100 * w:.2g} % of what the weights do"),

@@ -135,8 +135,8 @@ class History:
 
     def summary(self) -> str:
         """One table of 80 columns: runs, what was mounted, vibration at each speed, share of the limit."""
-        unit = f" in {self.labels.vibration_unit}" if self.labels.vibration_unit else ""
-        head = ["run", f"mounted {self.labels.weight_unit}".rstrip(), "rpm", "largest", "rms"]
+        unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
+        head = ["run", f"mounted {self.labels.weight_in}".rstrip(), "rpm", "largest", "rms"]
         limited = self.of_limit is not None
         lines = [[*head, "of limit"] if limited else head]
         for run in self.to_dict()["runs"]:

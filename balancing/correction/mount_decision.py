@@ -328,7 +328,7 @@ def coarse(influence: Influence) -> tuple[str, ...]:
 
 
 def _shown(labels: Labels, size: float, digits: int = 3) -> str:
-    return f"{figures(size * labels.vibration_scale, digits)} {labels.vibration_unit}".rstrip()
+    return f"{figures(size * labels.vibration_scale, digits)} {labels.vibration_in}".rstrip()
 
 
 def _effect(choice: Choice, inputs: Inputs) -> float:
@@ -359,7 +359,7 @@ def _causes(
         alike = acting_alike(inputs.W)
         mass, angle = labels.weight(weights)
         at = [f"{(angle[p] + 180 * (names[p] in remove)) % 360:.0f}°" for p in alike]
-        each = [f"{figures(mass[p], 3)} {labels.weight_unit}".rstrip() for p in alike]
+        each = [f"{figures(mass[p], 3)} {labels.weight_in}".rstrip() for p in alike]
         against = " against ".join(f"{m} at {a}" for m, a in zip(each, at, strict=True))
         planes = listing((repr(names[p]) for p in alike), "and")
         found.append(f"planes {planes} act alike, and their weights fight each other ({against})")

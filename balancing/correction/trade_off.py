@@ -95,7 +95,7 @@ class TradeOff:
 
     def summary(self) -> str:
         """Table of 80 columns, the knee marked."""
-        vibration = self.labels.vibration_unit
+        vibration = self.labels.vibration_in
         gained = self.objective[0] - self.objective[-1]
         share = (self.objective[0] - self.objective) / (gained if gained > 0 else 1.0)
         marks = ["← knee" if k == self.knee else "" for k in range(len(share))]
@@ -110,7 +110,7 @@ class TradeOff:
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale
-        total = "total" + (f", {labels.weight_unit}" if labels.weight_unit else "")
+        total = "total" + (f", {labels.weight_in}" if labels.weight_in else "")
         return (
             Column("total", self.totals * labels.weight_scale, three_figures, total),
             Column("rms_after", self.rms * scale, three_figures, "rms"),
@@ -123,7 +123,7 @@ class TradeOff:
             if len(self.totals) == 1:
                 return "There is nothing to take away."
             return "The curve has no clear knee: the last weights pay nearly as well as the first."
-        unit, scale = self.labels.weight_unit, self.labels.weight_scale
+        unit, scale = self.labels.weight_in, self.labels.weight_scale
         gain_there = (self.objective[0] - self.objective[self.knee]) / (
             self.objective[0] - self.objective[-1]
         )

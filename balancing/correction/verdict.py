@@ -34,6 +34,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.rpm import rpm
 from rotorid.base.text import wrap
+from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,12 +97,17 @@ class Verdict:
         lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
         lines.append(f"Verdict ({self.source}): {self.overall}")
         for row in judged:
+            unit = (
+                weight_unit_words(row["unit"])
+                if row["kind"] != "sensor"
+                else vibration_unit_words(row["unit"])
+            )
             at = "" if row["speed_rpm"] is None else f" at {row['speed_rpm']:.6g} rpm"
             within = (
                 "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
             )
             line = (
-                f"  {row['kind']} {row['name']}{at}: {row['size']:.4g} {row['unit']}".rstrip()
+                f"  {row['kind']} {row['name']}{at}: {row['size']:.4g} {unit}".rstrip()
                 + f" ({within}), limit {row['limit']:.4g}: {row['verdict']}"
             )
             lines.append(wrap(line, "    "))

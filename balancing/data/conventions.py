@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
 
 Phase = Literal["lead", "lag"]
 Angles = Literal["with rotation", "against rotation"]
@@ -126,13 +127,23 @@ class Labels:
         ends = np.degrees([start, start + width])[:: self.angle_sign] * self.angle_sign
         return [float(round(end, 9)) for end in np.mod(ends + (180.0 if opposite else 0.0), 360.0)]
 
+    @property
+    def vibration_in(self) -> str:
+        """The unit of the readings as people write it: "µm pp"; "" if they have none."""
+        return vibration_unit_words(self.vibration_unit)
+
+    @property
+    def weight_in(self) -> str:
+        """The unit of the weights as people write it: "g·mm"."""
+        return weight_unit_words(self.weight_unit)
+
     def amplitude_words(self, size: float) -> str:
         """An amplitude, given in SI."""
-        return f"{size * self.vibration_scale:.4g} {self.vibration_unit}".rstrip()
+        return f"{size * self.vibration_scale:.4g} {self.vibration_in}".rstrip()
 
     def weight_words(self, size: float) -> str:
         """The size of a weight, given in SI."""
-        return f"{size * self.weight_scale:.4g} {self.weight_unit}".rstrip()
+        return f"{size * self.weight_scale:.4g} {self.weight_in}".rstrip()
 
     def weight_entry(self, weight: complex) -> dict[str, float]:
         """A weight as JSON has it: `mass` in the job's unit and `angle_deg`, without the last digits."""
@@ -142,7 +153,7 @@ class Labels:
     def weight_at(self, weight: complex) -> str:
         """A weight as text, such as "35 g at 120.0°"."""
         size, angle = self.weight(weight)
-        return f"{size:.5g} {self.weight_unit} at {angle:.1f}°"
+        return f"{size:.5g} {self.weight_in} at {angle:.1f}°"
 
     def directions(self, angles: FloatArray) -> list[float]:
         """Angles in rad with the rotation in degrees as the job counts them, without the last digits."""

@@ -40,7 +40,7 @@ def weight_columns(labels: Labels, planes: Sequence[str], weights: ArrayLike) ->
     mass, angle = labels.weight(weights)
     return (
         Column("plane", planes, str),
-        Column("mass", mass, figures, labels.weight_unit),
+        Column("mass", mass, figures, labels.weight_in),
         Column("unit", (labels.weight_unit,) * len(planes)),
         Column("angle_deg", angle, degrees, "angle"),
     )

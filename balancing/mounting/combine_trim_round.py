@@ -70,7 +70,7 @@ class TwoPositions:
 
     def summary(self, labels: Labels) -> str:
         """Text: both solutions."""
-        unit, (one, other) = labels.weight_unit, self.masses * labels.weight_scale
+        unit, (one, other) = labels.weight_in, self.masses * labels.weight_scale
         lines = [f"{labels.weight_at(self.target)} from two weights:"]
         for row, word in zip(self.angles, ("either", "or"), strict=True):
             a, b = labels.directions(row)
@@ -122,7 +122,7 @@ class Rounded:
 
     def summary(self, labels: Labels) -> str:
         """Text: the weight, and what rounding did to it."""
-        scale, unit = labels.weight_scale, labels.weight_unit
+        scale, unit = labels.weight_scale, labels.weight_in
         if not self.worst:
             return labels.weight_at(self.weight)
         return (

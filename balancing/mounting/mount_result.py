@@ -135,7 +135,7 @@ class Mounted:
         for z in (self.after, c.after):
             size = labels.vibration(z)[0]
             left.append(f"rms {small(rms(size), scale)}, largest {small(size.max(), scale)}")
-        lines.append(f"{labels.vibration_unit} left: {left[0]}; with any weights {left[1]}".strip())
+        lines.append(f"{labels.vibration_in} left: {left[0]}; with any weights {left[1]}".strip())
         lines += [
             f"Plane {plane}: nothing; no pieces that it can take make it better."
             for plane in c.planes
@@ -178,7 +178,7 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
         Column("action", actions),
         Column("hole", [place[1] for place in places], str),
         Column("angle_deg", np.mod(angle + gone, 360), "{:.1f}°".format, "angle"),
-        Column("mass", size, figures, labels.weight_unit),
+        Column("mass", size, figures, labels.weight_in),
         Column("unit", [labels.weight_unit] * len(places)),
         Column("pieces", [place[3] for place in places], str),
     )

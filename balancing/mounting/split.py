@@ -77,7 +77,7 @@ class Split:
         return out or ["nothing is mounted: nothing that fits these holes is nearer to the wanted weight"]
 
     def _content(self, h: int, labels: Labels) -> str:
-        unit = labels.weight_unit
+        unit = labels.weight_in
         if self.holes.free_amounts:
             return f"{self.mounting.amounts[h] * labels.weight_scale:.6g} {unit}"
         return " + ".join(
@@ -120,7 +120,7 @@ class Split:
     def summary(self, labels: Labels) -> str:
         """Text: hole by hole, what they make together, and what is missing."""
         sizes, angles = labels.weight([self.target, self.mounting.vector, self.error])
-        unit, what = labels.weight_unit, ("wanted", "mounted", "error")
+        unit, what = labels.weight_in, ("wanted", "mounted", "error")
         lines = [*self.lines(labels), ""]
         for name, size, angle in zip(what, sizes, angles, strict=True):
             share = f"   ({percent(self.relative_error)} %)" if name == "error" else ""

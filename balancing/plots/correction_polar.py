@@ -83,7 +83,7 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     regions = _regions(c)
     for p, plane in enumerate(c.planes):
         _arrow(polar, np.deg2rad(angle[p]), mass[p], COLORS[p % len(COLORS)], MARKERS[p % len(MARKERS)])
-        label = f"{plane}: {figures(mass[p])} {c.labels.weight_unit} at {angle[p]:.1f}°"
+        label = f"{plane}: {figures(mass[p])} {c.labels.weight_in} at {angle[p]:.1f}°"
         polar.plot([], [], color=COLORS[p % len(COLORS)], marker=MARKERS[p % len(MARKERS)], label=label)
         if regions is not None:
             size, around = c.labels.weight(regions[p])
@@ -97,9 +97,7 @@ def corrections(c: Correction, ax: Axes | None = None) -> Axes:
     _largest_weights(polar, c, largest)
     polar.set_rlim(0, 1.15 * largest)
     _quiet_radii(polar, angle, mass)
-    polar.set_title(
-        f"Correction weights on the bare rotor, {c.labels.weight_unit}", fontsize="medium", pad=14
-    )
+    polar.set_title(f"Correction weights on the bare rotor, {c.labels.weight_in}", fontsize="medium", pad=14)
     polar.legend(
         loc="upper center",
         bbox_to_anchor=(0.5, -0.08),
@@ -309,4 +307,4 @@ def _quiet_radii(ax: PolarAxes, angle: FloatArray, size: FloatArray) -> None:
 
 
 def _unit(c: Correction) -> str:
-    return f", {c.labels.vibration_unit}" if c.labels.vibration_unit else ""
+    return f", {c.labels.vibration_in}" if c.labels.vibration_in else ""

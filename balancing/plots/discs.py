@@ -275,7 +275,7 @@ def _write_weights(
         far = bool(before != 0 and not far and abs(np.angle(way / before)) < _CLOSE)
         before = way
         size, angle = (float(v) for v in labels.weight(abs(run[0]) * way))
-        text = f"{'−' if remove else ''}{size:.4g} {labels.weight_unit}"
+        text = f"{'−' if remove else ''}{size:.4g} {labels.weight_in}"
         text = f"{len(run)} × {text}" if len(run) > 1 else text
         x, y = _at((_TEXTS + 0.2 * far) * way, clockwise)
         ax.text(
@@ -356,10 +356,10 @@ def _words(
     for name, value in ((f"{like}wanted (dashed)", weight), (f"{like}made (bold)", made)):
         if value is not None:
             size, angle = (float(v) for v in labels.weight(value))
-            lines.append(f"{name}: {figures(size)} {labels.weight_unit} at {angle:.1f}°")
+            lines.append(f"{name}: {figures(size)} {labels.weight_in} at {angle:.1f}°")
     if weight is not None and made is not None:
-        lines.append(f"error: {float(labels.weight(made - weight)[0]):.2g} {labels.weight_unit}")
+        lines.append(f"error: {float(labels.weight(made - weight)[0]):.2g} {labels.weight_in}")
     if tolerance is not None:
         allowed = float(labels.weight(tolerance)[0])
-        lines.append(f"permissible (dotted): {figures(allowed)} {labels.weight_unit}")
+        lines.append(f"permissible (dotted): {figures(allowed)} {labels.weight_in}")
     return lines

@@ -82,7 +82,7 @@ def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
             reach, around = v.labels.weight(row.region)
             polar.plot(np.unwrap(np.deg2rad(around)), reach, color=colour, lw=1.0)
     polar.set_rlim(0, 1.4 * largest)
-    polar.set_title(f"Residual unbalance and tolerance, {v.labels.weight_unit}", fontsize="medium", pad=14)
+    polar.set_title(f"Residual unbalance and tolerance, {v.labels.weight_in}", fontsize="medium", pad=14)
     _legend(polar)
     return polar
 
@@ -113,14 +113,14 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
     size, angle = t.labels.weight(t.amount * np.exp(1j * t.angle))
     theta, radius = np.deg2rad(float(angle)), float(size)
     polar.plot([theta, theta], [0, radius], color=COLORS[0], lw=2.2)
-    label = f"{t.plane}: {radius:.4g} {t.labels.weight_unit} at {float(angle):.0f}°"
+    label = f"{t.plane}: {radius:.4g} {t.labels.weight_in} at {float(angle):.0f}°"
     polar.plot([theta], [radius], MARKERS[0], color=COLORS[0], label=label)
     if t.angle_reach:
         arc = theta + np.linspace(-t.angle_reach, t.angle_reach, 91)
         polar.plot(arc, np.full_like(arc, radius), color=COLORS[0], lw=4.0, alpha=0.4)
     polar.set_rlim(0, 1.2 * radius)
     polar.set_title(
-        f"Trial weight, {t.labels.weight_unit}, angles {t.labels.angle_words}", fontsize="medium", pad=14
+        f"Trial weight, {t.labels.weight_in}, angles {t.labels.angle_words}", fontsize="medium", pad=14
     )
     _legend(polar)
     return polar

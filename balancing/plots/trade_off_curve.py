@@ -34,7 +34,7 @@ def overview(t: TradeOff) -> Figure:
 
 def curve(t: TradeOff, ax: Axes) -> Axes:
     """Residual over total weight, rms and largest amplitude, the knee marked."""
-    scale, unit = t.labels.vibration_scale, t.labels.vibration_unit
+    scale, unit = t.labels.vibration_scale, t.labels.vibration_in
     x = t.totals * t.labels.weight_scale
     shown = {"max": ("largest amplitude", t.largest, COLORS[1]), "rms": ("rms", t.rms, COLORS[0])}
     for kind, (name, values, colour) in shown.items():
@@ -48,7 +48,7 @@ def curve(t: TradeOff, ax: Axes) -> Axes:
     if t.knee is not None:
         y = shown[t.criterion][1][t.knee] * scale
         ax.axvline(x[t.knee], color="#7F7F7F", lw=0.8, ls="--", zorder=1)
-        text = f"knee: {figures(x[t.knee], 3)} {t.labels.weight_unit}, {figures(y, 3)} {unit}".rstrip()
+        text = f"knee: {figures(x[t.knee], 3)} {t.labels.weight_in}, {figures(y, 3)} {unit}".rstrip()
         ax.plot(x[t.knee], y, "o", ms=11, mfc="none", mec="#000000", mew=1.4, zorder=4, label=text)
     ax.set_ylim(bottom=0)
     ax.set_xlim(left=0)
@@ -70,7 +70,7 @@ def planes(t: TradeOff, ax: Axes) -> Axes:
         ax.axvline(x[t.knee], color="#7F7F7F", lw=0.8, ls="--", zorder=1)
     ax.set_ylim(bottom=0)
     ax.set_xlabel(_total(t))
-    unit = t.labels.weight_unit
+    unit = t.labels.weight_in
     ax.set_ylabel(f"weight{f', {unit}' if unit else ''}")
     ax.legend(
         fontsize="x-small",
@@ -84,5 +84,5 @@ def planes(t: TradeOff, ax: Axes) -> Axes:
 
 
 def _total(t: TradeOff) -> str:
-    unit = t.labels.weight_unit
+    unit = t.labels.weight_in
     return f"total weight of all planes{f', {unit}' if unit else ''}"

@@ -38,7 +38,7 @@ def unbalance_bars(found: Unbalance, ax: Axes | None = None) -> Axes:
         ax.errorbar(x[sure], size[sure], yerr=error, fmt="none", ecolor="black", capsize=2, lw=1.2)
     ax.set_xticks(x, found.stations, rotation=0 if len(x) < 12 else 90)
     ax.set_xlabel("station")
-    ax.set_ylabel(f"unbalance, {labels.weight_unit}")
+    ax.set_ylabel(f"unbalance, {labels.weight_in}")
     ax.set_title(f"Unbalance of a single run, {found.method}")
     ax.legend(frameon=False)
     return ax

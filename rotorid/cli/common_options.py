@@ -15,7 +15,7 @@ import typer
 from rotorid.cli.output import Destination
 
 Command = Callable[..., None]
-USUAL = ("json", "plot", "output")
+USUAL = ("table", "json", "plot", "output")
 WITH_REPORT = (*USUAL, "report")
 RotorArgument = Annotated[
     Path,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
+from rotorid.base.answer import LINES
 from rotorid.cli.progress import busy
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ class Destination:
     ----------
     json
         One JSON document on standard output, nothing else.
+    table
+        Every table behind the answer, too.
     plot : FILE
         Picture, .png, .svg or .pdf.
     output : FILE
@@ -43,6 +46,7 @@ class Destination:
     """
 
     json: bool = False
+    table: bool = False
     plot: Path | None = None
     output: Path | None = None
     report: Path | None = None
@@ -96,7 +100,9 @@ class Destination:
             typer.echo(json_text(document))
         else:
             written = [f"written: {printable(str(path))}" for path in targets]
-            typer.echo("\n".join([found.summary(), *written]))
+            answer = found.answer
+            text = answer.whole() if self.table else answer.brief(LINES - len(written))
+            typer.echo("\n".join([text, *written]))
         return found
 
 

@@ -77,8 +77,8 @@ def balance_report(
     runs = sheet["runs"]
     name = title or _name(job)
     text = {
-        "vibration": conventions_explained.vibration_words(labels.vibration_unit),
-        "weight": conventions_explained.weight_words(labels.weight_unit),
+        "vibration": labels.vibration_in,
+        "weight": labels.weight_in,
         "seen": conventions_explained.seen_from(labels),
         "method": method_words(result.method, weighted=result.row_weights is not None),
         "errors": _SOURCES.get(result.error_source, result.error_source),

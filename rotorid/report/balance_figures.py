@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.report.conventions_explained import plain, weight_words
+from rotorid.report.conventions_explained import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +52,7 @@ def plane_figure(
     from balancing.plots.discs import disc
 
     p = result.planes.index(plane)
-    labels = replace(result.labels, weight_unit=weight_words(result.labels.weight_unit))
+    labels = result.labels
     wanted, mounting = complex(result.weights[p]), None
     if mounted is not None:
         holes, mounting = mounted.holes[p], mounted.found.mountings[p]

@@ -20,42 +20,6 @@ _SAMPLE = 60.0
 """Angle, degrees, of the weight and of the phase that the figures show."""
 _SIDE, _TALL, _FLAT, _INNER, _OUTER, _KEY = 2.45, 2.1, 1.6, 1.3, 1.52, 1.13
 _ASSUMED = " Assumed: neither the job nor the command line says so."
-_BASES = {
-    "um": "µm",
-    "m_s": "m/s",
-    "mm_s": "mm/s",
-    "in_s": "in/s",
-    "m_s2": "m/s²",
-    "mm_s2": "mm/s²",
-}
-
-
-def vibration_words(unit: str) -> str:
-    """Write the unit of a reading for people; one that the program only prints stays as it is.
-
-    Examples
-    --------
-    >>> vibration_words("um_pp"), vibration_words("mm_s_rms"), vibration_words("mm"), vibration_words("V")
-    ('µm pp', 'mm/s rms', 'mm peak', 'V')
-    """
-    if unit not in units.VIBRATION:
-        return unit
-    for suffix, word in (("_pp", "pp"), ("_rms", "rms")):
-        if unit.endswith(suffix):
-            base = unit.removesuffix(suffix)
-            return f"{_BASES.get(base, base)} {word}"
-    return f"{_BASES.get(unit, unit)} peak"
-
-
-def weight_words(unit: str) -> str:
-    """Write the unit of a weight for people.
-
-    Examples
-    --------
-    >>> weight_words("g_mm"), weight_words("g")
-    ('g·mm', 'g')
-    """
-    return unit.replace("_", "·")
 
 
 def plain(name: str) -> str:
@@ -163,11 +127,11 @@ def _amplitude(labels: Labels) -> str:
     kind = (
         "from peak to peak" if unit.endswith("_pp") else "rms" if unit.endswith("_rms") else "peak amplitude"
     )
-    return f"in {vibration_words(unit)} ({kind}), the part that turns with the rotor (1×)."
+    return f"in {labels.vibration_in} ({kind}), the part that turns with the rotor (1×)."
 
 
 def _weight(labels: Labels) -> str:
-    shown = weight_words(labels.weight_unit)
+    shown = labels.weight_in
     if "·" in shown:
         return f"in {shown}: mass times radius. Divide by the radius to get the mass."
     return f"in {shown}, at the radius of the plane."

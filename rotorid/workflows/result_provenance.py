@@ -15,6 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from rotorid.base.answer import Answer, together
 from rotorid.workflows.input_checks import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -45,9 +46,14 @@ class Outcome(ABC):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
 
-    @abstractmethod
+    @property
+    def answer(self) -> Answer:
+        """What is told first, and the tables behind it."""
+        return Answer("", self.summary())  # until every outcome has its own
+
     def summary(self) -> str:
-        """For the terminal."""
+        """The answer, at most 24 lines."""
+        return self.answer.brief()
 
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
@@ -81,9 +87,14 @@ class Parts(Outcome):
         known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
         return {**known.pop("", {}), **known}
 
-    def summary(self) -> str:
-        """For the terminal."""
-        return "\n\n".join(part.summary() for part in self.parts.values() if part is not None)
+    @property
+    def answer(self) -> Answer:
+        """Those of the parts, one after the other."""
+        return together(
+            part.answer if hasattr(part, "answer") else Answer("", part.summary())  # until every part has
+            for part in self.parts.values()
+            if part is not None
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """The table of the first."""

@@ -243,7 +243,7 @@ def _at_two_angles(
     masses = weights(options.two, "--two", labels, radius)
     if len(masses) != 2:
         raise ValueError(f"--two {options.two!r}: give two weights, such as 20g,30g")
-    scale, unit = labels.weight_scale, labels.weight_unit
+    scale, unit = labels.weight_scale, labels.weight_in
     size, low, high = abs(target), abs(masses[0] - masses[1]), sum(masses)
     if not low * (1 - 1e-12) <= size <= high * (1 + 1e-12):
         raise ValueError(

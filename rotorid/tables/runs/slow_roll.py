@@ -263,4 +263,4 @@ def _larger(trials: Trials, S: ComplexArray) -> Iterator[str]:
 
 
 def _shown(amplitude: float, labels: Labels) -> str:
-    return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_unit}".rstrip()
+    return f"{amplitude * labels.vibration_scale:.3g} {labels.vibration_in}".rstrip()

@@ -1,0 +1,133 @@
+"""What a result tells: the judgement and the answer first, and the tables behind them.
+
+Every command prints the `brief` text of its answer, which fits a terminal: at most `LINES` lines of at most `COLUMNS`
+columns. What does not fit is counted, and `--table` prints the `whole`.
+
+>>> answer = Answer(
+...     "Mount these weights.",
+...     "left 3 g at 20°",
+...     warnings=("the weight in plane 'A' is small", "the weight in plane 'B' is small"),
+...     tables=("  sensor   1.0",),
+...     more="every sensor",
+... )
+>>> print(answer.brief())
+Mount these weights.
+<BLANKLINE>
+left 3 g at 20°
+<BLANKLINE>
+Warning: the weight in plane 'A' is small (and 1 more of this kind)
+<BLANKLINE>
+Every sensor: --table.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from rotorid.base.text import capital, counted
+
+LINES, COLUMNS = 24, 100
+_VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
+"""What differs between two remarks of a kind: names and numbers."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Text of a result, in the order of what matters.
+
+    Attributes
+    ----------
+    judgement
+        What to do, or what was found, in a sentence or two.
+    found
+        The answer with its errors, and the few numbers that matter: lines of at most `COLUMNS` columns.
+    warnings, notes
+        Clauses without "Warning: " and "Note: ", the worst first.
+    tables
+        Blocks that only the whole text has.
+    more
+        What these show, in words.
+    """
+
+    judgement: str
+    found: str = ""
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+    more: str = ""
+
+    def brief(self, lines: int = LINES) -> str:
+        """At most so many lines; of each kind of remark (the same words with other names or numbers) one."""
+        head = _wrapped(self.judgement.splitlines())
+        remarks = [*_kinds("Warning", self.warnings), *_kinds("Note", self.notes)]
+        room = lines - len(head) - 3 - bool(remarks)  # blank lines, and where the rest is
+        found, hidden = _first(
+            _wrapped(self.found.splitlines()), room - max(map(len, remarks[:1]), default=0)
+        )
+        told, untold = _fitting(remarks, room - len(found))
+        left = [self.more if self.tables else "", hidden, counted(untold, "more remark") if untold else ""]
+        rest = capital("; ".join(part for part in left if part))
+        return _joined(head, found, told, [f"{rest}: --table."] if rest else [])
+
+    def whole(self) -> str:
+        """Everything."""
+        remarks = [_remark("Warning", each) for each in self.warnings]
+        remarks += [_remark("Note", each) for each in self.notes]
+        parts = (self.judgement, self.found, *map("\n".join, remarks), *self.tables)
+        return "\n\n".join(part for part in parts if part)
+
+
+def together(answers: Iterable[Answer]) -> Answer:
+    """Answers beside each other as one: their judgements first."""
+    each = list(answers)
+    return Answer(
+        "\n".join(one.judgement for one in each if one.judgement),
+        "\n\n".join(one.found for one in each if one.found),
+        tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
+        tuple(dict.fromkeys(note for one in each for note in one.notes)),
+        tuple(table for one in each for table in one.tables),
+        "; ".join(one.more for one in each if one.more),
+    )
+
+
+def _kinds(word: str, clauses: Iterable[str]) -> list[list[str]]:
+    """One remark of each kind, as lines."""
+    kinds: dict[str, list[str]] = {}
+    for clause in dict.fromkeys(clauses):
+        kinds.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
+    return [
+        _remark(word, same[0].rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else ""))
+        for same in kinds.values()
+    ]
+
+
+def _remark(word: str, clause: str) -> list[str]:
+    return textwrap.wrap(f"{word}: {clause}", COLUMNS, subsequent_indent="  ")
+
+
+def _wrapped(lines: Iterable[str]) -> list[str]:
+    return [part for line in lines for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+
+
+def _first(lines: list[str], room: int) -> tuple[list[str], str]:
+    """As many lines as there is room for, and words for the others."""
+    if len(lines) <= room:
+        return lines, ""
+    return lines[:room], counted(len(lines) - room, "more line")
+
+
+def _fitting(remarks: Sequence[list[str]], room: int) -> tuple[list[str], int]:
+    """The first remarks that fit, at least one, and how many are left."""
+    told: list[str] = []
+    for k, remark in enumerate(remarks):
+        if k and len(told) + len(remark) > room:
+            return told, len(remarks) - k
+        told += remark
+    return told, 0
+
+
+def _joined(*blocks: Sequence[str]) -> str:
+    return "\n\n".join("\n".join(block) for block in blocks if block)
