@@ -1,7 +1,7 @@
 """What a result tells: the judgement and the answer first, and the tables behind them.
 
-Every command prints the `brief` text of its answer, which fits a terminal: at most `LINES` lines of at most `COLUMNS`
-columns. What does not fit is counted, and `--table` prints the `whole`.
+Every command prints the `brief` text of its answer, which fits a terminal: at most `LINES` lines of at most
+`COLUMNS` columns. What does not fit is counted, and `--table` prints the `whole`.
 
 >>> answer = Answer(
 ...     "Mount these weights.",
