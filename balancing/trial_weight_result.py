@@ -147,7 +147,7 @@ class TrialWeight:
             return None
         change = np.abs(self.expected - self.before) * self.labels.vibration_scale
         return (
-            *reading_columns(self.speeds, self.sensors),
+            *reading_columns(self.labels, self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),
             *vector_columns(self.labels, "after", self.expected),
             Column("change", change.ravel()),

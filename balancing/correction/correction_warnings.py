@@ -87,10 +87,9 @@ def warnings_of(result: Correction, W: ComplexArray, *, alike: bool, rising: boo
     if result.chi_square is not None and result.fit_dof and not told:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
-            f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
-            "large as the errors of the readings; unbalance outside the planes (or a bow, or a rotor that is "
-            "not linear) is likely, and the errors of the weights allow for it; if the readings have larger "
-            f"errors than stated instead, those of the weights are up to {ratio:.2g} times larger"
+            f"weights in these planes leave {ratio:.2g} times what the errors explain: unbalance elsewhere, "
+            "a bow or a nonlinear rotor (the ± allow for it), or larger errors than stated (then ± up to "
+            f"{ratio:.2g} times larger)"
         )
     if rising and np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
         out += _rises(result)

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import re
 import textwrap
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -32,6 +33,7 @@ from rotorid.base.text import capital, counted
 LINES, COLUMNS = 24, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
+_SIGN, _KEPT = re.compile(r"(?<=[±→]) "), "\u00a0"
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,22 @@ class Answer:
         """Everything."""
         remarks = [_remark("Warning", each) for each in self.warnings]
         remarks += [_remark("Note", each) for each in self.notes]
-        parts = (self.judgement, self.found, *map("\n".join, remarks), *self.tables)
+        first = (_wrapped(part.splitlines()) for part in (self.judgement, self.found))
+        parts = (*map("\n".join, [*first, *remarks]), *self.tables)
         return "\n\n".join(part for part in parts if part)
+
+
+class Answered(ABC):
+    """A result that tells its answer; `summary` prints it."""
+
+    @property
+    @abstractmethod
+    def answer(self) -> Answer:
+        """The judgement and the answer first, and the tables behind them."""
+
+    def summary(self) -> str:
+        """For a terminal, at most 24 lines of at most 100 columns."""
+        return self.answer.brief()
 
 
 def together(answers: Iterable[Answer]) -> Answer:
@@ -105,11 +121,14 @@ def _kinds(word: str, clauses: Iterable[str]) -> list[list[str]]:
 
 
 def _remark(word: str, clause: str) -> list[str]:
-    return textwrap.wrap(f"{word}: {clause}", COLUMNS, subsequent_indent="  ")
+    return _wrapped([f"{word}: {clause}"])
 
 
 def _wrapped(lines: Iterable[str]) -> list[str]:
-    return [part for line in lines for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+    """Lines of at most `COLUMNS`; a sign stays beside its number."""
+    kept = (_SIGN.sub(_KEPT, line) for line in lines)
+    parts = [part for line in kept for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+    return [part.replace(_KEPT, " ") for part in parts]
 
 
 def _first(lines: list[str], room: int) -> tuple[list[str], str]:
