@@ -130,7 +130,7 @@ class Subsets(Answered):
                 f"{self.dependent} more choices have planes that act alike: no weights are determined."
             )
         best = f"The best of {choices}, by {by}: {'; '.join(each)}."
-        return Answer(best, tables=("\n".join(lines),), more="the choices of planes")
+        return Answer(best, tables=("\n".join(lines),), more="choices of planes")
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale

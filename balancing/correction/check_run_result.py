@@ -171,7 +171,7 @@ class CheckComparison(Answered):
             f"Largest in run {self.runs[-1]!r}{largest}",
             self.warnings,
             tables=(f"Check run, mounted: {mounted}.\n{self._readings_text()}\n{times}",),
-            more="readings beside their prediction",
+            more="the check run",
         )
 
     def _columns(self) -> tuple[Column, ...]:

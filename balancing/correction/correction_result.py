@@ -418,7 +418,7 @@ class Correction(Answered):
         taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
         conventions = f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}"
         lines = [f"{conventions}; total weights for the bare rotor."]
-        if self.mounted is not None:
+        if self.mounted is not None and self.mounted[2].any():
             run, stays = self.mounted[0], self._in_planes(self.labels, self.to_add, self.remove)
             cells = [stays.pop(plane, "nothing") for plane in self.planes]
             columns.append(Column(f"if {cut(run, _NAME)!r} stays mounted", cells, str))

@@ -144,7 +144,7 @@ class History(Answered):
             "",
             f"Largest reading of each run{unit}: {', '.join(each)}.",
             tables=(self._table(),),
-            more="all runs",
+            more="run by run",
         )
 
     def _table(self) -> str:

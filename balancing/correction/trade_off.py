@@ -108,9 +108,7 @@ class TradeOff(Answered):
         )
         what = criterion_words(self.criterion, weighted=self.weighted)
         head = f"The least {what} that a total weight leaves{f' ({vibration})' if vibration else ''}"
-        return Answer(
-            self._words(), tables=(f"{head}\n{text(shown, left=0)}",), more="vibration by total weight"
-        )
+        return Answer(self._words(), tables=(f"{head}\n{text(shown, left=0)}",), more="trade-off")
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale

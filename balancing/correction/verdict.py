@@ -100,8 +100,10 @@ class Verdict(Answered):
         same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
         worst = sorted(same, key=lambda k: self.rows[k].limit / (self.rows[k].size or 1e-30))[:_SHOWN]
         others = [words for k, words in enumerate(told) if k not in worst]
-        why = "the 95 % region of the value lies on both sides, or the errors are unknown; repeated readings or "
-        why = f": {why}stated errors would tell" if self.overall == "not decidable" else ""
+        why = ""
+        if self.overall == "not decidable":
+            why = ": the 95 % region lies on both sides, or the errors are unknown; repeated readings "
+            why += "or stated errors would tell"
         of = f"{len(same)} of {counted(len(told), 'limit')}"
         return Answer(
             f"{capital(self.overall)} ({self.source}), {of}{why}.",

@@ -95,7 +95,7 @@ def largest_readings(
     share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
     words = []
     for place in np.argsort(-share, axis=None, kind="stable")[:_LARGEST]:
-        s, c = np.unravel_index(place, size.shape)
+        s, c = divmod(int(place), len(sensors))
         width = "" if np.isnan(reach[s, c]) else f" (± {figures(reach[s, c], 2)})"
         left = f"{three_figures(old[s, c])} → {small(new[s, c], old.max())}{width}"
         words.append(f"{sensors[c]} at {labels.speed_words(speeds[s])} {left}")

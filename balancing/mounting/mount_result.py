@@ -20,6 +20,7 @@ from balancing.data.result_columns import (
     weight_columns,
 )
 from balancing.mounting.discrete_weights import Discrete
+from balancing.mounting.holes import equal_together
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
@@ -131,7 +132,7 @@ class Mounted(Answered):
         left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
         what = "Mount or remove" if c.remove else "Mount"
         stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
-        lines = [f"Pieces in {labels.weight_in}{stays}:", *self._pieces_lines(columns)]
+        lines = [f"Pieces in {labels.weight_in}{stays}:", *self._in_planes(columns)]
         if labels.assumed:
             said = " and ".join(labels.assumed)
             lines.append(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
@@ -145,24 +146,18 @@ class Mounted(Answered):
             more="hole by hole",
         )
 
-    def _pieces_lines(self, columns: Sequence[Column]) -> list[str]:
-        """Of each plane: equal pieces with their holes."""
-        shown = {column.name: list(column.values) for column in columns}
-        found = []
+    def _in_planes(self, columns: Sequence[Column]) -> list[str]:
+        """Of each plane what goes where, equal pieces together."""
+        shown = list(zip(*(column.values for column in columns), strict=True))
+        lines = []
         for plane in self.correction.planes:
-            same: dict[str, list[str]] = {}
-            for place, name in enumerate(shown["plane"]):
-                if name == plane:
-                    hole, amount = shown["hole"][place], figures(shown["mass"][place])
-                    at = f"hole {hole}" if hole != _ANY else f"{shown['angle_deg'][place]:.1f}°"
-                    same.setdefault(shown["pieces"][place] or amount, []).append(at)
-            words = [f"{pieces} in {_holes(at)}" for pieces, at in same.items()]
-            found.append(
-                [f"{plane} (remove)" if plane in self.correction.remove else plane, ", ".join(words)]
-            )
-        width = max(len(name) for name, _ in found)
-        nothing = "nothing; no pieces that it can take make it better"
-        return [f"  {name:<{width}}  {words or nothing}" for name, words in found]
+            own = [row for row in shown if row[0] == plane]
+            words = [f"{figures(row[4])} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
+            words += equal_together((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
+            gone = " (remove)" if plane in self.correction.remove else ""
+            nothing = "nothing; no pieces that it can take make it better"
+            lines.append(f"  {plane}{gone}: {', '.join(words) or nothing}")
+        return lines
 
     def _proof(self) -> str:
         """How sure it is that nothing better exists."""
@@ -172,11 +167,6 @@ class Mounted(Answered):
         if np.isfinite(self.plane_by_plane):
             sure += f"; plane by plane the nearest would leave {self.plane_by_plane:.3g} times as much"
         return f"{sure}."
-
-
-def _holes(at: Sequence[str]) -> str:
-    """Places of equal pieces: "hole 5", "holes 7, 8, 10" or an angle."""
-    return at[0] if len(at) == 1 else "holes " + ", ".join(place.removeprefix("hole ") for place in at)
 
 
 def _action(correction: Correction, plane: str) -> str:

@@ -28,7 +28,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rotorid.base.text import capital, counted
+from rotorid.base.text import capital, counted, cut
 
 LINES, COLUMNS = 24, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
@@ -70,8 +70,8 @@ class Answer:
             _wrapped(self.found.splitlines()), room - max(map(len, remarks[:1]), default=0)
         )
         told, untold = _fitting(remarks, room - len(found))
-        left = [self.more if self.tables else "", hidden, counted(untold, "more remark") if untold else ""]
-        rest = capital("; ".join(part for part in left if part))
+        left = [hidden, counted(untold, "more remark") if untold else "", self.more if self.tables else ""]
+        rest = cut(capital("; ".join(part for part in left if part)), COLUMNS - len(": --table."))
         return _joined(head, found, told, [f"{rest}: --table."] if rest else [])
 
     def whole(self) -> str:
@@ -105,7 +105,7 @@ def together(answers: Iterable[Answer]) -> Answer:
         tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
         tuple(dict.fromkeys(note for one in each for note in one.notes)),
         tuple(table for one in each for table in one.tables),
-        "; ".join(one.more for one in each if one.more),
+        "; ".join(dict.fromkeys(one.more for one in each if one.more)),
     )
 
 
