@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.coefficients.baseline import describe_errors
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.convention_assumptions import OtherReading, assumptions, contradiction
@@ -417,11 +418,11 @@ class Correction(Answered):
         ]
         taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
         conventions = f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}"
-        lines = [f"{conventions}; total weights for the bare rotor."]
+        lines = [f"{conventions}; weights for the bare rotor."]
         if self.mounted is not None and self.mounted[2].any():
             run, stays = self.mounted[0], self._in_planes(self.labels, self.to_add, self.remove)
             cells = [stays.pop(plane, "nothing") for plane in self.planes]
-            columns.append(Column(f"if {cut(run, _NAME)!r} stays mounted", cells, str))
+            columns.append(Column(f"if {cut(run, _NAME)!r} stays", cells, str))
             also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
@@ -472,6 +473,9 @@ class Correction(Answered):
         within = self.within(self.after_covariance).reshape(self.before.shape)
         words = largest_readings(self.labels, self.speeds, self.sensors, self.before, self.after, within)
         lines = [f"Largest predicted{words}"]
+        if self.error_source == "assumed" and self.errors is not None:
+            size = describe_errors(self.errors, self.labels.vibration_in, self.labels.vibration_scale)
+            lines.append(f"The errors of the readings are assumed, {size}: state them, or repeat readings.")
         if self.covariance is None:
             why = "no errors are stated, no reading is repeated, and no run is more than needed"
             lines.append(

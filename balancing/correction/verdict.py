@@ -95,11 +95,13 @@ class Verdict(Answered):
 
     @property
     def answer(self) -> Answer:
-        """Pass, fail or not decidable, the values nearest to their limits or above, and all the others."""
+        """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
         told = [self._row_words(row) for row in rows(self._columns())]
         same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
-        worst = sorted(same, key=lambda k: self.rows[k].limit / (self.rows[k].size or 1e-30))[:_SHOWN]
-        others = [words for k, words in enumerate(told) if k not in worst]
+        near = sorted(same, key=lambda k: self.rows[k].limit / (self.rows[k].size or 1e-30))
+        shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
+        shown += [k for k in near if k not in shown][:_SHOWN]
+        others = [words for k, words in enumerate(told) if k not in shown]
         why = ""
         if self.overall == "not decidable":
             why = ": the 95 % region lies on both sides, or the errors are unknown; repeated readings "
@@ -107,7 +109,7 @@ class Verdict(Answered):
         of = f"{len(same)} of {counted(len(told), 'limit')}"
         return Answer(
             f"{capital(self.overall)} ({self.source}), {of}{why}.",
-            "\n".join(told[k] for k in worst),
+            "\n".join(told[k] for k in shown),
             self.warnings,
             tables=("\n".join(["The other limits:", *others]),) if others else (),
             more="the other limits",

@@ -54,8 +54,10 @@ def test_trial_weights_left_in_of_feese_and_grazier():
     assert c.mounted[0] == "run 2"
     np.testing.assert_allclose(c.to_add + c.mounted[2], c.weights, rtol=1e-12)
     text = c.summary()
-    assert "total weights for the bare rotor" in text
-    assert "add" in text
+    assert "weights for the bare rotor" in text
+    line = next(line for line in text.splitlines() if line.startswith("  A "))
+    assert line.endswith(f"  {figures(c.labels.weight(c.to_add)[0][0])} at {c.labels.weight(c.to_add)[1][0]:.1f}°")
+    assert "if 'run 2' stays" in text
 
 
 @pytest.mark.parametrize("phase", ["lead", "lag"])
