@@ -121,7 +121,7 @@ class Subsets(Answered):
         by += f" ({unit})" if unit else ""
         size = self.largest if self.criterion == "max" else self.rms
         each = [
-            f"{', '.join(planes)} {three_figures(value * scale)}"
+            f"{', '.join(planes)}: {three_figures(value * scale)}"
             for planes, value in zip(self.planes[:_NAMED], size, strict=False)
         ]
         lines = [f"The best of {choices}, by {by}", text(shown)]

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-_NAME = 20
+_NAME = 16
 """So many letters of the name of a run stand over a column."""
 
 
@@ -316,7 +316,9 @@ class Correction(Answered):
             return "Mount nothing: the limits leave no plane a weight."
         gone = [plane in self.remove for plane in self.planes]
         what = "Remove this material" if all(gone) else "Mount these weights"
-        return f"{what}: {self._rms_words()}."
+        ways = {"phase": f"phases {self.labels.phase}", "angles": f"angles count {self.labels.angle_words}"}
+        said = " and ".join(ways[name] for name in self.labels.assumed) if self.others else ""
+        return f"{what}{f', if {said} as assumed' if said else ''}: {self._rms_words()}."
 
     def _weight_columns(self) -> tuple[Column, ...]:
         n, covariance = len(self.planes), self.plane_covariance
@@ -422,7 +424,7 @@ class Correction(Answered):
         if self.mounted is not None and self.mounted[2].any():
             run, stays = self.mounted[0], self._in_planes(self.labels, self.to_add, self.remove)
             cells = [stays.pop(plane, "nothing") for plane in self.planes]
-            columns.append(Column(f"if {cut(run, _NAME)!r} stays", cells, str))
+            columns.append(Column(f"add if {cut(run, _NAME)!r} stays", cells, str))
             also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []

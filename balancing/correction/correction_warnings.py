@@ -11,7 +11,6 @@ from balancing.coefficients.influence import Influence
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
@@ -27,9 +26,9 @@ _TOUCHES = 2e-3
 """Relative distance below which a limit with a price is touched (the solver stays a little inside)."""
 
 
-def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
+def reading_names(labels: Labels, sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
     """What to call each reading, speed by speed."""
-    return tuple(f"sensor {c!r} at {rpm_text(s)}" for s in speeds for c in sensors)
+    return tuple(f"sensor {c!r} at {labels.speed_words(s)}" for s in speeds for c in sensors)
 
 
 def binding(stack: Stack, fitted: Fitted) -> tuple[str, ...]:
@@ -88,7 +87,7 @@ def warnings_of(result: Correction, W: ComplexArray, *, alike: bool, rising: boo
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
             f"weights in these planes leave {ratio:.2g} times what the errors explain: unbalance elsewhere, "
-            "a bow or a nonlinear rotor (the ± allow for it), or larger errors than stated (then ± up to "
+            "a bow or nonlinearity (the ± allow for it), or larger errors than stated (± up to "
             f"{ratio:.2g} times larger)"
         )
     if rising and np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
@@ -132,8 +131,8 @@ def left_out(
         return words
     over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
     return words + tuple(
-        f"the vibration of {reading_names((influence.sensors[c],), influence.speeds[[rest[s]]])[0]}, a speed "
-        f"left out, is predicted to be {labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
+        f"the vibration of sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[rest[s]])}, a "
+        f"speed left out, is predicted to be {labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
         f"limit of {labels.amplitude_words(float(limits.residual[rest[s], c]))}"
         for s, c in np.argwhere(over)[:_RISES_NAMED]
     )
@@ -151,7 +150,7 @@ def _rising(
     places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
     places.sort(key=lambda place: old[place] - new[place])
     words = [
-        f"the vibration of sensor {sensors[c]!r} at {rpm_text(speeds[s])}{where} is predicted "
+        f"the vibration of sensor {sensors[c]!r} at {labels.speed_words(speeds[s])}{where} is predicted "
         f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_in}".rstrip()
         for s, c in places[:_RISES_NAMED]
     ]

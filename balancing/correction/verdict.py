@@ -247,7 +247,7 @@ def verdict_of_check(
         check_planes(W, used)
         errors = stack_errors(known, start, list(range(len(at))), chosen)
         own, common = (None, None) if errors is None else (errors.channels, errors.common)
-        names = reading_names(known.sensors, known.speeds)
+        names = reading_names(start.labels, known.sensors, known.speeds)
         found = fit_weights(Stack(W, Y, own, None, None, used, names, str, str, common), "least-squares")
         covariance, dof = (None, None) if errors is None else errors.weights(found)
         if errors is not None and not errors.explain(found.weights, POOR):

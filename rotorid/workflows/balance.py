@@ -192,13 +192,18 @@ class Balance(Parts):
             weights = replace(weights, judgement="")
         if self.mounted:
             weights = replace(weights, found="", tables=(weights.found, *weights.tables))
+        elif self.check:
+            first, _, predicted = weights.found.partition("\n\n")
+            weights = replace(weights, found=first, tables=(predicted, *weights.tables))
         judged = [part.answer for part in (self.verdict, self.check, self.mounted) if part]
         asked = [part.answer for part in (self.subsets, self.curve, self.history) if part]
         found = together([*judged, weights, *asked] if sound else [weights, *judged, *asked])
-        if self.result.limits is None or not (self.subsets or self.curve):
-            return found
-        unlimited = "the comparison of planes and the trade-off do not look at the limits"
-        return replace(found, notes=(*found.notes, unlimited))
+        notes = list(found.notes)
+        if self.check:
+            notes.insert(0, "--refine adds the check run, and gives the trim")
+        if self.result.limits is not None and (self.subsets or self.curve):
+            notes.append("the comparison of planes and the trade-off do not look at the limits")
+        return replace(found, notes=tuple(notes))
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""

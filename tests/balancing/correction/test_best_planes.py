@@ -135,7 +135,7 @@ def test_tables_speak_the_units_of_the_job():
         weight["angle_deg"], np.degrees(np.angle(found.weights[0, 1])) % 360, rtol=1e-9
     )
     best, rms = ", ".join(found.planes[0]), found.rms[0] * 2e6
-    assert f"by rms after correction (µm pp): {best} {rms:.2f}; " in found.summary()
+    assert f"by rms after correction (µm pp): {best}: {rms:.2f}; " in found.summary()
     lines = found.answer.tables[0].splitlines()
     assert lines[0] == "The best of 10 choices of 2 planes, by rms after correction (µm pp)"
     assert lines[1].split() == [

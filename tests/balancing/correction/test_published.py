@@ -56,8 +56,9 @@ def test_trial_weights_left_in_of_feese_and_grazier():
     text = c.summary()
     assert "weights for the bare rotor" in text
     line = next(line for line in text.splitlines() if line.startswith("  A "))
-    assert line.endswith(f"  {figures(c.labels.weight(c.to_add)[0][0])} at {c.labels.weight(c.to_add)[1][0]:.1f}°")
-    assert "if 'run 2' stays" in text
+    (mass, *_), (angle, *_) = c.labels.weight(c.to_add)
+    assert line.endswith(f"  {mass:.3f} at {angle:.1f}°")
+    assert "add if 'run 2' stays" in text
 
 
 @pytest.mark.parametrize("phase", ["lead", "lag"])

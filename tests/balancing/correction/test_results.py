@@ -170,3 +170,16 @@ def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
     texts = [text.get_text() for text in upper.get_xticklabels()]
     assert texts == [f"{v * 30 / np.pi:.5g}" for v in c.speeds[::2]]
     assert upper.get_xticks()[0] < upper.get_xticks()[1]
+
+
+def test_speeds_in_the_unit_of_the_readings():
+    trials, _, _ = synthetic(np.random.default_rng(3), speeds=2)
+    turns = replace(trials, speeds=np.array([20.0, 25.5]) * 2 * np.pi)
+    hertz = replace(turns, labels=replace(trials.labels, speed_unit="Hz"))
+    told, usual = (correct(estimate_influence(made)).answer for made in (hertz, turns))
+    assert " at 20 Hz " in told.brief()
+    assert " rpm" not in told.whole()
+    head, *rows = told.tables[1].splitlines()[1:]
+    assert head.split()[0] == "Hz"
+    assert {row.split()[0] for row in rows[:-1]} == {"20", "25.5"}
+    assert " at 1530 rpm " in usual.whole()
