@@ -162,15 +162,11 @@ class CheckComparison(Answered):
         judged = f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
         largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
         mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
-        times = (
-            f"Vibration (rms) before by after: predicted {_times(self.improvement_predicted)}, achieved "
-            f"{_times(self.improvement_achieved)}."
-        )
         return Answer(
             f"{judged} {sentence(self.verdict)}",
             f"Largest in run {self.runs[-1]!r}{largest}",
             self.warnings,
-            tables=(f"Check run, mounted: {mounted}.\n{self._readings_text()}\n{times}",),
+            tables=(f"Check run, mounted: {mounted}.\n{self._readings_text()}",),
             more="the check run",
         )
 
@@ -260,10 +256,6 @@ def _verdict_words(c: CheckComparison) -> str:
 
 def _two_figures(value: float) -> str:
     return figures(value, 2)
-
-
-def _times(factor: float | None) -> str:
-    return "nothing left" if factor is None else f"{figures(factor, 3)} times"
 
 
 def _percent(probability: float) -> str:

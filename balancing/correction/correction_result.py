@@ -273,7 +273,7 @@ class Correction(Answered):
         for other in self.others:
             word = other.words.replace(" ", "_")
             shown[f"mass_if_{word}"] = other.labels.weight(other.weights)[0]
-            shown[f"angle_deg_if_{word}"] = self._other_places(other, self.planes, other.weights)
+            shown[f"angle_deg_if_{word}"] = self._other_places(other)
         return shown
 
     def residuals_frame(self) -> pd.DataFrame:
@@ -377,11 +377,11 @@ class Correction(Answered):
             "forbidden_deg": {plane: pairs for plane, pairs in arcs.items() if pairs},
         }
 
-    def _other_places(self, other: OtherReading, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
-        return replace(self, labels=other.labels).places(planes, weights)
+    def _other_places(self, other: OtherReading) -> FloatArray:
+        return replace(self, labels=other.labels).places(self.planes, other.weights)
 
     def _other_rows(self, other: OtherReading) -> list[dict[str, Any]]:
-        n, at = len(self.planes), self._other_places(other, self.planes, other.weights)
+        n, at = len(self.planes), self._other_places(other)
         gone = [plane in self.remove for plane in self.planes]
         return rows(
             (
@@ -397,7 +397,7 @@ class Correction(Answered):
         """The angles if a convention is otherwise, and the mass where that is another than the one shown."""
         found = []
         for other in self.others:
-            at = [degrees(angle) for angle in self._other_places(other, self.planes, other.weights)]
+            at = [degrees(angle) for angle in self._other_places(other)]
             masses = map(figures, other.labels.weight(other.weights)[0])
             cells = [
                 place if mass == figures(own) else f"{mass} at {place}"
@@ -406,13 +406,10 @@ class Correction(Answered):
             found.append(Column(f"if {other.words}", cells, str))
         return found
 
-    def _plane_column(self, planes: Sequence[str]) -> Column:
-        return Column("plane", [f"{p} (remove)" if p in self.remove else p for p in planes], str)
-
     def _weights_text(self) -> str:
         unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
         columns = [
-            self._plane_column(self.planes),
+            Column("plane", [f"{p} (remove)" if p in self.remove else p for p in self.planes], str),
             Column(unit, mass, figures),
             Column("angle", self.places(self.planes, self.weights), degrees),
             *self._width_columns(unit),
@@ -431,7 +428,6 @@ class Correction(Answered):
         return "\n".join([text(columns), *lines])
 
     def _width_columns(self, unit: str) -> list[Column]:
-        """Half widths of 95 % intervals; none where errors are unknown."""
         if not self.coverage_factor:
             return []
         sizes, angles = self.half_widths()
@@ -456,7 +452,6 @@ class Correction(Answered):
         }
 
     def _mounted_text(self) -> str:
-        """What was mounted in the last run, and what to add to it if a convention is otherwise."""
         if self.mounted is None:
             return ""
         run, _, weights = self.mounted
@@ -471,7 +466,6 @@ class Correction(Answered):
         return "\n".join(wrap(line) for line in each)
 
     def _left(self) -> str:
-        """The largest readings left; where there are no intervals, why."""
         within = self.within(self.after_covariance).reshape(self.before.shape)
         words = largest_readings(self.labels, self.speeds, self.sensors, self.before, self.after, within)
         lines = [f"Largest predicted{words}"]

@@ -130,9 +130,10 @@ def left_out(
     if limits is None:
         return words
     over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
+    names = reading_names(labels, influence.sensors, influence.speeds[rest])
     return words + tuple(
-        f"the vibration of sensor {influence.sensors[c]!r} at {labels.speed_words(influence.speeds[rest[s]])}, a "
-        f"speed left out, is predicted to be {labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
+        f"the vibration of {names[s * len(influence.sensors) + c]}, a speed left out, is predicted to be "
+        f"{labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
         f"limit of {labels.amplitude_words(float(limits.residual[rest[s], c]))}"
         for s, c in np.argwhere(over)[:_RISES_NAMED]
     )

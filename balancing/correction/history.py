@@ -148,7 +148,6 @@ class History(Answered):
         )
 
     def _table(self) -> str:
-        """Runs, what was mounted, vibration at each speed, share of the limit."""
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
         head = ["run", f"mounted {self.labels.weight_in}".rstrip(), self.labels.speed_in, "largest", "rms"]
         limited = self.of_limit is not None

@@ -147,7 +147,6 @@ class Mounted(Answered):
         )
 
     def _in_planes(self, columns: Sequence[Column]) -> list[str]:
-        """Of each plane what goes where, equal pieces together."""
         shown = list(zip(*(column.values for column in columns), strict=True))
         lines = []
         for plane in self.correction.planes:
@@ -160,7 +159,6 @@ class Mounted(Answered):
         return lines
 
     def _proof(self) -> str:
-        """How sure it is that nothing better exists."""
         sure = "No other choice of pieces is better (proven)"
         if not self.found.proven:
             sure = f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %"
