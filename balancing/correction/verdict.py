@@ -27,6 +27,7 @@ from balancing.correction.limit_check import Judgement, Word, judge, judge_unbal
 from balancing.correction.selected_planes import plane_indices
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
+from balancing.data.result_columns import INVISIBLE
 from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
 from balancing.solvers.correction_methods import Stack, fit_weights
@@ -120,7 +121,8 @@ class Verdict(Answered):
         unit = vibration_unit_words(row["unit"]) if sensor else weight_unit_words(row["unit"])
         at = "" if row["speed_rpm"] is None else f" at {self.labels.speed_words(row['speed_rpm'] / RPM)}"
         within = "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
-        value = f"{row['size']:.4g} {unit}".rstrip()
+        size = row["size"] if row["size"] > INVISIBLE * row["limit"] else 0.0
+        value = f"{size:.4g} {unit}".rstrip()
         name = f"{row['kind']} {row['name']}{at}"
         return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
 

@@ -155,7 +155,7 @@ class Mounted(Answered):
             words += equal_together((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
             gone = " (remove)" if plane in self.correction.remove else ""
             nothing = "nothing; no pieces that it can take make it better"
-            lines.append(f"  {plane}{gone}: {', '.join(words) or nothing}")
+            lines.append(f"  {plane}{gone}: {'; '.join(words) or nothing}")
         return lines
 
     def _proof(self) -> str:

@@ -179,7 +179,7 @@ class OnHoles:
         nearest = self.nearest.answer(labels)
         lines = [nearest.found, *(["", "With fewer pieces:"] if self.fewer else [])]
         for one in self.fewer:
-            words = ", ".join(one.in_holes(labels))
+            words = "; ".join(one.in_holes(labels))
             lines.append(f"  {one.pieces}: error {percent(one.relative_error)} %: {words}")
         return replace(nearest, found="\n".join(lines))
 

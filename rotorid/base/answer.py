@@ -105,7 +105,7 @@ def together(answers: Iterable[Answer]) -> Answer:
         tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
         tuple(dict.fromkeys(note for one in each for note in one.notes)),
         tuple(table for one in each for table in one.tables),
-        "; ".join(dict.fromkeys(one.more for one in each if one.more)),
+        "; ".join(dict.fromkeys(one.more for one in each if one.tables)),
     )
 
 
