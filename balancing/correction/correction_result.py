@@ -314,8 +314,7 @@ class Correction(Answered):
             return "\n".join([*first, *self.decision.lines()])
         if not self.weights.any():
             return "Mount nothing: the limits leave no plane a weight."
-        gone = [plane in self.remove for plane in self.planes]
-        what = "Remove this material" if all(gone) else "Mount these weights"
+        what = "Remove this material" if set(self.planes) <= set(self.remove) else "Mount these weights"
         ways = {"phase": f"phases {self.labels.phase}", "angles": f"angles count {self.labels.angle_words}"}
         said = " and ".join(ways[name] for name in self.labels.assumed) if self.others else ""
         return f"{what}{f', if {said} as assumed' if said else ''}: {self._rms_words()}."
@@ -421,7 +420,8 @@ class Correction(Answered):
         if self.mounted is not None and self.mounted[2].any():
             run, stays = self.mounted[0], self._in_planes(self.labels, self.to_add, self.remove)
             cells = [stays.pop(plane, "nothing") for plane in self.planes]
-            columns.append(Column(f"add if {cut(run, _NAME)!r} stays", cells, str))
+            work = "remove" if set(self.planes) <= set(self.remove) else "add"
+            columns.append(Column(f"{work} if {cut(run, _NAME)!r} stays", cells, str))
             also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []

@@ -103,13 +103,15 @@ class Verdict(Answered):
         shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
         shown += [k for k in near if k not in shown][:_SHOWN]
         others = [words for k, words in enumerate(told) if k not in shown]
-        why = ""
-        if self.overall == "not decidable":
-            why = ": the 95 % region lies on both sides, or the errors are unknown; repeated readings "
-            why += "or stated errors would tell"
+        why = {
+            "pass": "kept",
+            "fail": "not kept",
+            "not decidable": "open: the 95 % region lies on both sides, or the errors are unknown; repeated "
+            "readings or stated errors would tell",
+        }[self.overall]
         of = f"{len(same)} of {counted(len(told), 'limit')}"
         return Answer(
-            f"{capital(self.overall)} ({self.source}), {of}{why}.",
+            f"{capital(self.overall)} ({self.source}): {of} {why}.",
             "\n".join(told[k] for k in shown),
             self.warnings,
             tables=("\n".join(["The other limits:", *others]),) if others else (),

@@ -228,7 +228,7 @@ def test_words_table_and_picture(job):
     assert rows[1]["angle_deg"] == pytest.approx(90)
     assert rows[0]["low"] < rows[0]["size"] < rows[0]["high"]
     text = found.summary()
-    assert text.startswith("Fail (check run check), ")
+    assert text.startswith("Fail (check run check): 4 of 5 limits not kept.")
     assert "plane A: 0.2 g" in text
     assert max(len(line) for line in text.splitlines()) <= 100
     whole = found.answer.whole()
