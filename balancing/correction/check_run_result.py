@@ -254,10 +254,6 @@ def _verdict_words(c: CheckComparison) -> str:
     )
 
 
-def _two_figures(value: float) -> str:
-    return figures(value, 2)
-
-
 def _percent(probability: float) -> str:
     return "below 0.01 %" if probability < 1e-4 else f"{100 * probability:.3g} %"
 

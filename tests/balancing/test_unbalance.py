@@ -290,7 +290,7 @@ def test_picture():
     [[(_, low), (_, high)]] = ax.collections[0].get_segments()
     assert (low, high) == pytest.approx((0.804e6, 1.196e6))
     assert [text.get_text() for text in ax.get_xticklabels()] == ["A", "B", "C"]
-    assert ax.get_ylabel() == "unbalance, g_mm"
+    assert ax.get_ylabel() == "unbalance, g·mm"
     assert plot(found, ax) is ax
 
 

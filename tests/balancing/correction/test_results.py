@@ -157,7 +157,7 @@ def test_angles_of_the_picture_run_as_the_job_counts_them(angles, direction):
     assert np.degrees(tip.get_xdata()[0]) == pytest.approx(direction * 50.19 % 360, abs=0.01)
     assert plots.vibration(c).get_theta_direction() == -1
     assert "g" in ax.get_title()
-    assert plots.amplitudes(c).get_ylabel() == "amplitude, um_pp"
+    assert plots.amplitudes(c).get_ylabel() == "amplitude, µm pp"
 
 
 def test_many_speeds_and_sensors_are_drawn_too(tmp_path):

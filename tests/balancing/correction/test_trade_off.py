@@ -178,7 +178,7 @@ def test_the_picture_holds_the_curve_the_knee_and_the_weights():
     mark = next(line for line in upper.lines if str(line.get_label()).startswith("knee: "))
     np.testing.assert_allclose(mark.get_xdata(), [found.totals[found.knee] * 1e3])
     np.testing.assert_allclose(mark.get_ydata(), [found.rms[found.knee] * 2e6])
-    assert upper.get_ylabel() == "amplitude after correction, um_pp"
+    assert upper.get_ylabel() == "amplitude after correction, µm pp"
     assert lower.get_xlabel() == "total weight of all planes, g"
     for p, plane in enumerate("ABC"):
         line = next(line for line in lower.lines if line.get_label() == plane)
