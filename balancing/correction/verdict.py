@@ -99,7 +99,7 @@ class Verdict(Answered):
         """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
         told = [self._row_words(row) for row in rows(self._columns())]
         same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
-        near = sorted(same, key=lambda k: self.rows[k].limit / (self.rows[k].size or 1e-30))
+        near = sorted(same, key=lambda k: round(self.rows[k].limit / (self.rows[k].size or 1e-30), 6))
         shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
         shown += [k for k in near if k not in shown][:_SHOWN]
         others = [words for k, words in enumerate(told) if k not in shown]

@@ -85,7 +85,7 @@ def test_limits_that_cannot_be_met_name_the_conflict_and_the_way_out(cli, tmp_pa
     assert outcome.code == 2
     assert "cannot be met" in outcome.err
     assert "100 g·mm" in outcome.err
-    assert "limit 5 um_pp" in outcome.err
+    assert "limit 5 µm pp" in outcome.err
     factor = float(outcome.err.split("relaxing all amplitude limits ")[1].split()[0])
     assert not picture.exists()
     relaxed = cli("balance", JOB, "--max-mass", "100", "--limit", f"{5.01 * factor}")
