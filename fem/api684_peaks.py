@@ -11,7 +11,7 @@ separation margin, in percent of the nearest operating speed, must be at least
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -114,22 +114,28 @@ class Peaks:
         """The peaks as text, amplitudes times `scale` with the name of their unit."""
         if not self.peaks:
             return "no peak in this range of speeds"
-        named = f"amplitude, {unit}" if unit else "amplitude"
-        lines = [f"{'rad/s':>12} {'rpm':>13} {named:>14} {'AF':>9} {'margin, %':>11} {'required, %':>12}"]
-        for p in self.peaks:
-            values = [
-                "-" if v is None else f"{v:.{d}f}"
-                for v, d in ((p.amplification, 2), (p.margin, 1), (p.required, 1))
-            ]
-            size = "-" if p.undamped else f"{scale * p.amplitude:.5g}"
-            verdict = {True: "  enough", False: "  NOT ENOUGH", None: ""}[p.enough]
-            lines.append(
-                f"{p.speed:12.4f} {p.speed * RPM:13.2f} {size:>14} {values[0]:>9} {values[1]:>11} "
-                f"{values[2]:>12}{verdict}"
-            )
-            if p.note:
-                lines.append(f"    {p.note}")
-        return "\n".join(lines)
+        notes = [f"    {p.speed * RPM:.2f} rpm: {p.note}" for p in self.peaks if p.note]
+        return "\n".join([text(peak_columns(self.peaks, unit, scale)), *notes])
+
+
+def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
+    """The table of peaks as it is printed."""
+    verdicts = {True: "enough", False: "NOT ENOUGH", None: ""}
+    one = "{:.1f}".format
+    return (
+        Column("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format),
+        Column("rad/s", [p.speed for p in peaks], "{:.4f}".format),
+        Column(
+            "amplitude",
+            [None if p.undamped else scale * p.amplitude for p in peaks],
+            "{:.4g}".format,
+            f"amplitude, {unit}" if unit else "amplitude",
+        ),
+        Column("AF", [p.amplification for p in peaks], "{:.2f}".format),
+        Column("margin, %", [p.margin for p in peaks], one),
+        Column("required, %", [p.required for p in peaks], one),
+        Column("", [verdicts[p.enough] for p in peaks], str),
+    )
 
 
 def find_peaks(

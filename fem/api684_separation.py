@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from rotorid.base.answer import Answer
+from rotorid.base.result import Column, text
 from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import listing
 
 
 def separation(criticals: Iterable[float], operating: tuple[float, float]) -> dict[str, Any]:
@@ -24,13 +27,30 @@ def separation(criticals: Iterable[float], operating: tuple[float, float]) -> di
     return {"range_rad_s": [low, high], "critical_speeds": rows}
 
 
-def separation_text(operating: Mapping[str, Any]) -> str:
+def separation_answer(operating: Mapping[str, Any]) -> Answer:
     """The result of `separation` for an engineer."""
     low, high = operating["range_rad_s"]
-    lines = [f"operating range {low:.6g} to {high:.6g} rad/s ({low * RPM:.6g} to {rpm_text(high)})"]
-    for row in operating["critical_speeds"]:
-        where = "INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} % away"
-        lines.append(f"{row['speed_rad_s']:14.4f} rad/s {row['speed_rad_s'] * RPM:14.2f} rpm   {where}")
-    if not operating["critical_speeds"]:
-        lines.append("no critical speed was found")
-    return "\n".join(lines)
+    rows = operating["critical_speeds"]
+    within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
+    inside = [f"{row['speed_rad_s'] * RPM:.6g}" for row in rows if row["inside"]]
+    if inside:
+        said = f"INSIDE {within}: {listing(inside, 'and')} rpm."
+    elif rows:
+        near = min(rows, key=lambda row: float(row["separation_percent"]))
+        said = (
+            f"None lies in {within}; the nearest, {rpm_text(near['speed_rad_s'])}, is "
+            f"{near['separation_percent']:.1f} % away."
+        )
+    else:
+        return Answer(f"No critical speed was found beside {within}.")
+    columns = (
+        Column("rpm", [row["speed_rad_s"] * RPM for row in rows], "{:.2f}".format),
+        Column("rad/s", [row["speed_rad_s"] for row in rows], "{:.4f}".format),
+        Column(
+            "away",
+            ["INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} %" for row in rows],
+            str,
+            "from the operating range",
+        ),
+    )
+    return Answer(said, tables=(text(columns),), more="how far each is from the operating range")

@@ -19,12 +19,13 @@ from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.whirl import available_modes, checked_number, in_both_planes
 from fem.windows import Window, within
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import counted
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +36,7 @@ _NAMED = 5  # critical speeds that a warning names
 
 
 @dataclass(frozen=True, eq=False)
-class Campbell:
+class Campbell(Answered):
     """Whirl over speed; each column is one mode, followed through crossings.
 
     Attributes
@@ -124,38 +125,49 @@ class Campbell:
             )
         )
 
-    def summary(self) -> str:
-        """Frequencies at both ends of the range and the damped critical speeds as text."""
-        first, last = self.speeds[0], self.speeds[-1]
-        lines = [
-            f"Whirl from {first:.6g} to {last:.6g} rad/s ({first * RPM:.6g} to {rpm_text(last)})",
-            "mode    at first, rad/s   log dec    at last, rad/s   log dec",
-        ]
-        for k in range(self.frequencies.shape[1]):
-            parts = [f"{k + 1:4d}"]
-            for s in (0, -1):
-                omega, delta = self.frequencies[s, k], self.log_decrements[s, k]
-                text = f"{omega:16.4f} {_LETTERS[float(self.direction[s, k])]}{_rounded(delta):10.4f}"
-                parts.append(text if np.isfinite(omega) else f"{'none':>18}{'':10}")
-            lines.append("".join(parts))
-        heavy = self.critical_log_decrements > HEAVY
-        for title, which in (
-            ("damped critical speeds", ~heavy),
-            (f"heavily damped, without a peak (log decrement above {HEAVY})", heavy),
-        ):
-            if which.any():
-                lines += [title, "mode     rad/s         rpm   log dec  direction"]
-            for row, here in zip(rows(self._criticals()), which, strict=True):
-                if here:
-                    lines.append(
-                        f"{row['mode']:4d}{row['speed_rad_s']:12.4f}{row['speed_rpm']:12.2f}"
-                        f"{_rounded(row['log_decrement']):10.4f}  {row['direction']}"
-                    )
-        if not self.critical_speeds.size:
-            lines.append("no damped critical speed in this range")
-        if self.cut:
-            lines.append(self.cut)
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+    @property
+    def answer(self) -> Answer:
+        """Whether it is stable, and the damped critical speeds that show a peak."""
+        unstable = listing([window.where() for window in self.windows], "and")
+        said = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
+        heavy = int((self.critical_log_decrements > HEAVY).sum())
+        light = self.critical_speeds.size - heavy
+        count = counted(light, "damped critical speed")
+        if heavy:
+            count += f"; {heavy} more without a peak"
+        return Answer(
+            f"{said}\nWhirl from {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
+            text(self._told_criticals(), left=2) if self.critical_speeds.size else "",
+            self.warnings,
+            (self.cut,) if self.cut else (),
+            (self._at(0), self._at(-1)),
+            "whirl at both ends of the range",
+        )
+
+    def _told_criticals(self) -> tuple[Column, ...]:
+        """Those that show a peak before those that do not."""
+        which = np.argsort(self.critical_log_decrements > HEAVY, kind="stable")
+        speeds, decrements = self.critical_speeds[which], self.critical_log_decrements[which]
+        ways = [DIRECTION_NAMES[way] for way in self.critical_direction[which].tolist()]
+        return (
+            Column("mode", self.critical_modes[which], str),
+            Column("whirl", ways, str),
+            Column("rpm", speeds * RPM, "{:.2f}".format),
+            Column("rad/s", speeds, "{:.4f}".format),
+            Column("log dec", decrements, _rounded),
+            Column("", [f"no peak: above {HEAVY}" if decrement > HEAVY else "" for decrement in decrements], str),
+        )
+
+    def _at(self, s: int) -> str:
+        """Whirl at one of the speeds."""
+        columns = (
+            Column("mode", range(1, self.frequencies.shape[1] + 1), str),
+            Column("whirl", [word or "none" for word in self._ways()[s]], str),
+            Column("rpm", self.frequencies[s] * RPM, "{:.2f}".format),
+            Column("rad/s", self.frequencies[s], "{:.4f}".format),
+            Column("log dec", self.log_decrements[s], _rounded),
+        )
+        return f"Whirl at {rpm_text(self.speeds[s])}:\n{text(columns, left=2)}"
 
     def _criticals(self) -> tuple[Column, ...]:
         return (
@@ -173,9 +185,6 @@ class Campbell:
         for number, word in DIRECTION_NAMES.items():
             words[np.isfinite(self.frequencies) & (self.direction == number)] = word
         return words
-
-
-_LETTERS = {1.0: "F", -1.0: "B", 0.0: "-"}
 
 
 def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
@@ -335,6 +344,6 @@ def _warnings(
     return tuple(texts)
 
 
-def _rounded(delta: float) -> float:
-    """To the four digits that are printed, without a negative zero."""
-    return round(float(delta), 4) + 0.0
+def _rounded(delta: float) -> str:
+    """Four digits, without a negative zero."""
+    return f"{round(float(delta), 4) + 0.0:.4f}"

@@ -14,9 +14,11 @@ from fem.critical import lowest_critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
 from fem.solvers.bracketed_roots import bracketed_root
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.rpm import rpm_text
+from rotorid.base.result import Column, text
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +53,7 @@ class Intersection:
 
 
 @dataclass(frozen=True, eq=False)
-class SpeedMap:
+class SpeedMap(Answered):
     """Critical speeds over support stiffness.
 
     Attributes
@@ -107,24 +109,42 @@ class SpeedMap:
         columns |= {f"critical_speed_{k}_rad_s": row for k, row in enumerate(self.speeds.T, start=1)}
         return pd.DataFrame(columns)
 
-    def summary(self) -> str:
-        """Limits and intersections as text."""
-        lines = [
-            f"Critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m each",
-            "mode    free, rad/s  pinned, rad/s",
-            *(
-                f"{k:4d}{a:15.4f}{b:15.4f}"
-                for k, (a, b) in enumerate(zip(self.free, self.pinned, strict=True), 1)
-            ),
-        ]
-        if self.intersections:
-            lines.append("with the stiffness that the supports have")
-        lines += [
-            f"{item.support}, {item.direction}: critical speed {item.mode} at {item.speed:.6g} rad/s = "
-            f"{rpm_text(item.speed)}, {item.stiffness:.4g} N/m"
-            for item in self.intersections
-        ]
-        return "\n".join(lines)
+    @property
+    def answer(self) -> Answer:
+        """Each critical speed between its limits, and where the supports' own stiffness puts it."""
+        modes = range(1, self.free.size + 1)
+        met = [[RPM * item.speed for item in self.intersections if item.mode == k] for k in modes]
+        columns = (
+            Column("mode", modes, str),
+            Column("free, rpm", self.free * RPM, "{:.1f}".format),
+            Column("with the supports' own stiffness, rpm", [_range(own) for own in met], str),
+            Column("pinned, rpm", self.pinned * RPM, "{:.1f}".format),
+        )
+        low, high = self.stiffness[0], self.stiffness[-1]
+        return Answer(
+            f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each:",
+            text(columns),
+            tables=(text(self._meetings(), left=2),) if self.intersections else (),
+            more="which support meets which critical speed, and where",
+        )
+
+    def _meetings(self) -> tuple[Column, ...]:
+        met = self.intersections
+        return (
+            Column("support", [item.support for item in met], str),
+            Column("direction", [item.direction for item in met], str),
+            Column("mode", [item.mode for item in met], str),
+            Column("rpm", [item.speed * RPM for item in met], "{:.2f}".format),
+            Column("rad/s", [item.speed for item in met], "{:.4f}".format),
+            Column("N/m", [item.stiffness for item in met], "{:.4g}".format),
+        )
+
+
+def _range(speeds: Sequence[float]) -> str:
+    if not speeds:
+        return "none"
+    low, high = f"{min(speeds):.1f}", f"{max(speeds):.1f}"
+    return low if low == high else f"{low} to {high}"
 
 
 def speed_map(

@@ -80,6 +80,19 @@ class Answer:
         return "\n\n".join(part for part in parts if part)
 
 
+class Answered:
+    """What has an answer."""
+
+    @property
+    def answer(self) -> Answer:
+        """What is told first, and the tables behind it."""
+        raise NotImplementedError
+
+    def summary(self) -> str:
+        """The answer, at most 24 lines."""
+        return self.answer.brief()
+
+
 def together(answers: Iterable[Answer]) -> Answer:
     """Answers beside each other as one: their judgements first."""
     each = list(answers)
