@@ -134,9 +134,9 @@ class Campbell(Answered):
         light = self.critical_speeds.size - heavy
         count = counted(light, "damped critical speed")
         if heavy:
-            count += f"; {heavy} more without a peak"
+            count += f", {heavy} more without a peak"
         return Answer(
-            f"{said}\nWhirl from {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
+            f"{said}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
             text(self._told_criticals(), left=2) if self.critical_speeds.size else "",
             self.warnings,
             (self.cut,) if self.cut else (),

@@ -27,6 +27,11 @@ def figures(value: float, digits: int = 4) -> str:
     return f"{value:.{places}f}"
 
 
+def error_figures(error: float) -> str:
+    """A standard deviation, two digits."""
+    return figures(error, 2)
+
+
 def capital(text: str) -> str:
     """The text with a capital at its beginning."""
     return text[:1].upper() + text[1:]

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fem
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame
-from rotorid.base.text import counted, listing
+from rotorid.base.text import counted, listing, percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -86,7 +87,7 @@ class Method:
 
 
 @dataclass(frozen=True, eq=False)
-class Methods:
+class Methods(Answered):
     """Reduced models of the same rotor at the same nodes by different methods.
 
     Attributes
@@ -157,15 +158,34 @@ class Methods:
             }
         )
 
-    def summary(self) -> str:
-        """A table of frequencies, errors and MAC by method and mode, as text."""
-        n = len(self.nodes)
-        lines = [f"Warning: {text}" for text in self.warnings]
-        unknowns = counted(n, "unknown")
-        lines.append(
-            f"The rotor reduced to {unknowns}, the deflections of nodes {', '.join(map(str, self.nodes))}"
+    @property
+    def answer(self) -> Answer:
+        """The largest error of each method; behind it frequencies, errors and MAC by method and mode."""
+        worst = [
+            f"{row.name} {percent(round(float(np.nanmax(np.abs(row.relative_error))), 8))} %"
+            for row in self.rows
+            if np.isfinite(row.relative_error).any()
+        ]
+        full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
+        said = (
+            f"{listing(full, 'and')}: full mass matrices; they couple the nodes, and no single mass stands "
+            "at a node"
         )
-        lines.append("in each cell: frequency in rad/s, its error, MAC with the rotor's mode at these nodes")
+        return Answer(
+            f"Largest error of {counted(len(self.nodes), 'frequency', 'frequencies')}: {', '.join(worst)}.",
+            warnings=self.warnings,
+            notes=(said,) if full else (),
+            tables=("\n".join(self._table()),),
+            more="frequencies and shapes of each method",
+        )
+
+    def _table(self) -> list[str]:
+        n = len(self.nodes)
+        lines = [
+            f"The rotor reduced to {counted(n, 'unknown')}, the deflections of nodes "
+            f"{', '.join(map(str, self.nodes))}",
+            "in each cell: frequency in rad/s, its error, MAC with the rotor's mode at these nodes",
+        ]
         for first in range(0, n, _ACROSS):
             modes = range(first, min(n, first + _ACROSS))
             lines.append(f"{'method':<20}" + "".join(f"{f'mode {k + 1}':>10}{'':19}" for k in modes).rstrip())
@@ -180,13 +200,7 @@ class Methods:
                     f"{m:.4g} kg at node {node}" for m, node in zip(row.masses, self.nodes, strict=True)
                 )
                 lines += textwrap.wrap(f"{row.name}: {pairs}", 100, subsequent_indent="  ")
-        full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
-        if full:
-            lines.append(
-                f"{listing(full, 'and')}: full mass matrices; they couple the nodes, "
-                "and no single mass stands at a node"
-            )
-        return "\n".join(lines)
+        return lines
 
 
 def _cell(row: Method, k: int) -> str:

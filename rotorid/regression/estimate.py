@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import error_figures, percent, sentence
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
 
 if TYPE_CHECKING:
     import pandas as pd
+
+UNKNOWN = "not determined by these data"
+
+
+class _Known(Protocol):
+    """A combination of parameters: in words, with its value and standard deviation."""
+
+    @property
+    def words(self) -> str: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def std(self) -> float | None: ...
 
 
 class Uncertain:
@@ -81,6 +96,43 @@ def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, .
     )
 
 
+def parameter_text(
+    names: Sequence[str],
+    found: Uncertain,
+    combinations: Sequence[_Known] = (),
+    why: Mapping[str, str] | None = None,
+) -> str:
+    """A table of parameters and of combinations that are known: estimate, ±, 95 % interval, or `why` not."""
+    n, more = len(names), len(combinations)
+    nothing = np.full(n, np.nan)
+    std = nothing if found.std is None else found.std
+    low, high = (nothing, nothing) if found.ci95 is None else found.ci95.T
+    known = np.array([np.nan if c.std is None else c.std for c in combinations])
+    values = np.append(found.values, [c.value for c in combinations])
+    errors = np.append(std, known)
+    digits = [_digits(value, error) for value, error in zip(values, errors, strict=True)]
+    words = [*names, *(c.words for c in combinations)]
+    unknown = {name: UNKNOWN for name, value in zip(names, found.values, strict=True) if np.isnan(value)}
+    said = unknown | dict(why or {})
+
+    def written(numbers: FloatArray) -> list[str]:
+        return ["" if np.isnan(x) else f"{x:.{d}g}" for x, d in zip(numbers, digits, strict=True)]
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(values == 0, np.nan, errors / np.abs(values))
+    columns = [
+        Column("parameter", words, str),
+        Column("estimate", written(values), str),
+        Column("std", errors, error_figures, "±"),
+        Column("%", share, percent),
+        Column("low", written(np.append(low, np.full(more, np.nan))), str, "95 %: from"),
+        Column("high", written(np.append(high, np.full(more, np.nan))), str, "to"),
+        Column("why", [said.get(word, "") for word in words], str, ""),
+    ]
+    shown = [column for column in columns if any(value == value and value != "" for value in column.values)]
+    return text(shown, width=COLUMNS)
+
+
 def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
     table = rows(parameter_columns(names, found))
@@ -95,7 +147,7 @@ def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate(Uncertain):
+class Estimate(Answered, Uncertain):
     """Parameters estimated from `K θ = Y`, and what the data do not say about them.
 
     Attributes
@@ -206,42 +258,22 @@ class Estimate(Uncertain):
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
         return frame(parameter_columns(self.names, self))
 
-    def summary(self, at_bounds: Sequence[str] = ()) -> str:
-        """Text for an engineer: values ± standard deviations, intervals, and what is not determined.
+    @property
+    def answer(self) -> Answer:
+        """Values ± standard deviations, intervals, and what is not determined."""
+        return self.told()
 
-        Parameters
-        ----------
-        at_bounds
-            Parameters that stand at a bound, which is said instead of an interval.
-        """
-        width = max(len(n) for n in self.names)
-        lines = [
-            f"{name:<{width}} = {self.values[i]:.6g}   at its bound"
-            if name in at_bounds
-            else self._line(i, width)
-            for i, name in enumerate(self.names)
-        ]
-        lines += [c.line() for c in self.combinations]
-        lines.append(self.describe_rank())
-        if self.covariance is None:
-            lines.append("no intervals: no errors are stated and there are no more equations than parameters")
+    def told(self, at_bounds: Sequence[str] = ()) -> Answer:
+        """The answer where some parameters stand at a bound, which is said instead of an interval."""
+        notes = []
         if self.chi_square is not None and self.dof > 0:
             ratio = np.sqrt(self.chi_square / self.dof)
-            lines.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
-        return "\n".join(lines)
-
-    def _line(self, i: int, width: int) -> str:
-        name, std, ci95 = self.names[i], self.std, self.ci95
-        if np.isnan(self.values[i]):
-            return f"{name:<{width}} = not determined by these data"
-        digits = _digits(self.values[i], None if std is None else std[i])
-        text = f"{name:<{width}} = {self.values[i]:.{digits}g}"
-        if std is not None:
-            share = f" ({100 * std[i] / abs(self.values[i]):.2g} %)" if self.values[i] else ""
-            text += f" ± {std[i]:.2g}{share}"
-        if ci95 is not None:
-            text += f"   95 %: {ci95[i, 0]:.{digits}g} … {ci95[i, 1]:.{digits}g}"
-        return text
+            notes.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
+        if self.covariance is None and self.dof <= 0:
+            notes.append("no intervals: no errors are stated and there are no more equations than parameters")
+        why = dict.fromkeys(at_bounds, "at its bound")
+        table = parameter_text(self.names, self, self.combinations, why)
+        return Answer(sentence(self.describe_rank()), table, notes=tuple(notes))
 
 
 def coverage_factor(dof: float | None) -> float | None:

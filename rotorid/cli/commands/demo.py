@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
+from rotorid.base.answer import LINES
 from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
 
-
-@command(to=("json",))
+@command(to=("table", "json"))
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
@@ -41,11 +41,34 @@ def demo(
     if to.json:
         typer.echo(json_text(made.run(_document).document))
         return
+    room, left = LINES - 2, len(made.commands)
     for heading, words in made.told():
         typer.echo(heading)
-        _run(words)
-        typer.echo("")
-    typer.echo(made.summary())
+        if to.table:
+            typer.echo("")
+            _run(words)
+            typer.echo("")
+            continue
+        with contextlib.redirect_stdout(io.StringIO()) as text:
+            _run(words)
+        lines = heading.count("\n") + 1
+        said = _beginning(text.getvalue(), room // left - lines)
+        typer.echo("\n".join(said))
+        room, left = room - lines - len(said), left - 1
+    typer.echo(made.answer.whole())
+    if not to.table:
+        typer.echo("All that a command says: type it; that all of them say: add --table.")
+
+
+def _beginning(text: str, room: int) -> list[str]:
+    """The first paragraphs that fit, at least the beginning of the first."""
+    first, *others = text.rstrip("\n").split("\n\n")
+    lines = first.splitlines()[: max(room, 2)]
+    for other in others:
+        if len(lines) + other.count("\n") + 1 > room:
+            break
+        lines += other.splitlines()
+    return lines
 
 
 def _run(command: list[str]) -> None:

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, text
 from rotorid.reduction.equivalent.changed_inputs import Shift, labels, units
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
 from rotorid.reduction.equivalent.mass_sensitivity import (
@@ -41,7 +42,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class MassUncertainty:
+class MassUncertainty(Answered):
     """Equivalent masses and frequencies of the small model with what stated input errors do to them.
 
     Attributes
@@ -176,33 +177,62 @@ class MassUncertainty:
             }
         )
 
-    def summary(self) -> str:
-        """Text: value ± std, and the inputs that make up most of each variance."""
-        n, lines = len(self.masses), []
+    @property
+    def likely(self) -> FloatArray:
+        """Standard deviations to use, of masses, kg, and frequencies, rad/s, shape (2, n); NaN where unknown."""
+        known = (self.masses_std, self.frequencies_std) if self.drawn is None else self.drawn
+        return np.array(known)
+
+    @property
+    def answer(self) -> Answer:
+        """What the errors do to masses and frequencies, and the inputs that make up most of each variance."""
+        n, warnings = len(self.masses), self.warnings
+        values, std = np.stack((self.masses, self.frequencies)), self.likely
+        with np.errstate(divide="ignore", invalid="ignore"):
+            shares = 100 * std / np.abs(values)
+        mass, speed = (_span(row) for row in shares)
+        drawn = "" if self.drawn is None else " (drawn inputs)"
+        if lost := [label for label, size in zip(labels(n), std.ravel(), strict=True) if np.isnan(size)]:
+            warnings = (
+                "some of the drawn inputs give masses that are not positive, and then no "
+                f"{lost[0]}: these errors do not determine {', '.join(lost)}",
+                *warnings,
+            )
+        return Answer(
+            f"The stated errors move the masses by {mass} and the frequencies by {speed}{drawn}.",
+            warnings=warnings,
+            tables=(text(self._shares()),),
+            more="which inputs make up the errors",
+        )
+
+    def _shares(self) -> tuple[Column, ...]:
+        """Each quantity in first order, and the largest parts of its variance."""
+        n = len(self.masses)
         values = np.concatenate((self.masses, self.frequencies))
         std = np.concatenate((self.masses_std, self.frequencies_std))
         parts = {name: part.ravel() for name, part in self.contributions.items()}
-        for q, (label, unit) in enumerate(zip(labels(n), units(n), strict=True)):
-            if not np.isfinite(values[q]):
-                lines.append(f"{label:<6} does not vibrate")
-                continue
-            text = f"{label:<6} = {values[q]:.6g} ± {std[q]:.2g} {unit}"
-            if values[q]:
-                text += f" ({100 * std[q] / abs(values[q]):.2g} %)"
-            top = sorted(parts, key=lambda name: -parts[name][q])[:3]
-            shares = [(name, 100 * parts[name][q] / std[q] ** 2) for name in top] if std[q] > 0 else []
-            said = ", ".join(f"{name} {share:.0f} %" for name, share in shares if share >= 1)
-            lines.append(text + (f"   of the variance: {said}" if said else ""))
-        if self.drawn is not None:
-            half = list(zip(labels(n), self.drawn.ravel(), units(n), strict=True))
-            known = [f"{label} ± {value:.2g} {unit}" for label, value, unit in half if np.isfinite(value)]
-            lines.append(f"drawn inputs instead of first order: {', '.join(known)}")
-            if lost := [label for label, value, _ in half if not np.isfinite(value)]:
-                lines.append(
-                    f"  some of the drawn inputs give masses that are not positive, and then no {lost[0]}: "
-                    f"these errors do not determine {', '.join(lost)}"
-                )
-        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
+        said = []
+        for q, size in enumerate(std):
+            top = sorted(parts, key=lambda name: -parts[name][q])[:3]  # noqa: B023 - used at once
+            shown = [(name, 100 * parts[name][q] / size**2) for name in top] if size > 0 else []
+            known = ", ".join(f"{name} {share:.0f} %" for name, share in shown if share >= 1)
+            said.append(known if np.isfinite(values[q]) else "does not vibrate")
+        return (
+            Column("quantity", labels(n), str, ""),
+            Column("value", values, "{:.6g}".format),
+            Column("std", std, "{:.2g}".format, "±"),
+            Column("unit", units(n), str, ""),
+            Column("shares", said, str, "of the variance"),
+        )
+
+
+def _span(shares: FloatArray) -> str:
+    """The least and the largest that is known, in percent."""
+    known = [f"{size:.2g}" for size in shares[np.isfinite(shares)]]
+    if not known:
+        return "an unknown amount"
+    low, high = min(known, key=float), max(known, key=float)
+    return f"{low} %" if low == high else f"{low} to {high} %"
 
 
 def mass_uncertainty(
