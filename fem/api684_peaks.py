@@ -97,18 +97,8 @@ class Peaks:
         return frame(self._columns())
 
     def _columns(self) -> tuple[Column, ...]:
-        peaks = self.peaks
-        return (
-            Column("speed_rad_s", [p.speed for p in peaks]),
-            Column("speed_rpm", [p.speed * RPM for p in peaks]),
-            Column("amplitude", [None if p.undamped else p.amplitude for p in peaks]),
-            Column("half_power_rad_s", [(p.below, p.above) for p in peaks]),
-            Column("amplification_factor", [p.amplification for p in peaks]),
-            Column("separation_margin_percent", [p.margin for p in peaks]),
-            Column("required_margin_percent", [p.required for p in peaks]),
-            Column("enough", [p.enough for p in peaks]),
-            Column("note", [p.note for p in peaks]),
-        )
+        rpm, speed, *rest = peak_columns(self.peaks)
+        return (speed, rpm, *rest)
 
     def summary(self, unit: str = "", scale: float = 1.0) -> str:
         """The peaks as text, amplitudes times `scale` with the name of their unit."""
@@ -119,23 +109,24 @@ class Peaks:
 
 
 def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
-    """The table of peaks as it is printed."""
-    verdicts = {True: "enough", False: "NOT ENOUGH", None: ""}
+    """The table of peaks, amplitudes times `scale` with the name of their unit."""
     one = "{:.1f}".format
+    sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
     return (
-        Column("rpm", [p.speed * RPM for p in peaks], "{:.2f}".format),
-        Column("rad/s", [p.speed for p in peaks], "{:.4f}".format),
-        Column(
-            "amplitude",
-            [None if p.undamped else scale * p.amplitude for p in peaks],
-            "{:.4g}".format,
-            f"amplitude, {unit}" if unit else "amplitude",
-        ),
-        Column("AF", [p.amplification for p in peaks], "{:.2f}".format),
-        Column("margin, %", [p.margin for p in peaks], one),
-        Column("required, %", [p.required for p in peaks], one),
-        Column("", [verdicts[p.enough] for p in peaks], str),
+        Column("speed_rpm", [p.speed * RPM for p in peaks], "{:.2f}".format, "rpm"),
+        Column("speed_rad_s", [p.speed for p in peaks], "{:.4f}".format, "rad/s"),
+        Column("amplitude", sizes, "{:.4g}".format, f"amplitude, {unit}" if unit else None),
+        Column("half_power_rad_s", [(p.below, p.above) for p in peaks]),
+        Column("amplification_factor", [p.amplification for p in peaks], "{:.2f}".format, "AF"),
+        Column("separation_margin_percent", [p.margin for p in peaks], one, "margin, %"),
+        Column("required_margin_percent", [p.required for p in peaks], one, "required, %"),
+        Column("enough", [p.enough for p in peaks], _verdict, ""),
+        Column("note", [p.note for p in peaks]),
     )
+
+
+def _verdict(enough: bool) -> str:
+    return "enough" if enough else "NOT ENOUGH"
 
 
 def find_peaks(

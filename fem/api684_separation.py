@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rotorid.base.answer import Answer
-from rotorid.base.result import Column, text
 from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import listing
+from rotorid.base.text import listing, table
 
 
 def separation(criticals: Iterable[float], operating: tuple[float, float]) -> dict[str, Any]:
@@ -30,27 +29,14 @@ def separation(criticals: Iterable[float], operating: tuple[float, float]) -> di
 def separation_answer(operating: Mapping[str, Any]) -> Answer:
     """The result of `separation` for an engineer."""
     low, high = operating["range_rad_s"]
-    rows = operating["critical_speeds"]
     within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
-    inside = [f"{row['speed_rad_s'] * RPM:.6g}" for row in rows if row["inside"]]
+    rows = sorted(operating["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+    inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
     if inside:
-        said = f"INSIDE {within}: {listing(inside, 'and')} rpm."
-    elif rows:
-        near = min(rows, key=lambda row: float(row["separation_percent"]))
-        said = (
-            f"None lies in {within}; the nearest, {rpm_text(near['speed_rad_s'])}, is "
-            f"{near['separation_percent']:.1f} % away."
-        )
-    else:
+        return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+    if not rows:
         return Answer(f"No critical speed was found beside {within}.")
-    columns = (
-        Column("rpm", [row["speed_rad_s"] * RPM for row in rows], "{:.2f}".format),
-        Column("rad/s", [row["speed_rad_s"] for row in rows], "{:.4f}".format),
-        Column(
-            "away",
-            ["INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} %" for row in rows],
-            str,
-            "from the operating range",
-        ),
-    )
-    return Answer(said, tables=(text(columns),), more="how far each is from the operating range")
+    near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
+    away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
+    more = "how far each is from the operating range"
+    return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)

@@ -130,6 +130,7 @@ class Campbell(Answered):
         """Whether it is stable, and the damped critical speeds that show a peak."""
         unstable = listing([window.where() for window in self.windows], "and")
         said = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
+        speed, rpm, mode, decrement, whirl, mark = self._criticals()
         heavy = int((self.critical_log_decrements > HEAVY).sum())
         light = self.critical_speeds.size - heavy
         count = counted(light, "damped critical speed")
@@ -137,25 +138,11 @@ class Campbell(Answered):
             count += f", {heavy} more without a peak"
         return Answer(
             f"{said}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
-            text(self._told_criticals(), left=2) if self.critical_speeds.size else "",
+            text((mode, whirl, rpm, speed, decrement, mark), left=2) if self.critical_speeds.size else "",
             self.warnings,
             (self.cut,) if self.cut else (),
             (self._at(0), self._at(-1)),
             "whirl at both ends of the range",
-        )
-
-    def _told_criticals(self) -> tuple[Column, ...]:
-        """Those that show a peak before those that do not."""
-        which = np.argsort(self.critical_log_decrements > HEAVY, kind="stable")
-        speeds, decrements = self.critical_speeds[which], self.critical_log_decrements[which]
-        ways = [DIRECTION_NAMES[way] for way in self.critical_direction[which].tolist()]
-        return (
-            Column("mode", self.critical_modes[which], str),
-            Column("whirl", ways, str),
-            Column("rpm", speeds * RPM, "{:.2f}".format),
-            Column("rad/s", speeds, "{:.4f}".format),
-            Column("log dec", decrements, _rounded),
-            Column("", [f"no peak: above {HEAVY}" if decrement > HEAVY else "" for decrement in decrements], str),
         )
 
     def _at(self, s: int) -> str:
@@ -170,13 +157,14 @@ class Campbell(Answered):
         return f"Whirl at {rpm_text(self.speeds[s])}:\n{text(columns, left=2)}"
 
     def _criticals(self) -> tuple[Column, ...]:
+        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
         return (
-            Column("speed_rad_s", self.critical_speeds),
-            Column("speed_rpm", self.critical_speeds * RPM),
-            Column("mode", self.critical_modes),
-            Column("log_decrement", self.critical_log_decrements),
-            Column("direction", [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]),
-            Column("heavily_damped", self.critical_log_decrements > HEAVY),
+            Column("speed_rad_s", self.critical_speeds, "{:.4f}".format, "rad/s"),
+            Column("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, "rpm"),
+            Column("mode", self.critical_modes, str),
+            Column("log_decrement", self.critical_log_decrements, _rounded, "log dec"),
+            Column("direction", ways, str, "whirl"),
+            Column("heavily_damped", self.critical_log_decrements > HEAVY, _no_peak, ""),
         )
 
     def _ways(self) -> AnyArray:
@@ -319,14 +307,14 @@ def _warnings(
     values, speeds = paths.values[asked][:, columns], whirl.speeds[asked]
     gone = ~np.isfinite(values)
     above = went_above(whirl, paths, columns)[asked]
-    for text, cells in (
+    for said, cells in (
         ("does not oscillate (overdamped)", gone & ~above),
         ("was not found (overdamped, or above the frequencies computed)", above),
     ):
         for k in np.flatnonzero(cells.any(axis=0)):
             where = speeds[cells[:, k]]
             texts.append(
-                f"mode {k + 1} {text} at {where.size} of {counted(speeds.size, 'speed')}, "
+                f"mode {k + 1} {said} at {where.size} of {counted(speeds.size, 'speed')}, "
                 f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
             )
     if columns.size < n:
@@ -347,3 +335,7 @@ def _warnings(
 def _rounded(delta: float) -> str:
     """Four digits, without a negative zero."""
     return f"{round(float(delta), 4) + 0.0:.4f}"
+
+
+def _no_peak(heavy: bool) -> str:
+    return f"no peak: above {HEAVY}" if heavy else ""

@@ -62,8 +62,8 @@ class MeshCheck(Answered):
     def _estimates(self) -> tuple[Column, ...]:
         return (
             Column("extrapolated_rad_s", self.extrapolated),
-            Column("relative_error", self.errors),
-            Column("rate", self.rates),
+            Column("relative_error", self.errors, "{:.1e}".format, "error of the mesh"),
+            Column("rate", self.rates, "{:.2f}".format),
         )
 
     @property
@@ -78,12 +78,8 @@ class MeshCheck(Answered):
         if size > FINE:
             times = int(np.ceil((size / FINE) ** (1 / RATE)))
             said += f": elements {times} times shorter would bring all errors below {percent(FINE)} %"
-        columns = (
-            Column("mode", range(1, self.frequencies.size + 1), str),
-            Column("rpm", self.frequencies * RPM, "{:.2f}".format),
-            Column("error of the mesh, %", 100 * self.errors, "{:.1e}".format),
-            Column("rate", ["rounding" if np.isnan(rate) else f"{rate:.2f}" for rate in self.rates], str),
-        )
+        speeds = Column("rpm", self.frequencies * RPM, "{:.2f}".format)
+        columns = (Column("mode", range(1, self.rates.size + 1), str), speeds, *self._estimates())
         return Answer(sentence(said), tables=(text(columns),), more="errors of the mesh")
 
 

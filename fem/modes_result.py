@@ -93,27 +93,15 @@ class Modes(Answered):
     @property
     def answer(self) -> Answer:
         """The critical speeds, in rpm, Hz and rad/s."""
-        own = [f"{speed * RPM:.6g}" for speed in self.frequencies if speed > 0]
+        own = [f"{speed:.6g}" for speed in self.rpm if speed > 0]
         shown = listing(own, "and") if len(own) < _NAMED else f"{', '.join(own[:_NAMED])} …"
-        return Answer(
-            f"{counted(len(own), 'critical speed')} without damping{f': {shown} rpm' if own else ''}.",
-            text(self._table(), left=1 + self._mixed),
-            self.warnings,
-            (self.cut,) if self.cut else (),
-        )
-
-    @property
-    def _mixed(self) -> bool:
-        return any(word != "forward" for word in self.direction)
-
-    def _table(self) -> tuple[Column, ...]:
-        whirl = (Column("whirl", self.direction, str),) if self._mixed else ()
-        rigid = ["rigid body" if speed == 0 else "" for speed in self.frequencies]
-        return (
+        ways = zip(self.frequencies, self.direction, strict=True)
+        columns = (
             Column("mode", range(1, self.frequencies.size + 1), str),
-            *whirl,
+            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways], str),
             Column("rpm", self.rpm, "{:.2f}".format),
             Column("Hz", self.frequencies / (2 * np.pi), "{:.4f}".format),
             Column("rad/s", self.frequencies, "{:.4f}".format),
-            Column("", rigid, str),
         )
+        said = f"{counted(len(own), 'critical speed')} without damping{f': {shown} rpm' if own else ''}."
+        return Answer(said, text(columns, left=2), self.warnings, (self.cut,) if self.cut else ())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Answered):
     """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
 
     On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
@@ -160,17 +160,20 @@ class Response:
             ]
         return frame(columns)
 
-    def summary(self) -> str:
-        """The highest peak of a steady response and where it is, as text."""
+    @property
+    def answer(self) -> Answer:
+        """The highest peak of a steady response and where it is."""
+        said = f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes."
+        return Answer(f"{said}\n{self.highest}", warnings=self.warnings)
+
+    @property
+    def highest(self) -> str:
+        """The largest amplitude in a sentence."""
         k = largest_at(self.largest, self.steady)
-        lines = [
-            f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
-            "no steady response at any of these speeds"
-            if k is None
-            else f"largest amplitude {1e6 * self.largest[k]:.4g} µm at node {self.largest_node[k]}, "
-            f"{rpm_text(self.speeds[k])}",
-        ]
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+        if k is None:
+            return "No steady response at any of these speeds."
+        size, node = 1e6 * self.largest[k], self.largest_node[k]
+        return f"Largest amplitude {size:.4g} µm at node {node}, {rpm_text(self.speeds[k])}."
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,8 +232,12 @@ class BearingForces:
         forces = zip(where, self.largest.T, strict=True)
         columns = (
             Column("support", [support.name or f"node {support.node}" for support in self.supports], str),
-            Column("N", [None if k is None else force[k] for k, force in forces], figures, "largest force, N"),
-            Column("rpm", [None if k is None else self.speeds[k] * RPM for k in where], "{:.1f}".format, "at rpm"),
+            Column(
+                "N", [None if k is None else force[k] for k, force in forces], figures, "largest force, N"
+            ),
+            Column(
+                "rpm", [None if k is None else self.speeds[k] * RPM for k in where], "{:.1f}".format, "at rpm"
+            ),
         )
         return text(columns)
 
@@ -286,8 +293,8 @@ class InfluenceCoefficients(Answered):
 
     @property
     def answer(self) -> Answer:
-        """How many coefficients there are, where they are largest, and over many speeds how small they get."""
-        S, C, P = self.W.shape
+        """Where the coefficients are largest, and over many speeds how small they get."""
+        _, C, P = self.W.shape
         steady = ~within(self.windows, self.speeds)
         said = (
             f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')} at "
@@ -295,33 +302,23 @@ class InfluenceCoefficients(Answered):
         )
         if not steady.any():
             return Answer(f"{said} None has a meaning: there is no steady response.", warnings=self.warnings)
-        sizes = np.abs(self.W[steady])
-        s, c, p = np.unravel_index(int(sizes.argmax()), sizes.shape)
-        said += (
-            f"\nLargest: {sizes[s, c, p]:.4g} µm per g·mm at sensor {label(self.sensors[c])}, plane "
-            f"{self.planes[p]}, {rpm_text(self.speeds[steady][s])}."
-        )
-        table = text(self._sizes(sizes, self.speeds[steady]), left=2)
-        return Answer(said, table, self.warnings)
-
-    def _sizes(self, sizes: FloatArray, speeds: FloatArray) -> tuple[Column, ...]:
-        """Least and largest over the speeds, or size and phase at one, per sensor and plane."""
-        flat = sizes.reshape(speeds.size, -1)
-        named = (
+        sizes, speeds = np.abs(self.W[steady]).reshape(-1, C * P), self.speeds[steady]
+        largest = sizes.argmax(axis=0)
+        columns = [
             Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.planes], str),
-            Column("plane", list(self.planes) * len(self.sensors), str),
-        )
-        if self.speeds.size == 1:
-            size, phase = polar("µm per g·mm", "phase lead, deg", self.W)
-            return (*named, replace(size, shown="{:.4g}".format), replace(phase, shown="{:.2f}".format))
-        largest = flat.argmax(axis=0)
-        return (
-            *named,
-            Column("least", flat.min(axis=0), "{:.4g}".format, "µm per g·mm: least"),
-            Column("largest", flat.max(axis=0), "{:.4g}".format),
-            Column("rpm", speeds[largest] * RPM, "{:.6g}".format, "at rpm"),
-            Column("rad/s", speeds[largest], "{:.6g}".format),
-        )
+            Column("plane", list(self.planes) * C, str),
+            Column("largest", sizes.max(axis=0), "{:.4g}".format, "µm per g·mm"),
+        ]
+        if speeds.size == 1:
+            columns.append(
+                Column("phase", phase_deg(self.W[steady].ravel()), "{:.2f}".format, "phase lead, deg")
+            )
+        else:
+            columns.append(Column("rpm", speeds[largest] * RPM, "{:.6g}".format, "at rpm"))
+            columns.append(Column("rad/s", speeds[largest], "{:.6g}".format))
+            columns.append(Column("least", sizes.min(axis=0), "{:.4g}".format, "least"))
+        said += f"\nThe largest is {sizes.max():.4g} µm per g·mm."
+        return Answer(said, text(columns, left=2), self.warnings)
 
 
 def largest_at(size: FloatArray, steady: BoolArray) -> int | None:

@@ -17,7 +17,7 @@ from fem.solvers.bracketed_roots import bracketed_root
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, text
+from rotorid.base.result import Column, rows, text
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -88,16 +88,7 @@ class SpeedMap(Answered):
                 "critical_speeds_rad_s": self.speeds.T,
                 "free_rad_s": self.free,
                 "pinned_rad_s": self.pinned,
-                "intersections": [
-                    {
-                        "support": item.support,
-                        "direction": item.direction,
-                        "mode": item.mode,
-                        "speed_rad_s": item.speed,
-                        "stiffness_N_per_m": item.stiffness,
-                    }
-                    for item in self.intersections
-                ],
+                "intersections": rows(self._meetings()),
             }
         )
 
@@ -111,40 +102,31 @@ class SpeedMap(Answered):
 
     @property
     def answer(self) -> Answer:
-        """Each critical speed between its limits, and where the supports' own stiffness puts it."""
-        modes = range(1, self.free.size + 1)
-        met = [[RPM * item.speed for item in self.intersections if item.mode == k] for k in modes]
-        columns = (
-            Column("mode", modes, str),
-            Column("free, rpm", self.free * RPM, "{:.1f}".format),
-            Column("with the supports' own stiffness, rpm", [_range(own) for own in met], str),
-            Column("pinned, rpm", self.pinned * RPM, "{:.1f}".format),
+        """Where the supports' own stiffness meets the map; behind it the limits of each critical speed."""
+        limits = (
+            Column("mode", range(1, self.free.size + 1), str),
+            Column("free", self.free * RPM, "{:.2f}".format, "free supports, rpm"),
+            Column("pinned", self.pinned * RPM, "{:.2f}".format, "pinned, rpm"),
         )
+        speeds = [item.speed * RPM for item in self.intersections]
+        met = self._meetings()
         low, high = self.stiffness[0], self.stiffness[-1]
         return Answer(
-            f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each:",
-            text(columns),
-            tables=(text(self._meetings(), left=2),) if self.intersections else (),
-            more="which support meets which critical speed, and where",
+            f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each.",
+            text((*met[:3], Column("rpm", speeds, "{:.2f}".format), *met[3:]), left=2),
+            tables=(text(limits),),
+            more="limits of soft and of stiff supports",
         )
 
     def _meetings(self) -> tuple[Column, ...]:
         met = self.intersections
         return (
-            Column("support", [item.support for item in met], str),
+            Column("support", [item.support for item in met], str, "own stiffness of"),
             Column("direction", [item.direction for item in met], str),
             Column("mode", [item.mode for item in met], str),
-            Column("rpm", [item.speed * RPM for item in met], "{:.2f}".format),
-            Column("rad/s", [item.speed for item in met], "{:.4f}".format),
-            Column("N/m", [item.stiffness for item in met], "{:.4g}".format),
+            Column("speed_rad_s", [item.speed for item in met], "{:.4f}".format, "rad/s"),
+            Column("stiffness_N_per_m", [item.stiffness for item in met], "{:.4g}".format, "N/m"),
         )
-
-
-def _range(speeds: Sequence[float]) -> str:
-    if not speeds:
-        return "none"
-    low, high = f"{min(speeds):.1f}", f"{max(speeds):.1f}"
-    return low if low == high else f"{low} to {high}"
 
 
 def speed_map(

@@ -92,9 +92,13 @@ class Design(Answered):
         columns = (
             Column("parameter", self.parameters, str),
             Column("guess", self.guess, "{:.6g}".format),
-            Column("std", [std if np.isfinite(std) else None for std in self.std], error_figures, "± expected"),
+            Column(
+                "std", [std if np.isfinite(std) else None for std in self.std], error_figures, "± expected"
+            ),
             Column("%", np.where(np.isfinite(share), share, np.nan), percent),
-            Column("all", [std if np.isfinite(std) else None for std in self.std_all], error_figures, "± of all"),
+            Column(
+                "all", [std if np.isfinite(std) else None for std in self.std_all], error_figures, "± of all"
+            ),
             Column("why", known, str, ""),
         )
         return Answer(f"{said}.", text(columns, width=COLUMNS))

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import phase_deg
 from rotorid.base.text import percent, sentence
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
@@ -40,6 +39,10 @@ class FoundCombination:
     words: str
     value: float
     std: float | None
+
+    def line(self) -> str:
+        """One line of text."""
+        return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,28 +174,26 @@ class Identification(Answered, Uncertain):
     @property
     def answer(self) -> Answer:
         """What is determined and how well the model fits, the values, and what it leaves of each reading."""
-        solutions = [
-            f"  solution {i + 1}: " + ", ".join(f"{k} = {v:.6g}" for k, v in one.items() if np.isfinite(v))
-            for i, one in enumerate(self.solutions if len(self.solutions) > 1 else ())
-        ]
         why = {name: SEVERAL for name in self.parameters if self._several(name)}
-        table = parameter_text(self.parameters, self, self.combinations, why)
+        found = [parameter_text(self.parameters, self, why), *(f"  {c.line()}" for c in self.combinations)]
+        for i, solution in enumerate(self.solutions if len(self.solutions) > 1 else ()):
+            values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
+            found.append(f"  solution {i + 1}: {values}")
         notes = [f"left out: {row}" for row in self.left_out]
         if self.covariance is None and self.converged:
             notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
-        misfit = self._misfit()
-        left = np.array(misfit[-1].values if misfit else (), dtype=float)
-        left = left[np.isfinite(left)]
-        said = ""
-        if left.size and self.converged:
-            said = f"\nThe model leaves {percent(_rounded(left))} % of the readings"
-            said += f" (rms), {percent(left.max() / 100)} % of the worst one." if left.max() > 1e-8 else "."
+        columns = self._misfit()
+        left = np.array(columns[-1].values)
+        said = f"{self._judgement()} Method: {HEADINGS.get(self.method, self.method)}."
+        if known := bool(np.isfinite(left).any()):
+            rms = float(np.sqrt(np.nanmean(np.square(left))))
+            said += f"\nThe model leaves {percent(round(rms, 10))} % of the readings (rms)."
         return Answer(
-            f"{self._judgement()} Method: {HEADINGS.get(self.method, self.method)}.{said}",
-            "\n".join([table, *solutions]),
+            said,
+            "\n".join(found),
             self.warnings[::-1],  # what speaks against the answer comes last there
             (*notes, *self.notes),
-            (text(misfit, left=2, width=COLUMNS),) if left.size else (),
+            (text(columns),) if known else (),
             "what it leaves of each reading",
         )
 
@@ -212,31 +213,21 @@ class Identification(Answered, Uncertain):
         return len({round(s[name], 12) for s in self.solutions if np.isfinite(s[name])}) > 1
 
     def _misfit(self) -> tuple[Column, ...]:
-        """Measured and predicted amplitudes, and their difference in percent of the measured one."""
+        """Size of measured and predicted amplitudes, and their difference as a share of the measured one."""
         names = [name for name in self.model.outputs if name in self.predicted]
-        if not names:
-            return ()
         n, e = len(self.experiments), len(names)
         measured = self.experiments.table(names).ravel()
-        model = np.stack([self.predicted[name] for name in names], axis=1).ravel()
+        model = np.array([self.predicted[name] for name in names]).T.ravel()
         with np.errstate(divide="ignore", invalid="ignore"):
-            left = 100 * np.abs(model - measured) / np.abs(measured)
+            left = np.abs(model - measured) / np.abs(measured)
         return (
             Column("experiment", np.repeat(self.experiments.names, e), str),
-            Column("output", names * n, str),
             Column("rad/s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format),
+            Column("output", names * n, str),
             Column("measured", np.abs(measured), "{:.4g}".format),
-            Column("lead_measured", phase_deg(measured), "{:.1f}".format, "lead, deg"),
             Column("model", np.abs(model), "{:.4g}".format),
-            Column("lead_model", phase_deg(model), "{:.1f}".format, "lead, deg"),
-            Column("left", left, "{:.2g}".format, "left, %"),
+            Column("%", left, percent, "left, %"),
         )
-
-
-def _rounded(percents: FloatArray) -> float:
-    """Root mean square of percents as a share; rounding of exact readings is none."""
-    share = float(np.sqrt(np.mean(percents**2))) / 100
-    return share if share > 1e-10 else 0.0
 
 
 def _residual_columns(found: Identification) -> tuple[Column, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -242,49 +242,43 @@ class Placement(Answered):
             said = f"{asked} no choice gives a physical model; use other candidates or more modes."
             return Answer(said, warnings=self.warnings)
         i = self.compromise
-        said = asked
-        if i is not None:
-            said += (
-                f" the compromise is {', '.join(map(str, self.nodes[i]))}: frequencies within "
-                f"{100 * self.error[i]:.2g} %, MAC {self.mac[i]:.3g}"
-            )
+        assert i is not None
+        places = ", ".join(map(str, self.nodes[i]))
         named = {
             "best by frequency": self.best_by_frequency,
             "best by MAC": self.best_by_mac,
             "compromise": i,
-            "the book's rule (antinodes)": self.book,
+            "the book's antinodes": self.book,
         }
-        chosen = {words: int(row) for words, row in named.items() if row is not None}
         counts = (
             f"Masses from {counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}: ranked "
             f"{self.ranked}; with masses that are not positive {self.unphysical}; not determined "
             f"{self.undetermined}; a mode has a node at the first mass {self.at_node}."
         )
-        best = text(self._choices(range(min(_TOP, self.ranked)), []))
+        best = self._choices({str(k + 1): k for k in range(min(_TOP, self.ranked))})
         return Answer(
-            f"{said}.",
-            text(self._choices([*chosen.values()], [*chosen]), width=COLUMNS),
+            f"{asked} the compromise is {places}: frequencies within {100 * self.error[i]:.2g} %, "
+            f"MAC {self.mac[i]:.3g}.",
+            self._choices({words: int(row) for words, row in named.items() if row is not None}),
             self.warnings,
             (self._trap(), *((f"the book's rule: {self.book_note}",) if self.book is None else ())),
             (f"{counts}\n{best}",),
-            f"the best {min(_TOP, self.ranked)} choices with their masses",
+            f"the best {min(_TOP, self.ranked)} choices",
         )
 
-    def _choices(self, chosen: Sequence[int], names: Sequence[str]) -> tuple[Column, ...]:
-        """Choices as a table, with names or else with their masses."""
-        ranked = [i < self.ranked for i in chosen]
-        masses = [", ".join(f"{m:.2f}" for m in self.masses[i]) for i in chosen]
-        first = (Column("choice", names, str, ""),) if names else ()
-        return (
-            *first,
-            Column("rank", [str(i + 1) if known else "none" for i, known in zip(chosen, ranked)], str),
-            Column("error", [100 * self.error[i] for i in chosen], "{:.4f}".format, "largest error, %"),
-            Column("mac", [self.mac[i] for i in chosen], "{:.4f}".format, "smallest MAC"),
-            Column("mode", [self.worst_mode[i] or None for i in chosen], "in mode {}".format, ""),
-            Column("condition", [self.condition[i] for i in chosen], "{:.3g}".format),
+    def _choices(self, named: Mapping[str, int]) -> str:
+        """Choices as a table."""
+        chosen = [*named.values()]
+        macs = [f"{self.mac[i]:.4f} ({self.worst_mode[i]})" if i < self.ranked else "" for i in chosen]
+        columns = (
+            Column("choice", [*named], str),
+            Column("error", 100 * self.error[chosen], "{:.4f}".format, "largest error, %"),
+            Column("mac", macs, str, "MAC (mode)"),
+            Column("condition", self.condition[chosen], "{:.3g}".format),
             Column("nodes", [", ".join(map(str, self.nodes[i])) for i in chosen], str),
-            *(() if names else (Column("masses", masses, str, "masses, kg"),)),
+            Column("masses", [", ".join(f"{m:.1f}" for m in self.masses[i]) for i in chosen], str, "kg"),
         )
+        return text(columns, width=COLUMNS)
 
     def _trap(self) -> str:
         if self.nodes.shape[1] == 1:

@@ -283,34 +283,26 @@ class Reduction(Answered):
         return said
 
     def _masses(self) -> tuple[Column, ...]:
-        std, stated, positions = self.masses.std, self.uncertainty, self.positions
-        columns = [Column("node", self.nodes, str)]
-        if positions is not None:
-            columns.append(Column("at, m", positions, "{:.3f}".format))
-        columns.append(Column("kg", self.masses.solution, "{:.3f}".format, "mass, kg"))
-        if std is not None:
-            columns.append(Column("std", std, error_figures, "±"))
-        if stated is not None:
-            columns.append(Column("stated", stated.likely[0], error_figures, "± by the stated errors"))
-        return tuple(columns)
+        std, positions = self.masses.std, self.positions
+        at = () if positions is None else (Column("at, m", positions, "{:.3f}".format),)
+        spread = () if std is None else (Column("±", std, error_figures),)
+        masses = Column("mass, kg", self.masses.solution, "{:.3f}".format)
+        return (Column("node", self.nodes, str), *at, masses, *spread)
 
     def _modes(self) -> tuple[Column, ...]:
         own, other = self.frequencies, self._padded(self.rotor_frequencies)
         whose = "measured" if self.choices.source == "measured" else "rotor"
-        columns = [
+        still = ["" if np.isfinite(f) else "does not vibrate" for f in own]
+        return (
             Column("mode", range(1, len(self.nodes) + 1), str),
             Column("model", own * RPM, "{:.1f}".format, "model, rpm"),
             Column("rad/s", own, "{:.4f}".format),
             Column("rotor", other * RPM, "{:.1f}".format, f"{whose}, rpm"),
             Column("rotor_rad_s", other, "{:.4f}".format, "rad/s"),
             Column("error", 100 * self.relative_error, "{:+.3f}".format, "error, %"),
-            Column("mac", np.where(np.isfinite(own), self.mac, np.nan), "{:.5f}".format, "MAC"),
-        ]
-        if self.uncertainty is not None:
-            columns.append(Column("stated", self.uncertainty.likely[1] * RPM, error_figures, "± rpm"))
-        if not np.isfinite(own).all():
-            columns.append(Column("", ["" if np.isfinite(f) else "does not vibrate" for f in own], str))
-        return tuple(columns)
+            Column("MAC", np.where(np.isfinite(own), self.mac, np.nan), "{:.5f}".format),
+            *((Column("", still, str),) if any(still) else ()),
+        )
 
     def _padded(self, values: FloatArray) -> FloatArray:
         out = np.full(len(self.nodes), np.nan)

@@ -5,32 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import error_figures, percent, sentence
+from rotorid.base.result import Column, frame, rows
+from rotorid.base.text import error_figures, percent, sentence, table
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
 
 if TYPE_CHECKING:
     import pandas as pd
-
-UNKNOWN = "not determined by these data"
-
-
-class _Known(Protocol):
-    """A combination of parameters: in words, with its value and standard deviation."""
-
-    @property
-    def words(self) -> str: ...
-    @property
-    def value(self) -> float: ...
-    @property
-    def std(self) -> float | None: ...
 
 
 class Uncertain:
@@ -96,41 +83,18 @@ def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, .
     )
 
 
-def parameter_text(
-    names: Sequence[str],
-    found: Uncertain,
-    combinations: Sequence[_Known] = (),
-    why: Mapping[str, str] | None = None,
-) -> str:
-    """A table of parameters and of combinations that are known: estimate, ±, 95 % interval, or `why` not."""
-    n, more = len(names), len(combinations)
-    nothing = np.full(n, np.nan)
-    std = nothing if found.std is None else found.std
-    low, high = (nothing, nothing) if found.ci95 is None else found.ci95.T
-    known = np.array([np.nan if c.std is None else c.std for c in combinations])
-    values = np.append(found.values, [c.value for c in combinations])
-    errors = np.append(std, known)
-    digits = [_digits(value, error) for value, error in zip(values, errors, strict=True)]
-    words = [*names, *(c.words for c in combinations)]
-    unknown = {name: UNKNOWN for name, value in zip(names, found.values, strict=True) if np.isnan(value)}
-    said = unknown | dict(why or {})
-
-    def written(numbers: FloatArray) -> list[str]:
-        return ["" if np.isnan(x) else f"{x:.{d}g}" for x, d in zip(numbers, digits, strict=True)]
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(values == 0, np.nan, errors / np.abs(values))
-    columns = [
-        Column("parameter", words, str),
-        Column("estimate", written(values), str),
-        Column("std", errors, error_figures, "±"),
-        Column("%", share, percent),
-        Column("low", written(np.append(low, np.full(more, np.nan))), str, "95 %: from"),
-        Column("high", written(np.append(high, np.full(more, np.nan))), str, "to"),
-        Column("why", [said.get(word, "") for word in words], str, ""),
-    ]
-    shown = [column for column in columns if any(value == value and value != "" for value in column.values)]
-    return text(shown, width=COLUMNS)
+def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str]) -> str:
+    """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
+    lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
+    for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, found)), strict=True):
+        digits = _digits(value, std)
+        numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
+        share = percent(std / abs(value)) if value else ""
+        reason = why.get(name, "not determined by these data" if np.isnan(value) else "")
+        cells = [name, numbers[0], error_figures(std), share, *numbers[1:], reason]
+        lines.append(["" if cell == "nan" else cell for cell in cells])
+    told = [column for column in zip(*lines, strict=True) if any(column[1:])]
+    return table([list(line) for line in zip(*told, strict=True)], width=COLUMNS)
 
 
 def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
@@ -271,9 +235,9 @@ class Estimate(Answered, Uncertain):
             notes.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
         if self.covariance is None and self.dof <= 0:
             notes.append("no intervals: no errors are stated and there are no more equations than parameters")
-        why = dict.fromkeys(at_bounds, "at its bound")
-        table = parameter_text(self.names, self, self.combinations, why)
-        return Answer(sentence(self.describe_rank()), table, notes=tuple(notes))
+        found = [parameter_text(self.names, self, dict.fromkeys(at_bounds, "at its bound"))]
+        found += [f"  {c.line()}" for c in self.combinations]
+        return Answer(sentence(self.describe_rank()), "\n".join(found), notes=tuple(notes))
 
 
 def coverage_factor(dof: float | None) -> float | None:

@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, text
+from rotorid.base.result import Column, frame
 from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
 from rotorid.timedomain.integration.simulate import Trajectory
@@ -128,57 +128,25 @@ class Fit(Answered, Path):
     @property
     def answer(self) -> Answer:
         """Whether there is an answer, the values with their intervals, and what the model leaves."""
-        own = self.estimate.told(self.at_bounds)
-        notes = own.notes if self.reliable or self.estimate.dof <= 0 else ()
-        how = f"{self.method}, integrator {self.integrator}"
-        end = f"{how}: {self.message}; residual rms {self.residual_rms:.4g}"
-        said = "No estimates: the values are where the search stopped."
-        if self.converged:  # nothing is said of a place that is no minimum
-            said = own.judgement if self.reliable else f"NO intervals, see why. {own.judgement}"
-        minima = [
-            f"minimum {i + 1} ({counted(m.starts, 'start')}): "
-            + ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
-            + f"; cost {m.cost:.4g}"
-            for i, m in enumerate(self.minima if len(self.minima) > 1 else ())
-        ]
-        judged = self.estimate.describe_rank()
-        warnings = tuple(w for w in self.warnings if w != judged and not w.startswith(self.message))
-        columns = self._outputs() if self.simulations else ()
-        outputs = text(columns, left=1 + (len(self.records) > 1)) if columns else ""
-        if self.reliable and columns:
-            shares = next(column.values for column in columns if column.name == "%")
-            said += f"\nThe model leaves at most {percent(max(shares))} % (rms) of an output."
-        tables = [table for table in (outputs, "\n".join(minima)) if table]
-        more = "what the model leaves of each output" + ("; all minima" if minima else "")
-        return Answer(said, f"{own.found}\n\n  {end}", warnings, notes, tuple(tables), more)
-
-    def _outputs(self) -> tuple[Column, ...]:
-        """Of each record and output: rms of what was measured, of what the model leaves, and the error used."""
-        names = self.model.outputs
-        pairs = [
-            (record, name, record.outputs[name], run.y[:, j])
-            for record, run in zip(self.records, self.simulations, strict=True)
-            for j, name in enumerate(names)
-            if name in record.outputs
-        ]
-        whole = np.array([_rms(measured) for _, _, measured, _ in pairs])
-        left = np.array([_rms(measured - y) for _, _, measured, y in pairs])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(whole > 0, left / whole, 0.0)
-        records = [Column("record", [record.name for record, *_ in pairs], str)]
-        columns = [
-            *(records if len(self.records) > 1 else ()),
-            Column("output", [name for _, name, *_ in pairs], str),
-            Column("rms", whole, "{:.4g}".format),
-            Column("left", left, "{:.4g}".format, "left by the model"),
-            Column("%", share, percent),
-        ]
+        own, judged = self.estimate.told(self.at_bounds), self.estimate.describe_rank()
+        said = own.judgement if self.reliable else f"NO intervals, see why. {own.judgement}"
+        if not self.converged:  # nothing is said of a place that is no minimum
+            said = "No estimates: the values are where the search stopped."
+        found = [own.found, f"\n  {self.method}, integrator {self.integrator}: {self.message}"]
+        found.append(f"  residual rms {self.residual_rms:.4g}")
+        data = np.concatenate([values for record in self.records for values in record.outputs.values()])
+        if self.reliable and np.nan_to_num(data).any():
+            left = self.residual_rms / float(np.sqrt(np.nanmean(data**2)))
+            said += f"\nThe model leaves {percent(left)} % of the record (rms)."
         if self.errors:
-            known = [self.errors.get(name) for _, name, *_ in pairs]
-            columns.append(Column("errors", known, "{:.3g}".format, "estimated errors, the weights"))
-        return tuple(columns)
-
-
-def _rms(values: FloatArray) -> float:
-    """Of the samples that there are."""
-    return float(np.sqrt(np.nanmean(np.square(values)))) if np.isfinite(values).any() else 0.0
+            sizes = ", ".join(f"{name} {size:.3g}" for name, size in self.errors.items())
+            found.append(f"  estimated standard deviations, used as weights: {sizes}")
+        for i, m in enumerate(self.minima if len(self.minima) > 1 else ()):
+            values = ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
+            found.append(f"  minimum {i + 1} ({counted(m.starts, 'start')}): {values}; cost {m.cost:.4g}")
+        return Answer(
+            said,
+            "\n".join(found),
+            tuple(w for w in self.warnings if w != judged and not w.startswith(self.message)),
+            own.notes if self.reliable or self.estimate.dof <= 0 else (),
+        )

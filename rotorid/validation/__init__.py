@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotorid.base.answer import Answer
-from rotorid.base.result import Column, text
 from rotorid.base.text import listing, sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
 from rotorid.workflows.result_provenance import Outcome, provenance
@@ -120,11 +119,6 @@ class Validation(Outcome):
             for group in self.groups
             if group.failure
         ]
-        columns = [Column("group", [group.title for group in self.groups], str, "")]
-        columns += [Column("numbers", [len(group.rows) for group in self.groups], str)]
-        for title, status in (("agree", AGREES), ("errata", ERRATUM), ("differ", DIFFERS)):
-            columns.append(Column(title, [_counts(group.rows)[status] for group in self.groups], str))
-        found = [*failed, *_chapter("Differ", differ, _difference)]
         errata = [r for r in self.rows if r.status == ERRATUM]
         wide = [r for r in self.rows if r.reason]
         chapters = (
@@ -134,7 +128,7 @@ class Validation(Outcome):
         )
         return Answer(
             f"{said if self.holds else 'NOT every printed number is met.'}\n{self.last_line}.",
-            "\n".join([*found, *([""] if found else []), text(columns, width=WIDTH)]),
+            "\n".join([*failed, *_chapter("Differ", differ, _difference)]),
             tables=tuple("\n".join(lines) for lines in chapters if lines),
             more="every source, errata, wide tolerances",
         )

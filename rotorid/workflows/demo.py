@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import shlex
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,12 +129,9 @@ class Demo(Outcome):
 
 def _typed(command: list[str]) -> str:
     """The command after `$`, in lines that a shell joins again."""
-    lines = ["$"]
-    for word in map(shlex.quote, command):
-        if len(lines[-1]) + len(word) > COLUMNS - 3:
-            lines.append("   ")
-        lines[-1] += f" {word}"
-    return " \\\n".join(lines)
+    words = (shlex.quote(word).replace(" ", "\0") for word in command)  # a quoted word is not broken
+    lines = textwrap.wrap(" ".join(words), COLUMNS - 6, break_long_words=False, break_on_hyphens=False)
+    return "$ " + " \\\n    ".join(lines).replace("\0", " ")
 
 
 def samples() -> Samples:

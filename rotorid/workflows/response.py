@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, text
 from rotorid.base.rpm import RPM, phase_deg, rpm_text
-from rotorid.base.text import capital, counted, figures, listing
+from rotorid.base.text import counted, figures, listing
 from rotorid.workflows.input_checks import file_of, rotor_source
 from rotorid.workflows.option_values import (
     Band,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
-_APART = 1.05  # ratio of speeds from which peaks of different sensors are those of different critical speeds
+_APART = 1.05  # ratio of speeds from which peaks belong to different critical speeds
 
 
 @dataclass(frozen=True)
@@ -112,51 +113,49 @@ class RotorResponse(Outcome):
 
     @property
     def answer(self) -> Answer:
-        """What is largest, the peaks with their margins, and the readings and forces behind them."""
-        _, largest, *_ = self.finer.summary().splitlines()
+        """The margins, what is largest, a peak of each critical speed; behind it readings and forces."""
         found = sorted(
             ((name, peak) for name, own in zip(self.labels, self.peaks, strict=False) for peak in own.peaks),
             key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude),
         )
-        notes = [f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in found if peak.note]
-        chief = _one_of_each(found)
-        shown = [_peak_table(chief)] if chief else []
+        near = {round(math.log(peak.speed, _APART)): (name, peak) for name, peak in reversed(found)}
+        chief = sorted(near.values(), key=lambda one: one[1].speed)
         behind = [self.finer.bearing_forces().summary()] if self.response.rotor.supports else []
-        behind += [_peak_table(found)] if len(chief) < len(found) else []
         return Answer(
-            f"{self._judgement(chief)}\n{capital(largest)}.",
-            "\n\n".join([*shown, self._readings()]),
+            f"{self._judgement([peak for _, peak in chief])}\n{self.finer.highest}",
+            "\n\n".join([*([_peak_table(chief)] if chief else []), self._readings()]),
             self.response.warnings,
-            tuple(notes),
-            tuple(behind),
-            "forces on the supports" + ("; the peaks of every reading" if behind[1:] else ""),
+            tuple(
+                f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in found if peak.note
+            ),
+            (*behind, _peak_table(found)) if found else tuple(behind),
+            "forces on the supports; the peaks of every reading",
         )
 
-    def _judgement(self, chief: Sequence[tuple[str, Peak]]) -> str:
+    def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, and whether the margins are as required."""
         from fem.response_result import speed_range
 
         unstable = listing([window.where() for window in self.response.windows], "and")
         said = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
-        if self.operating is None or not chief:
+        known = [peak for peak in chief if peak.enough is not None]
+        if self.operating is None or not known:
             asked = f"at {speed_range(self.response.speeds)}, {counted(len(self.sensors), 'reading')}"
             return f"{said}{counted(len(chief), 'peak') if chief else 'No peak'} {asked}."
         low, high = self.operating
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
-        near = [rpm_text(peak.speed) for _, peak in chief if peak.enough is False]
+        near = [rpm_text(peak.speed) for peak in known if not peak.enough]
         if near:
             return f"{said}NOT far enough {beside}: critical speed {listing(near, 'and')}."
-        unknown = sum(peak.enough is None for _, peak in chief)
-        rest = f"; of {unknown} this is not known" if unknown else ""
-        return f"{said}{counted(len(chief) - unknown, 'critical speed')} far enough {beside}{rest}."
+        return f"{said}{counted(len(known), 'critical speed')} far enough {beside}."
 
     def _readings(self) -> str:
         """The largest reading of each sensor."""
-        known = self._largest_readings()
+        names, sizes, speeds = zip(*self._largest_readings(), strict=True)
         columns = (
-            Column("sensor", [name for name, _, _ in known], str),
-            Column("µm", [size and 1e6 * size for _, size, _ in known], figures, "largest reading, µm"),
-            Column("rpm", [speed and speed * RPM for _, _, speed in known], "{:.1f}".format, "at rpm"),
+            Column("sensor", names, str),
+            Column("µm", [size and 1e6 * size for size in sizes], figures, "largest reading, µm"),
+            Column("rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, "at rpm"),
         )
         return text(columns)
 
@@ -255,24 +254,11 @@ class RotorResponse(Outcome):
         }
 
 
-def _one_of_each(found: Sequence[tuple[str, Peak]]) -> list[tuple[str, Peak]]:
-    """Of the peaks of each critical speed the first, by speed."""
-    chief: list[tuple[str, Peak]] = []
-    last = 0.0
-    for one in sorted(found, key=lambda one: one[1].speed):
-        if one[1].speed > _APART * last:
-            chief.append(one)
-        elif found.index(one) < found.index(chief[-1]):
-            chief[-1] = one
-        last = one[1].speed
-    return chief
-
-
 def _peak_table(found: Sequence[tuple[str, Peak]]) -> str:
     from fem.api684_peaks import peak_columns
 
-    names = Column("sensor", [name for name, _ in found], str, "peak at")
-    return text((names, *peak_columns([peak for _, peak in found], "µm", 1e6)), width=COLUMNS)
+    names, peaks = zip(*found, strict=True)
+    return text((Column("peak at", names, str), *peak_columns(peaks, "µm", 1e6)), width=COLUMNS)
 
 
 @workflow

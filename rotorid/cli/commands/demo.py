@@ -16,6 +16,7 @@ from rotorid.workflows.demo import DemoOptions, samples
 from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
 
+
 @command(to=("table", "json"))
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
@@ -52,23 +53,12 @@ def demo(
         with contextlib.redirect_stdout(io.StringIO()) as text:
             _run(words)
         lines = heading.count("\n") + 1
-        said = _beginning(text.getvalue(), room // left - lines)
+        said = [line for line in text.getvalue().splitlines() if line][: max(room // left - lines, 2)]
         typer.echo("\n".join(said))
         room, left = room - lines - len(said), left - 1
     typer.echo(made.answer.whole())
     if not to.table:
         typer.echo("All that a command says: type it; that all of them say: add --table.")
-
-
-def _beginning(text: str, room: int) -> list[str]:
-    """The first paragraphs that fit, at least the beginning of the first."""
-    first, *others = text.rstrip("\n").split("\n\n")
-    lines = first.splitlines()[: max(room, 2)]
-    for other in others:
-        if len(lines) + other.count("\n") + 1 > room:
-            break
-        lines += other.splitlines()
-    return lines
 
 
 def _run(command: list[str]) -> None:

@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike
 import fem
 from fem.matrices.lateral_planes import Quadratic, both_planes, project
 from fem.state_space import StateSpace, state_space
-from rotorid.base.result import Column, text
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
@@ -231,13 +230,7 @@ class SmallRotor(Answered):
         if self.modal_damping:
             ratios = ", ".join(f"{100 * ratio:.3g} %" for ratio in self.modal_damping)
             said += f"; damping ratios of the first modes of each plane: {ratios}"
-        columns = (
-            Column("node", self.nodes, str),
-            Column("at, m", self.rotor.positions[np.array(self.nodes) - 1], "{:.3f}".format),
-            Column("mass, kg", self.masses, "{:.3f}".format),
-        )
-        table = text(columns)
-        return Answer(f"{said}.", warnings=self.warnings, tables=(table,), more="masses of the small model")
+        return Answer(f"{said}.", warnings=self.warnings)
 
     def _at(self, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
         D, K = self.quadratic.at(speeds)

@@ -55,22 +55,18 @@ class Shift(Answered):
     @property
     def answer(self) -> Answer:
         """What each mass and frequency changes by, predicted and recomputed."""
-        n = len(self.masses)
         masses = ", ".join(f"{change:+.4g}" for change in self.exact_masses)
         speeds = ", ".join(f"{change * RPM:+.4g}" for change in self.exact_frequencies)
-        form = "{:+.4g}".format
+        said = f"The changed inputs move the masses by {masses} kg and the frequencies by {speeds} rpm."
+        n = len(self.masses)
         columns = (
             Column("change", labels(n), str),
-            Column("predicted", (*self.masses, *self.frequencies), form),
-            Column("exact", (*self.exact_masses, *self.exact_frequencies), form),
+            Column("predicted", (*self.masses, *self.frequencies), "{:+.4g}".format),
+            Column("exact", (*self.exact_masses, *self.exact_frequencies), "{:+.4g}".format),
             Column("unit", units(n), str, ""),
         )
-        return Answer(
-            f"The changed inputs move the masses by {masses} kg and the frequencies by {speeds} rpm.",
-            warnings=self.warnings,
-            tables=(text(columns),),
-            more="these changes predicted and exact",
-        )
+        more = "these changes by first order"
+        return Answer(said, warnings=self.warnings, tables=(text(columns),), more=more)
 
 
 def labels(n: int) -> list[str]:

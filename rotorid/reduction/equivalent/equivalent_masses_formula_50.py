@@ -12,7 +12,6 @@ depend on how large the rows are: how each shape is scaled and how each row is w
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 

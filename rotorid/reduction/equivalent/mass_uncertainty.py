@@ -17,6 +17,8 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM
+from rotorid.base.text import error_figures
 from rotorid.reduction.equivalent.changed_inputs import Shift, labels, units
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
 from rotorid.reduction.equivalent.mass_sensitivity import (
@@ -178,61 +180,34 @@ class MassUncertainty(Answered):
         )
 
     @property
-    def likely(self) -> FloatArray:
-        """Standard deviations to use, of masses, kg, and frequencies, rad/s, shape (2, n); NaN where unknown."""
-        known = (self.masses_std, self.frequencies_std) if self.drawn is None else self.drawn
-        return np.array(known)
-
-    @property
     def answer(self) -> Answer:
-        """What the errors do to masses and frequencies, and the inputs that make up most of each variance."""
-        n, warnings = len(self.masses), self.warnings
-        values, std = np.stack((self.masses, self.frequencies)), self.likely
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = 100 * std / np.abs(values)
-        mass, speed = (_span(row) for row in shares)
-        drawn = "" if self.drawn is None else " (drawn inputs)"
-        if lost := [label for label, size in zip(labels(n), std.ravel(), strict=True) if np.isnan(size)]:
-            warnings = (
-                "some of the drawn inputs give masses that are not positive, and then no "
-                f"{lost[0]}: these errors do not determine {', '.join(lost)}",
-                *warnings,
+        """What the errors do to masses and frequencies; behind it the inputs that make up most of each."""
+        n, first = len(self.masses), np.array((self.masses_std, self.frequencies_std))
+        masses, speeds = first if self.drawn is None else self.drawn
+        known = (", ".join(map(error_figures, row)) for row in (masses, speeds * RPM))
+        said = "By the stated errors the masses are ± {} kg, the frequencies ± {} rpm".format(*known)
+        if lost := [
+            label for label, size in zip(labels(n), (*masses, *speeds), strict=True) if np.isnan(size)
+        ]:
+            said += (
+                ". Some of the drawn inputs give masses that are not positive, and then no "
+                f"{lost[0]}: these errors do not determine {', '.join(lost)}"
             )
-        return Answer(
-            f"The stated errors move the masses by {mass} and the frequencies by {speed}{drawn}.",
-            warnings=warnings,
-            tables=(text(self._shares()),),
-            more="which inputs make up the errors",
-        )
-
-    def _shares(self) -> tuple[Column, ...]:
-        """Each quantity in first order, and the largest parts of its variance."""
-        n = len(self.masses)
-        values = np.concatenate((self.masses, self.frequencies))
-        std = np.concatenate((self.masses_std, self.frequencies_std))
         parts = {name: part.ravel() for name, part in self.contributions.items()}
-        said = []
-        for q, size in enumerate(std):
-            top = sorted(parts, key=lambda name: -parts[name][q])[:3]  # noqa: B023 - used at once
-            shown = [(name, 100 * parts[name][q] / size**2) for name in top] if size > 0 else []
-            known = ", ".join(f"{name} {share:.0f} %" for name, share in shown if share >= 1)
-            said.append(known if np.isfinite(values[q]) else "does not vibrate")
-        return (
+        shares = []
+        for q, std in enumerate(first.ravel()):
+            top = sorted(parts, key=lambda name: -parts[name][q])[:3]
+            known_parts = [(name, 100 * parts[name][q] / std**2) for name in top] if std > 0 else []
+            shares.append(", ".join(f"{name} {share:.0f} %" for name, share in known_parts if share >= 1))
+        columns = (
             Column("quantity", labels(n), str, ""),
-            Column("value", values, "{:.6g}".format),
-            Column("std", std, "{:.2g}".format, "±"),
+            Column("value", (*self.masses, *self.frequencies), "{:.6g}".format),
+            Column("std", first.ravel(), error_figures, "±"),
             Column("unit", units(n), str, ""),
-            Column("shares", said, str, "of the variance"),
+            Column("shares", shares, str, "of the variance"),
         )
-
-
-def _span(shares: FloatArray) -> str:
-    """The least and the largest that is known, in percent."""
-    known = [f"{size:.2g}" for size in shares[np.isfinite(shares)]]
-    if not known:
-        return "an unknown amount"
-    low, high = min(known, key=float), max(known, key=float)
-    return f"{low} %" if low == high else f"{low} to {high} %"
+        more = "which inputs make up the errors"
+        return Answer(f"{said}.", warnings=self.warnings, tables=(text(columns),), more=more)
 
 
 def mass_uncertainty(

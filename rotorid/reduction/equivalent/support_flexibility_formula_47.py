@@ -70,18 +70,14 @@ class Separated(Answered):
     def answer(self) -> Answer:
         """Share of the supports in a force at each mass, and its own flexibility δ."""
         a, b = self.supports
-        shares = [100 * self.fractions[:, s] for s in (0, 1)]
         columns = (
             Column("node", self.nodes, str, "mass at node"),
-            Column("a", shares[0], "{:.4g}".format, f"% on node {a}"),
-            Column("b", shares[1], "{:.4g}".format, f"% on node {b}"),
+            Column("a", 100 * self.fractions[:, 0], "{:.4g}".format, f"% on node {a}"),
+            Column("b", 100 * self.fractions[:, 1], "{:.4g}".format, f"% on node {b}"),
             Column("delta", np.diag(self.delta), "{:.6g}".format, "shaft on rigid supports, m/N"),
         )
-        return Answer(
-            f"The shaft apart from its supports at nodes {a} and {b}, {self.span:.6g} m apart.",
-            tables=(text(columns),),
-            more="shares of the supports, and the shaft's own flexibility",
-        )
+        said = f"The shaft apart from its supports at nodes {a} and {b}, {self.span:.6g} m apart."
+        return Answer(said, tables=(text(columns),), more="shares of the supports")
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
