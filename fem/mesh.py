@@ -63,7 +63,7 @@ class MeshCheck(Answered):
         return (
             Column("extrapolated_rad_s", self.extrapolated),
             Column("relative_error", self.errors, "{:.1e}".format, "error of the mesh"),
-            Column("rate", self.rates, "{:.2f}".format),
+            Column("rate", self.rates, "{:.2f}".format, "rate (none: rounding)"),
         )
 
     @property

@@ -29,7 +29,7 @@ def figures(value: float, digits: int = 4) -> str:
 
 def error_figures(error: float) -> str:
     """A standard deviation, two digits."""
-    return figures(error, 2)
+    return figures(error, 2) if error == error else "unknown"
 
 
 def capital(text: str) -> str:

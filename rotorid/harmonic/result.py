@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 HEADINGS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
-SEVERAL = "has several values, see the solutions"
+SEVERAL = "several values: see the solutions"
 
 
 @dataclass(frozen=True)

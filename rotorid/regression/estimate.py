@@ -90,8 +90,9 @@ def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str
         digits = _digits(value, std)
         numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
         share = percent(std / abs(value)) if value else ""
-        reason = why.get(name, "not determined by these data" if np.isnan(value) else "")
-        cells = [name, numbers[0], error_figures(std), share, *numbers[1:], reason]
+        reason = why.get(name, "not determined" if np.isnan(value) else "")
+        error = "" if np.isnan(std) else error_figures(std)
+        cells = [name, numbers[0], error, share, *numbers[1:], reason]
         lines.append(["" if cell == "nan" else cell for cell in cells])
     told = [column for column in zip(*lines, strict=True) if any(column[1:])]
     return table([list(line) for line in zip(*told, strict=True)], width=COLUMNS)

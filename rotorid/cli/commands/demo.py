@@ -53,12 +53,23 @@ def demo(
         with contextlib.redirect_stdout(io.StringIO()) as text:
             _run(words)
         lines = heading.count("\n") + 1
-        said = [line for line in text.getvalue().splitlines() if line][: max(room // left - lines, 2)]
+        said = _beginning(text.getvalue(), max(room // left - lines, 2))
         typer.echo("\n".join(said))
         room, left = room - lines - len(said), left - 1
     typer.echo(made.answer.whole())
     if not to.table:
         typer.echo("All that a command says: type it; that all of them say: add --table.")
+
+
+def _beginning(text: str, room: int) -> list[str]:
+    """As many whole paragraphs as there is room for, of the first as many lines."""
+    said: list[str] = []
+    for part in text.split("\n\n"):
+        lines = part.splitlines()
+        if said and len(said) + len(lines) > room:
+            break
+        said += lines[:room]
+    return said
 
 
 def _run(command: list[str]) -> None:
