@@ -133,7 +133,7 @@ class Campbell(Answered):
         speed, rpm, mode, decrement, whirl, mark = self._criticals()
         heavy = int((self.critical_log_decrements > HEAVY).sum())
         light = self.critical_speeds.size - heavy
-        count = counted(light, "damped critical speed")
+        count = counted(light, "damped critical speed") if light else "no damped critical speed"
         if heavy:
             count += f", {heavy} more without a peak"
         return Answer(
