@@ -11,7 +11,7 @@ separation margin, in percent of the nearest operating speed, must be at least
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -97,39 +97,36 @@ class Peaks:
         return frame(self._columns())
 
     def _columns(self) -> tuple[Column, ...]:
-        peaks = self.peaks
-        return (
-            Column("speed_rad_s", [p.speed for p in peaks]),
-            Column("speed_rpm", [p.speed * RPM for p in peaks]),
-            Column("amplitude", [None if p.undamped else p.amplitude for p in peaks]),
-            Column("half_power_rad_s", [(p.below, p.above) for p in peaks]),
-            Column("amplification_factor", [p.amplification for p in peaks]),
-            Column("separation_margin_percent", [p.margin for p in peaks]),
-            Column("required_margin_percent", [p.required for p in peaks]),
-            Column("enough", [p.enough for p in peaks]),
-            Column("note", [p.note for p in peaks]),
-        )
+        rpm, speed, *rest = peak_columns(self.peaks)
+        return (speed, rpm, *rest)
 
     def summary(self, unit: str = "", scale: float = 1.0) -> str:
         """The peaks as text, amplitudes times `scale` with the name of their unit."""
         if not self.peaks:
             return "no peak in this range of speeds"
-        named = f"amplitude, {unit}" if unit else "amplitude"
-        lines = [f"{'rad/s':>12} {'rpm':>13} {named:>14} {'AF':>9} {'margin, %':>11} {'required, %':>12}"]
-        for p in self.peaks:
-            values = [
-                "-" if v is None else f"{v:.{d}f}"
-                for v, d in ((p.amplification, 2), (p.margin, 1), (p.required, 1))
-            ]
-            size = "-" if p.undamped else f"{scale * p.amplitude:.5g}"
-            verdict = {True: "  enough", False: "  NOT ENOUGH", None: ""}[p.enough]
-            lines.append(
-                f"{p.speed:12.4f} {p.speed * RPM:13.2f} {size:>14} {values[0]:>9} {values[1]:>11} "
-                f"{values[2]:>12}{verdict}"
-            )
-            if p.note:
-                lines.append(f"    {p.note}")
-        return "\n".join(lines)
+        notes = [f"    {p.speed * RPM:.2f} rpm: {p.note}" for p in self.peaks if p.note]
+        return "\n".join([text(peak_columns(self.peaks, unit, scale)), *notes])
+
+
+def peak_columns(peaks: Sequence[Peak], unit: str = "", scale: float = 1.0) -> tuple[Column, ...]:
+    """The table of peaks, amplitudes times `scale` with the name of their unit."""
+    one = "{:.1f}".format
+    sizes = [None if p.undamped else scale * p.amplitude for p in peaks]
+    return (
+        Column("speed_rpm", [p.speed * RPM for p in peaks], "{:.2f}".format, "rpm"),
+        Column("speed_rad_s", [p.speed for p in peaks], "{:.4f}".format, "rad/s"),
+        Column("amplitude", sizes, "{:.4g}".format, f"amplitude, {unit}" if unit else None),
+        Column("half_power_rad_s", [(p.below, p.above) for p in peaks]),
+        Column("amplification_factor", [p.amplification for p in peaks], "{:.2f}".format, "AF"),
+        Column("separation_margin_percent", [p.margin for p in peaks], one, "margin, %"),
+        Column("required_margin_percent", [p.required for p in peaks], one, "required, %"),
+        Column("enough", [p.enough for p in peaks], _verdict, ""),
+        Column("note", [p.note for p in peaks]),
+    )
+
+
+def _verdict(enough: bool) -> str:
+    return "enough" if enough else "NOT ENOUGH"
 
 
 def find_peaks(

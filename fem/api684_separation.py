@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from rotorid.base.answer import Answer
 from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import listing, table
 
 
 def separation(criticals: Iterable[float], operating: tuple[float, float]) -> dict[str, Any]:
@@ -24,13 +26,17 @@ def separation(criticals: Iterable[float], operating: tuple[float, float]) -> di
     return {"range_rad_s": [low, high], "critical_speeds": rows}
 
 
-def separation_text(operating: Mapping[str, Any]) -> str:
+def separation_answer(operating: Mapping[str, Any]) -> Answer:
     """The result of `separation` for an engineer."""
     low, high = operating["range_rad_s"]
-    lines = [f"operating range {low:.6g} to {high:.6g} rad/s ({low * RPM:.6g} to {rpm_text(high)})"]
-    for row in operating["critical_speeds"]:
-        where = "INSIDE" if row["inside"] else f"{row['separation_percent']:.1f} % away"
-        lines.append(f"{row['speed_rad_s']:14.4f} rad/s {row['speed_rad_s'] * RPM:14.2f} rpm   {where}")
-    if not operating["critical_speeds"]:
-        lines.append("no critical speed was found")
-    return "\n".join(lines)
+    within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
+    rows = sorted(operating["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+    inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
+    if inside:
+        return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+    if not rows:
+        return Answer(f"No critical speed was found beside {within}.")
+    near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
+    away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
+    more = "how far each is from the operating range"
+    return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)

@@ -19,12 +19,13 @@ from fem.solvers.reduced_whirl import Whirl
 from fem.solvers.stable_speeds import GROWTH
 from fem.whirl import available_modes, checked_number, in_both_planes
 from fem.windows import Window, within
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IndexArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
-from rotorid.base.rpm import RPM, rpm_text
-from rotorid.base.text import counted
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,7 +36,7 @@ _NAMED = 5  # critical speeds that a warning names
 
 
 @dataclass(frozen=True, eq=False)
-class Campbell:
+class Campbell(Answered):
     """Whirl over speed; each column is one mode, followed through crossings.
 
     Attributes
@@ -124,47 +125,46 @@ class Campbell:
             )
         )
 
-    def summary(self) -> str:
-        """Frequencies at both ends of the range and the damped critical speeds as text."""
-        first, last = self.speeds[0], self.speeds[-1]
-        lines = [
-            f"Whirl from {first:.6g} to {last:.6g} rad/s ({first * RPM:.6g} to {rpm_text(last)})",
-            "mode    at first, rad/s   log dec    at last, rad/s   log dec",
-        ]
-        for k in range(self.frequencies.shape[1]):
-            parts = [f"{k + 1:4d}"]
-            for s in (0, -1):
-                omega, delta = self.frequencies[s, k], self.log_decrements[s, k]
-                text = f"{omega:16.4f} {_LETTERS[float(self.direction[s, k])]}{_rounded(delta):10.4f}"
-                parts.append(text if np.isfinite(omega) else f"{'none':>18}{'':10}")
-            lines.append("".join(parts))
-        heavy = self.critical_log_decrements > HEAVY
-        for title, which in (
-            ("damped critical speeds", ~heavy),
-            (f"heavily damped, without a peak (log decrement above {HEAVY})", heavy),
-        ):
-            if which.any():
-                lines += [title, "mode     rad/s         rpm   log dec  direction"]
-            for row, here in zip(rows(self._criticals()), which, strict=True):
-                if here:
-                    lines.append(
-                        f"{row['mode']:4d}{row['speed_rad_s']:12.4f}{row['speed_rpm']:12.2f}"
-                        f"{_rounded(row['log_decrement']):10.4f}  {row['direction']}"
-                    )
-        if not self.critical_speeds.size:
-            lines.append("no damped critical speed in this range")
-        if self.cut:
-            lines.append(self.cut)
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+    @property
+    def answer(self) -> Answer:
+        """Whether it is stable, and the damped critical speeds that show a peak."""
+        unstable = listing([window.where() for window in self.windows], "and")
+        said = f"UNSTABLE {unstable}: a motion grows there." if unstable else "Stable: no motion grows."
+        speed, rpm, mode, decrement, whirl, mark = self._criticals()
+        heavy = int((self.critical_log_decrements > HEAVY).sum())
+        light = self.critical_speeds.size - heavy
+        count = counted(light, "damped critical speed") if light else "no damped critical speed"
+        if heavy:
+            count += f", {heavy} more without a peak"
+        return Answer(
+            f"{said}\nFrom {range_text(self.speeds[0], self.speeds[-1])}: {count}.",
+            text((mode, whirl, rpm, speed, decrement, mark), left=2) if self.critical_speeds.size else "",
+            self.warnings,
+            (self.cut,) if self.cut else (),
+            (self._at(0), self._at(-1)),
+            "whirl at both ends of the range",
+        )
+
+    def _at(self, s: int) -> str:
+        """Whirl at one of the speeds."""
+        columns = (
+            Column("mode", range(1, self.frequencies.shape[1] + 1), str),
+            Column("whirl", [word or "none" for word in self._ways()[s]], str),
+            Column("rpm", self.frequencies[s] * RPM, "{:.2f}".format),
+            Column("rad/s", self.frequencies[s], "{:.4f}".format),
+            Column("log dec", self.log_decrements[s], _rounded),
+        )
+        return f"Whirl at {rpm_text(self.speeds[s])}:\n{text(columns, left=2)}"
 
     def _criticals(self) -> tuple[Column, ...]:
+        ways = [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]
         return (
-            Column("speed_rad_s", self.critical_speeds),
-            Column("speed_rpm", self.critical_speeds * RPM),
-            Column("mode", self.critical_modes),
-            Column("log_decrement", self.critical_log_decrements),
-            Column("direction", [DIRECTION_NAMES[way] for way in self.critical_direction.tolist()]),
-            Column("heavily_damped", self.critical_log_decrements > HEAVY),
+            Column("speed_rad_s", self.critical_speeds, "{:.4f}".format, "rad/s"),
+            Column("speed_rpm", self.critical_speeds * RPM, "{:.2f}".format, "rpm"),
+            Column("mode", self.critical_modes, str),
+            Column("log_decrement", self.critical_log_decrements, _rounded, "log dec"),
+            Column("direction", ways, str, "whirl"),
+            Column("heavily_damped", self.critical_log_decrements > HEAVY, _no_peak, ""),
         )
 
     def _ways(self) -> AnyArray:
@@ -173,9 +173,6 @@ class Campbell:
         for number, word in DIRECTION_NAMES.items():
             words[np.isfinite(self.frequencies) & (self.direction == number)] = word
         return words
-
-
-_LETTERS = {1.0: "F", -1.0: "B", 0.0: "-"}
 
 
 def campbell(rotor: Rotor, speeds: ArrayLike, n: int | None = None) -> Campbell:
@@ -310,14 +307,14 @@ def _warnings(
     values, speeds = paths.values[asked][:, columns], whirl.speeds[asked]
     gone = ~np.isfinite(values)
     above = went_above(whirl, paths, columns)[asked]
-    for text, cells in (
+    for said, cells in (
         ("does not oscillate (overdamped)", gone & ~above),
         ("was not found (overdamped, or above the frequencies computed)", above),
     ):
         for k in np.flatnonzero(cells.any(axis=0)):
             where = speeds[cells[:, k]]
             texts.append(
-                f"mode {k + 1} {text} at {where.size} of {counted(speeds.size, 'speed')}, "
+                f"mode {k + 1} {said} at {where.size} of {counted(speeds.size, 'speed')}, "
                 f"from {where[0]:.6g} to {where[-1]:.6g} rad/s"
             )
     if columns.size < n:
@@ -335,6 +332,10 @@ def _warnings(
     return tuple(texts)
 
 
-def _rounded(delta: float) -> float:
-    """To the four digits that are printed, without a negative zero."""
-    return round(float(delta), 4) + 0.0
+def _rounded(delta: float) -> str:
+    """Four digits, without a negative zero."""
+    return f"{round(float(delta), 4) + 0.0:.4f}"
+
+
+def _no_peak(heavy: bool) -> str:
+    return f"no peak: above {HEAVY}" if heavy else ""

@@ -9,20 +9,23 @@ import numpy as np
 
 from fem.critical import critical_speeds
 from fem.model.rotor import PER_ELEMENT, Rotor
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
-from rotorid.base.text import counted
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM
+from rotorid.base.text import counted, percent, sentence
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RATE = 4  # frequencies converge with this power of the element length, with and without shear
+FINE = 1e-3  # relative error of a critical speed that needs no finer mesh
 
 
 @dataclass(frozen=True, eq=False)
-class MeshCheck:
+class MeshCheck(Answered):
     """Estimated discretisation errors of the critical speeds.
 
     Attributes
@@ -59,21 +62,25 @@ class MeshCheck:
     def _estimates(self) -> tuple[Column, ...]:
         return (
             Column("extrapolated_rad_s", self.extrapolated),
-            Column("relative_error", self.errors),
-            Column("rate", self.rates),
+            Column("relative_error", self.errors, "{:.1e}".format, "error of the mesh"),
+            Column("rate", self.rates, "{:.2f}".format, "rate (none: rounding)"),
         )
 
-    def summary(self) -> str:
-        """A table, and the advice that follows."""
-        lines = [f"mode     rad/s   error of the mesh ({counted(self.elements, 'element')})   rate"]
-        for k in range(self.frequencies.size):
-            rate = "rounding" if np.isnan(self.rates[k]) else f"{self.rates[k]:.2f}"
-            lines.append(f"{k + 1:4d}{self.frequencies[k]:12.4f}{self.errors[k]:15.1e}{rate:>26}")
-        worst = float(np.abs(self.errors).max())
-        if worst > 1e-3:
-            times = int(np.ceil((worst / 1e-3) ** (1 / RATE)))
-            lines.append(f"Elements {times} times shorter would bring all errors below 0.1 %.")
-        return "\n".join(lines)
+    @property
+    def answer(self) -> Answer:
+        """Whether the mesh is fine enough, and what would be."""
+        worst = int(np.abs(self.errors).argmax())
+        size = abs(float(self.errors[worst]))
+        said = (
+            f"The mesh of {counted(self.elements, 'element')} changes these speeds by at most "
+            f"{percent(size)} % (critical speed {worst + 1})"
+        )
+        if size > FINE:
+            times = int(np.ceil((size / FINE) ** (1 / RATE)))
+            said += f": elements {times} times shorter would bring all errors below {percent(FINE)} %"
+        speeds = Column("rpm", self.frequencies * RPM, "{:.2f}".format)
+        columns = (Column("mode", range(1, self.rates.size + 1), str), speeds, *self._estimates())
+        return Answer(sentence(said), tables=(text(columns),), more="errors of the mesh")
 
 
 def refined(rotor: Rotor, times: int) -> Rotor:

@@ -8,17 +8,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.model.rotor import Rotor
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered
+from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.rpm import RPM
+from rotorid.base.text import counted, listing
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_NAMED = 6  # critical speeds in the first sentence
+
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class Modes(Answered):
     """The lowest critical speeds of a rotor, and its shapes there.
 
     Attributes
@@ -86,16 +90,18 @@ class Modes:
         nodes = (Column("node", range(1, self.rotor.n_nodes + 1)), Column("position_m", self.positions))
         return frame((*nodes, *numbered("mode_{}", self.shapes)))
 
-    def summary(self) -> str:
-        """Critical speeds as text."""
-        mixed = any(word != "forward" for word in self.direction)
-        lines = ["mode       rad/s           rpm            Hz"]
-        for k, omega in enumerate(self.frequencies, start=1):
-            note = "  rigid body" if omega == 0 else ""
-            if mixed:
-                note += f"  {self.direction[k - 1]}"
-            lines.append(
-                f"{k:4d} {omega:11.4f} {omega * RPM:13.2f} {omega / (2 * np.pi):13.4f}{note}",
-            )
-        lines += [self.cut] if self.cut else []
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+    @property
+    def answer(self) -> Answer:
+        """The critical speeds, in rpm, Hz and rad/s."""
+        own = [f"{speed:.6g}" for speed in self.rpm if speed > 0]
+        shown = listing(own, "and") if len(own) < _NAMED else f"{', '.join(own[:_NAMED])} …"
+        ways = zip(self.frequencies, self.direction, strict=True)
+        columns = (
+            Column("mode", range(1, self.frequencies.size + 1), str),
+            Column("whirl", ["rigid body" if speed == 0 else way for speed, way in ways], str),
+            Column("rpm", self.rpm, "{:.2f}".format),
+            Column("Hz", self.frequencies / (2 * np.pi), "{:.4f}".format),
+            Column("rad/s", self.frequencies, "{:.4f}".format),
+        )
+        said = f"{counted(len(own), 'critical speed')} without damping{f': {shown} rpm' if own else ''}."
+        return Answer(said, text(columns, left=2), self.warnings, (self.cut,) if self.cut else ())

@@ -11,18 +11,19 @@ import numpy as np
 from fem.model.rotor import Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.windows import Window, within
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray, IndexArray, read_only
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
-from rotorid.base.rpm import phase_deg, speed_text
-from rotorid.base.text import counted
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.rpm import RPM, phase_deg, range_text, rpm_text
+from rotorid.base.text import counted, figures
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Response(Answered):
     """Vibration of every node, z = x + i y = F e^{iωt} + b̄ e^{−iωt}, under a given unbalance.
 
     On rotationally symmetric supports b = 0: orbits are circles, x = Re F e^{iωt}, y = Im F e^{iωt}. On
@@ -159,17 +160,20 @@ class Response:
             ]
         return frame(columns)
 
-    def summary(self) -> str:
-        """The highest peak of a steady response and where it is, as text."""
+    @property
+    def answer(self) -> Answer:
+        """The highest peak of a steady response and where it is."""
+        said = f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes."
+        return Answer(f"{said}\n{self.highest}", warnings=self.warnings)
+
+    @property
+    def highest(self) -> str:
+        """The largest amplitude in a sentence."""
         k = largest_at(self.largest, self.steady)
-        lines = [
-            f"Unbalance response at {speed_range(self.speeds)}, {self.rotor.n_nodes} nodes",
-            "no steady response at any of these speeds"
-            if k is None
-            else f"largest amplitude {1e6 * self.largest[k]:.4g} µm at node {self.largest_node[k]}, "
-            f"{speed_text(self.speeds[k])}",
-        ]
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+        if k is None:
+            return "No steady response at any of these speeds."
+        size, node = 1e6 * self.largest[k], self.largest_node[k]
+        return f"Largest amplitude {size:.4g} µm at node {node}, {rpm_text(self.speeds[k])}."
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,17 +228,22 @@ class BearingForces:
 
     def summary(self) -> str:
         """The largest force on each support, as text."""
-        lines = [f"{'support':>16}{'largest force, N':>18}{'at rad/s':>12}"]
-        for support, force in zip(self.supports, self.largest.T, strict=True):
-            k = largest_at(force, self.steady)
-            name = support.name or f"node {support.node}"
-            values = f"{'none':>18}{'-':>12}" if k is None else f"{force[k]:18.6g}{self.speeds[k]:12.6g}"
-            lines.append(f"{name:>16}{values}")
-        return "\n".join(lines)
+        where = [largest_at(force, self.steady) for force in self.largest.T]
+        forces = zip(where, self.largest.T, strict=True)
+        columns = (
+            Column("support", [support.name or f"node {support.node}" for support in self.supports], str),
+            Column(
+                "N", [None if k is None else force[k] for k, force in forces], figures, "largest force, N"
+            ),
+            Column(
+                "rpm", [None if k is None else self.speeds[k] * RPM for k in where], "{:.1f}".format, "at rpm"
+            ),
+        )
+        return text(columns)
 
 
 @dataclass(frozen=True, eq=False)
-class InfluenceCoefficients:
+class InfluenceCoefficients(Answered):
     """Vibration at sensors per unit of unbalance in planes.
 
     Attributes
@@ -282,30 +291,34 @@ class InfluenceCoefficients:
             *polar(influence, phase, self.W),
         )
 
-    def summary(self) -> str:
-        """A table at one speed, or the range of sizes over many, as text."""
-        lines = [
-            f"Influence coefficients at {speed_range(self.speeds)}: {counted(len(self.sensors), 'sensor')}, "
-            f"{counted(len(self.planes), 'plane')}",
-            f"{'sensor':>12}{'plane':>12}{'µm per g·mm':>14}{'phase lead, deg':>17}",
-        ]
-        if self.speeds.size > 1:
-            lines[1] = f"{'sensor':>12}{'plane':>12}{'µm per g·mm, least':>20}{'largest':>12}{'at rad/s':>12}"
+    @property
+    def answer(self) -> Answer:
+        """Where the coefficients are largest, and over many speeds how small they get."""
+        _, C, P = self.W.shape
         steady = ~within(self.windows, self.speeds)
-        for c, sensor in enumerate(self.sensors):
-            for p, plane in enumerate(self.planes):
-                size = np.abs(self.W[:, c, p])
-                k = largest_at(size, steady)
-                line = f"{label(sensor)!s:>12}{plane!s:>12}"
-                if k is None:
-                    line += f"{'none: unstable':>20}"
-                elif self.speeds.size > 1:
-                    size = np.where(steady, size, size[k])
-                    line += f"{size.min():20.4g}{size[k]:12.4g}{self.speeds[k]:12.6g}"
-                else:
-                    line += f"{size[0]:14.4g}{phase_deg(self.W[0, c, p]):17.2f}"
-                lines.append(line)
-        return "\n".join([*lines, *(f"Warning: {text}" for text in self.warnings)])
+        said = (
+            f"Influence coefficients of {counted(C, 'sensor')} and {counted(P, 'plane')} at "
+            f"{speed_range(self.speeds)}."
+        )
+        if not steady.any():
+            return Answer(f"{said} None has a meaning: there is no steady response.", warnings=self.warnings)
+        sizes, speeds = np.abs(self.W[steady]).reshape(-1, C * P), self.speeds[steady]
+        largest = sizes.argmax(axis=0)
+        columns = [
+            Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.planes], str),
+            Column("plane", list(self.planes) * C, str),
+            Column("largest", sizes.max(axis=0), "{:.4g}".format, "µm per g·mm"),
+        ]
+        if speeds.size == 1:
+            columns.append(
+                Column("phase", phase_deg(self.W[steady].ravel()), "{:.2f}".format, "phase lead, deg")
+            )
+        else:
+            columns.append(Column("rpm", speeds[largest] * RPM, "{:.6g}".format, "at rpm"))
+            columns.append(Column("rad/s", speeds[largest], "{:.6g}".format))
+            columns.append(Column("least", sizes.min(axis=0), "{:.4g}".format, "least"))
+        said += f"\nThe largest is {sizes.max():.4g} µm per g·mm."
+        return Answer(said, text(columns, left=2), self.warnings)
 
 
 def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
@@ -321,5 +334,5 @@ def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:
 def speed_range(speeds: FloatArray) -> str:
     """A speed, or how many from where to where, as text."""
     if speeds.size == 1:
-        return f"{speeds[0]:.6g} rad/s"
-    return f"{speeds.size} speeds from {speeds.min():.6g} to {speeds.max():.6g} rad/s"
+        return f"{rpm_text(speeds[0])} ({speeds[0]:.6g} rad/s)"
+    return f"{speeds.size} speeds from {range_text(speeds.min(), speeds.max())}"

@@ -14,9 +14,11 @@ from fem.critical import lowest_critical_speeds
 from fem.model.rotor import Rotor, whole
 from fem.model.supports import Support
 from fem.solvers.bracketed_roots import bracketed_root
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.rpm import rpm_text
+from rotorid.base.result import Column, rows, text
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,7 +53,7 @@ class Intersection:
 
 
 @dataclass(frozen=True, eq=False)
-class SpeedMap:
+class SpeedMap(Answered):
     """Critical speeds over support stiffness.
 
     Attributes
@@ -86,16 +88,7 @@ class SpeedMap:
                 "critical_speeds_rad_s": self.speeds.T,
                 "free_rad_s": self.free,
                 "pinned_rad_s": self.pinned,
-                "intersections": [
-                    {
-                        "support": item.support,
-                        "direction": item.direction,
-                        "mode": item.mode,
-                        "speed_rad_s": item.speed,
-                        "stiffness_N_per_m": item.stiffness,
-                    }
-                    for item in self.intersections
-                ],
+                "intersections": rows(self._meetings()),
             }
         )
 
@@ -107,24 +100,33 @@ class SpeedMap:
         columns |= {f"critical_speed_{k}_rad_s": row for k, row in enumerate(self.speeds.T, start=1)}
         return pd.DataFrame(columns)
 
-    def summary(self) -> str:
-        """Limits and intersections as text."""
-        lines = [
-            f"Critical speeds on supports of {self.stiffness[0]:.4g} to {self.stiffness[-1]:.4g} N/m each",
-            "mode    free, rad/s  pinned, rad/s",
-            *(
-                f"{k:4d}{a:15.4f}{b:15.4f}"
-                for k, (a, b) in enumerate(zip(self.free, self.pinned, strict=True), 1)
-            ),
-        ]
-        if self.intersections:
-            lines.append("with the stiffness that the supports have")
-        lines += [
-            f"{item.support}, {item.direction}: critical speed {item.mode} at {item.speed:.6g} rad/s = "
-            f"{rpm_text(item.speed)}, {item.stiffness:.4g} N/m"
-            for item in self.intersections
-        ]
-        return "\n".join(lines)
+    @property
+    def answer(self) -> Answer:
+        """Where the supports' own stiffness meets the map; behind it the limits of each critical speed."""
+        limits = (
+            Column("mode", range(1, self.free.size + 1), str),
+            Column("free", self.free * RPM, "{:.2f}".format, "free supports, rpm"),
+            Column("pinned", self.pinned * RPM, "{:.2f}".format, "pinned, rpm"),
+        )
+        speeds = [item.speed * RPM for item in self.intersections]
+        met = self._meetings()
+        low, high = self.stiffness[0], self.stiffness[-1]
+        return Answer(
+            f"Map of critical speeds on supports of {low:.4g} to {high:.4g} N/m each.",
+            text((*met[:3], Column("rpm", speeds, "{:.2f}".format), *met[3:]), left=2),
+            tables=(text(limits),),
+            more="limits of soft and of stiff supports",
+        )
+
+    def _meetings(self) -> tuple[Column, ...]:
+        met = self.intersections
+        return (
+            Column("support", [item.support for item in met], str, "own stiffness of"),
+            Column("direction", [item.direction for item in met], str),
+            Column("mode", [item.mode for item in met], str),
+            Column("speed_rad_s", [item.speed for item in met], "{:.4f}".format, "rad/s"),
+            Column("stiffness_N_per_m", [item.stiffness for item in met], "{:.4g}".format, "N/m"),
+        )
 
 
 def speed_map(

@@ -9,7 +9,7 @@ import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.rpm import RPM, speed_text
+from rotorid.base.rpm import RPM, rpm_text, speed_text
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,14 @@ class Window:
             "frequency_rad_s": self.frequency,
             "direction": None if self.direction is None else DIRECTION_NAMES[self.direction],
         }
+
+    def where(self) -> str:
+        """The range, in rpm."""
+        if self.first == self.last:
+            return f"at {rpm_text(self.first)}"
+        if self.begins and not self.ends:
+            return f"above {rpm_text(self.first)}"
+        return f"from {self.first * RPM:.6g} to {rpm_text(self.last)}"
 
     def said(self) -> str:
         """What happens, as a warning."""

@@ -64,13 +64,15 @@ class Answer:
     def brief(self, lines: int = LINES) -> str:
         """At most so many lines; of each kind of remark (the same words with other names or numbers) one."""
         head = _wrapped(self.judgement.splitlines())
-        remarks = [*_kinds("Warning", self.warnings), *_kinds("Note", self.notes)]
+        remarks = [_remark("Warning", one) for one in kinds(self.warnings)]
+        remarks += [_remark("Note", one) for one in kinds(self.notes)]
         room = lines - len(head) - 3 - bool(remarks)  # blank lines, and where the rest is
         found, hidden = _first(
             _wrapped(self.found.splitlines()), room - max(map(len, remarks[:1]), default=0)
         )
         told, untold = _fitting(remarks, room - len(found))
-        left = [hidden, counted(untold, "more remark") if untold else "", self.more if self.tables else ""]
+        more = self.more if len(self.more) < COLUMNS // 2 else "the tables"
+        left = [hidden, counted(untold, "more remark") if untold else "", more if self.tables else ""]
         rest = cut(capital("; ".join(part for part in left if part)), COLUMNS - len(": --table."))
         return _joined(head, found, told, [f"{rest}: --table."] if rest else [])
 
@@ -109,14 +111,18 @@ def together(answers: Iterable[Answer]) -> Answer:
     )
 
 
-def _kinds(word: str, clauses: Iterable[str]) -> list[list[str]]:
-    """One remark of each kind, as lines."""
-    kinds: dict[str, list[str]] = {}
+def kinds(clauses: Iterable[str]) -> list[str]:
+    """One clause of each kind, and how many more there are.
+
+    >>> kinds(["line 3: no mass", "line 5: no mass", "no weight", "line 3: no mass"])
+    ['line 3: no mass (and 1 more of this kind)', 'no weight']
+    """
+    found: dict[str, list[str]] = {}
     for clause in dict.fromkeys(clauses):
-        kinds.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
+        found.setdefault(_VARIABLE.sub("#", clause), []).append(clause)
     return [
-        _remark(word, same[0].rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else ""))
-        for same in kinds.values()
+        same[0].rstrip(".") + (f" (and {len(same) - 1} more of this kind)" if same[1:] else "")
+        for same in found.values()
     ]
 
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.json import cell
-from rotorid.base.text import table
+from rotorid.base.text import WIDTH, table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,14 +72,14 @@ def frame(columns: Sequence[Column]) -> pd.DataFrame:
     return pd.DataFrame({column.name: column.values for column in columns})
 
 
-def text(columns: Sequence[Column], left: int = 1) -> str:
+def text(columns: Sequence[Column], left: int = 1, width: int = WIDTH) -> str:
     """The columns that are printed, all but the first `left` aligned to the right; nothing stays blank."""
     printed = [
         [column.name if column.title is None else column.title, *map(_shown(column.shown), column.values)]
         for column in columns
         if column.shown is not None
     ]
-    return table([list(row) for row in zip(*printed, strict=True)], left)
+    return table([list(row) for row in zip(*printed, strict=True)], left, width)
 
 
 def _shown(shown: Callable[[Any], str]) -> Callable[[Any], str]:

@@ -28,6 +28,11 @@ def speed_text(speed: float) -> str:
     return f"{speed:.6g} rad/s = {speed * RPM:.6g} rpm"
 
 
+def range_text(low: float, high: float) -> str:
+    """A range of speeds in both units, `1000 to 3000 rpm (104.72 to 314.159 rad/s)`."""
+    return f"{low * RPM:.6g} to {rpm_text(high)} ({low:.6g} to {high:.6g} rad/s)"
+
+
 def phase_deg(z: ArrayLike) -> FloatArray:
     """Phases of complex numbers, 0 ≤ phase < 360 degrees."""
     import numpy as np

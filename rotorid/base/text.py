@@ -27,6 +27,11 @@ def figures(value: float, digits: int = 4) -> str:
     return f"{value:.{places}f}"
 
 
+def error_figures(error: float) -> str:
+    """A standard deviation, two digits."""
+    return figures(error, 2) if error == error else "unknown"
+
+
 def capital(text: str) -> str:
     """The text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
@@ -71,12 +76,12 @@ def listing(names: Iterable[str], conjunction: str = "or") -> str:
     return f"{', '.join(items[:-1])} {conjunction} {items[-1]}"
 
 
-def table(rows: list[list[str]], left: int = 1) -> str:
-    """Columns right-aligned, except for the first `left` ones; names are cut where 80 columns need it."""
+def table(rows: list[list[str]], left: int = 1, width: int = WIDTH) -> str:
+    """Columns right-aligned, except for the first `left` ones; names are cut where the width needs it."""
     columns = len(rows[0])
     widths = [max(len(r[i]) for r in rows) for i in range(columns)]
     names = left - 1
-    widths[names] = max(min(widths[names], WIDTH - 2 * columns - (sum(widths) - widths[names])), 8)
+    widths[names] = max(min(widths[names], width - 2 * columns - (sum(widths) - widths[names])), 8)
     lines = []
     for row in rows:
         cells = [cut(cell, widths[i]) for i, cell in enumerate(row)]

@@ -7,10 +7,11 @@ import io
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import typer
 
+from rotorid.base.answer import kinds
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
@@ -93,12 +94,8 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):  # an old code page has no arrows or signs of degrees
             stream.reconfigure(errors="replace")
     try:
-        with warnings.catch_warnings():
-            warnings.showwarning = _warn  # type: ignore[assignment]
-            try:
-                app()
-            finally:
-                sys.stdout.flush()
+        with _warnings_last():
+            app()
     except (ArithmeticError, MemoryError) as problem:
         reason = f"numbers too large or too small to compute with: {problem}"
         sys.exit(
@@ -120,8 +117,19 @@ def _forget_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _warn(message: Warning | str, *_: object) -> None:
-    print(f"rotorid: Warning: {_safe(str(message))}", file=sys.stderr)
+@contextlib.contextmanager
+def _warnings_last() -> Iterator[None]:
+    """Print what was warned of when all else is printed: one of each kind, numerical trouble first."""
+    with warnings.catch_warnings(record=True) as caught:
+        try:
+            yield
+        finally:
+            try:
+                sys.stdout.flush()
+            finally:
+                caught.sort(key=lambda one: issubclass(one.category, UserWarning))
+                for text in kinds(_safe(str(one.message)) for one in caught):
+                    print(f"rotorid: Warning: {text}", file=sys.stderr)
 
 
 def _complain(problem: Exception) -> int:

@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, text
+from rotorid.base.text import error_figures, percent
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.experiments import experiments as gather
@@ -35,7 +37,7 @@ STARTS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(Answered):
     """Candidate frequencies and the chosen ones.
 
     Attributes
@@ -77,22 +79,29 @@ class Design:
         """Whether the chosen frequencies determine every parameter."""
         return bool(np.isfinite(self.std).all())
 
-    def summary(self) -> str:
-        """Text: the chosen frequencies and what they will tell."""
-        width = max(len(name) for name in self.parameters)
+    @property
+    def answer(self) -> Answer:
+        """The chosen frequencies and what they will tell."""
         listed = ", ".join(f"{w:.6g}" for w in self.frequencies)
-        lines = [f"measure at {listed} rad/s ({len(self.chosen)} of {len(self.candidates)} candidates)"]
-        for name, value, std, best in zip(self.parameters, self.guess, self.std, self.std_all, strict=True):
-            if not np.isfinite(std):
-                lines.append(f"{name:<{width}} = {value:.6g}: these frequencies will not determine it")
-                continue
-            share = f" ({100 * std / abs(value):.2g} %)" if value else ""
-            lines.append(
-                f"{name:<{width}} = {value:.6g} ± {std:.2g}{share} expected; all candidates ± {best:.2g}"
-            )
+        said = f"Measure at {listed} rad/s ({len(self.chosen)} of {len(self.candidates)} candidates)"
         if np.isfinite(self.efficiency):
-            lines.append(f"{self.efficiency:.2f} times the information of as many readings spread evenly")
-        return "\n".join(lines)
+            said += f": {self.efficiency:.2f} times the information of as many readings spread evenly"
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(self.guess == 0, np.nan, self.std / np.abs(self.guess))
+        known = ["" if np.isfinite(std) else "these frequencies will not determine it" for std in self.std]
+        columns = (
+            Column("parameter", self.parameters, str),
+            Column("guess", self.guess, "{:.6g}".format),
+            Column(
+                "std", [std if np.isfinite(std) else None for std in self.std], error_figures, "± expected"
+            ),
+            Column("%", np.where(np.isfinite(share), share, np.nan), percent),
+            Column(
+                "all", [std if np.isfinite(std) else None for std in self.std_all], error_figures, "± of all"
+            ),
+            Column("why", known, str, ""),
+        )
+        return Answer(f"{said}.", text(columns, width=COLUMNS))
 
     def to_frame(self) -> pd.DataFrame:
         """One row per candidate: frequency, how often chosen, expected standard deviations from it alone."""

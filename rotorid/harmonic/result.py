@@ -8,17 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import percent, sentence
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
-from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict
+from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 HEADINGS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
+SEVERAL = "several values: see the solutions"
 
 
 @dataclass(frozen=True)
@@ -37,9 +40,13 @@ class FoundCombination:
     value: float
     std: float | None
 
+    def line(self) -> str:
+        """One line of text."""
+        return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
+
 
 @dataclass(frozen=True, eq=False)
-class Identification(Uncertain):
+class Identification(Answered, Uncertain):
     """Parameters of a harmonic model, identified.
 
     Attributes
@@ -164,46 +171,63 @@ class Identification(Uncertain):
         """One row per experiment and equation (or output): real and imaginary part of the residual."""
         return frame(_residual_columns(self))
 
-    def summary(self) -> str:
-        """Text for an engineer: values ± standard deviations, intervals, and what is not determined."""
-        words = [*self.parameters, *(c.words for c in self.combinations)]
-        width = max(len(w) for w in words)
-        lines = [HEADINGS.get(self.method, self.method)]
-        if not self.converged:
-            lines.append("not converged: the values are where the search stopped, no estimates")
-        lines += [self._line(i, width) for i in range(len(self.parameters))]
-        for c in self.combinations:
-            lines.append(f"{c.words:<{width}} = {c.value:.6g}" + ("" if c.std is None else f" ± {c.std:.2g}"))
-        if self.identifiable:
-            n = len(self.parameters)
-            known = "the parameter is" if n == 1 else f"all {n} parameters are"
-            lines.append(f"{known} determined (condition number {self.condition_number:.3g})")
-        lines += self.unidentifiable
-        if len(self.solutions) > 1:
-            for i, solution in enumerate(self.solutions):
-                values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
-                lines.append(f"solution {i + 1}: {values}")
+    @property
+    def answer(self) -> Answer:
+        """What is determined and how well the model fits, the values, and what it leaves of each reading."""
+        why = {name: SEVERAL for name in self.parameters if self._several(name)}
+        found = [parameter_text(self.parameters, self, why), *(f"  {c.line()}" for c in self.combinations)]
+        for i, solution in enumerate(self.solutions if len(self.solutions) > 1 else ()):
+            values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
+            found.append(f"  solution {i + 1}: {values}")
+        notes = [f"left out: {row}" for row in self.left_out]
         if self.covariance is None and self.converged:
-            lines.append("no intervals: no errors are stated and there are no more equations than unknowns")
-        lines += [f"left out: {row}" for row in self.left_out]
-        lines += [f"warning: {text}" for text in self.warnings]
-        lines += self.notes
-        return "\n".join(lines)
+            notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
+        columns = self._misfit()
+        left = np.array(columns[-1].values)
+        said = f"{self._judgement()} Method: {HEADINGS.get(self.method, self.method)}."
+        if known := bool(np.isfinite(left).any()):
+            rms = float(np.sqrt(np.nanmean(np.square(left))))
+            said += f"\nThe model leaves {percent(round(rms, 10))} % of the readings (rms)."
+        return Answer(
+            said,
+            "\n".join(found),
+            self.warnings[::-1],  # what speaks against the answer comes last there
+            (*notes, *self.notes),
+            (text(columns),) if known else (),
+            "what it leaves of each reading",
+        )
 
-    def _line(self, i: int, width: int) -> str:
-        name, std, ci95 = self.parameters[i], self.std, self.ci95
-        value = self.values[i]
-        if not np.isfinite(value):
-            several = len({round(s[name], 12) for s in self.solutions if np.isfinite(s[name])}) > 1
-            reason = "has several values, see the solutions" if several else "not determined by these data"
-            return f"{name:<{width}} = {reason}"
-        text = f"{name:<{width}} = {value:.6g}"
-        if std is not None and np.isfinite(std[i]):
-            share = f" ({100 * std[i] / abs(value):.2g} %)" if value else ""
-            text += f" ± {std[i]:.2g}{share}"
-        if ci95 is not None and np.isfinite(ci95[i]).all():
-            text += f"   95 %: {ci95[i, 0]:.6g} … {ci95[i, 1]:.6g}"
-        return text
+    def _judgement(self) -> str:
+        if not self.converged:
+            return "NOT converged: the values are where the search stopped, no estimates."
+        if not self.identifiable:
+            return "\n".join(map(sentence, self.unidentifiable))
+        n = len(self.parameters)
+        known = "The parameter is" if n == 1 else f"All {n} parameters are"
+        return f"{known} determined (condition number {self.condition_number:.3g})."
+
+    def _several(self, name: str) -> bool:
+        """Whether a parameter has several values that explain the data alike."""
+        if np.isfinite(self.value(name)):
+            return False
+        return len({round(s[name], 12) for s in self.solutions if np.isfinite(s[name])}) > 1
+
+    def _misfit(self) -> tuple[Column, ...]:
+        """Size of measured and predicted amplitudes, and their difference as a share of the measured one."""
+        names = [name for name in self.model.outputs if name in self.predicted]
+        n, e = len(self.experiments), len(names)
+        measured = self.experiments.table(names).ravel()
+        model = np.array([self.predicted[name] for name in names]).T.ravel()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.abs(model - measured) / np.abs(measured)
+        return (
+            Column("experiment", np.repeat(self.experiments.names, e), str),
+            Column("rad/s", np.repeat(self.experiments.frequencies, e), "{:.6g}".format),
+            Column("output", names * n, str),
+            Column("measured", np.abs(measured), "{:.4g}".format),
+            Column("model", np.abs(model), "{:.4g}".format),
+            Column("%", left, percent, "left, %"),
+        )
 
 
 def _residual_columns(found: Identification) -> tuple[Column, ...]:

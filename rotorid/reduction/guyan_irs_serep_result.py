@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import fem
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
-from rotorid.base.text import counted, listing
+from rotorid.base.result import Column, frame, text
+from rotorid.base.text import counted, listing, percent
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-_ACROSS = 3
-"""Modes beside one another in a table that fits a page."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +82,7 @@ class Method:
 
 
 @dataclass(frozen=True, eq=False)
-class Methods:
+class Methods(Answered):
     """Reduced models of the same rotor at the same nodes by different methods.
 
     Attributes
@@ -132,17 +128,23 @@ class Methods:
 
     def to_frame(self) -> pd.DataFrame:
         """A row per method and mode."""
+        return frame(self._columns())
+
+    def _columns(self) -> tuple[Column, ...]:
         n, several = len(self.nodes), len(self.rows)
-        return frame(
-            (
-                Column("method", np.repeat([row.name for row in self.rows], n)),
-                Column("mode", np.tile(np.arange(1, n + 1), several)),
-                Column("frequency_rad_s", np.concatenate([row.frequencies for row in self.rows])),
-                Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several)),
-                Column("relative_error", np.concatenate([row.relative_error for row in self.rows])),
-                Column("mac", np.concatenate([row.mac for row in self.rows])),
-                Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
-            )
+        frequency, share = "{:.4f}".format, "{:+.3%}".format
+
+        def each(name: str) -> FloatArray:
+            return np.concatenate([getattr(row, name) for row in self.rows])
+
+        return (
+            Column("method", np.repeat([row.name for row in self.rows], n), str),
+            Column("mode", np.tile(np.arange(1, n + 1), several), str),
+            Column("frequency_rad_s", each("frequencies"), frequency, "rad/s"),
+            Column("rotor_frequency_rad_s", np.tile(self.rotor_frequencies, several), frequency, "rotor"),
+            Column("relative_error", each("relative_error"), share, "error"),
+            Column("mac", each("mac"), "{:.5f}".format, "MAC"),
+            Column("diagonal", np.repeat([row.diagonal for row in self.rows], n)),
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -157,57 +159,21 @@ class Methods:
             }
         )
 
-    def summary(self) -> str:
-        """A table of frequencies, errors and MAC by method and mode, as text."""
-        n = len(self.nodes)
-        lines = [f"Warning: {text}" for text in self.warnings]
-        unknowns = counted(n, "unknown")
-        lines.append(
-            f"The rotor reduced to {unknowns}, the deflections of nodes {', '.join(map(str, self.nodes))}"
-        )
-        lines.append("in each cell: frequency in rad/s, its error, MAC with the rotor's mode at these nodes")
-        for first in range(0, n, _ACROSS):
-            modes = range(first, min(n, first + _ACROSS))
-            lines.append(f"{'method':<20}" + "".join(f"{f'mode {k + 1}':>10}{'':19}" for k in modes).rstrip())
-            own = "".join(f"{_number(self.rotor_frequencies[k]):>10}{'':19}" for k in modes)
-            lines.append(f"{'rotor':<20}{own}".rstrip())
-            for row in self.rows:
-                cells = "".join(_cell(row, k) for k in modes)
-                lines.append(f"{row.name:<20}{cells}".rstrip())
-        for row in self.rows:
-            if row.masses is not None:
-                pairs = ", ".join(
-                    f"{m:.4g} kg at node {node}" for m, node in zip(row.masses, self.nodes, strict=True)
-                )
-                lines += textwrap.wrap(f"{row.name}: {pairs}", 100, subsequent_indent="  ")
+    @property
+    def answer(self) -> Answer:
+        """The largest error of each method; behind it frequencies, errors and MAC by method and mode."""
+        worst = [
+            f"{row.name} {percent(round(float(np.abs(row.relative_error).max()), 8))} %"
+            if row.M is not None and np.isfinite(row.relative_error).all()
+            else f"{row.name}: no model of all modes"
+            for row in self.rows
+        ]
         full = [row.name for row in self.rows if row.M is not None and not row.diagonal]
-        if full:
-            lines.append(
-                f"{listing(full, 'and')}: full mass matrices; they couple the nodes, "
-                "and no single mass stands at a node"
-            )
-        return "\n".join(lines)
-
-
-def _cell(row: Method, k: int) -> str:
-    if row.M is None:
-        return f"{'no model':>10}{'':19}"
-    if not np.isfinite(row.frequencies[k]):
-        return f"{'does not vibrate':>18}{'':11}"
-    return f"{_number(row.frequencies[k]):>10} {_percent(row.relative_error[k])} {row.mac[k]:8.5f}"
-
-
-def _number(omega: float) -> str:
-    """Seven digits or more, as the book prints frequencies."""
-    return f"{omega:.4f}" if omega < 1e4 else f"{omega:.7g}"
-
-
-def _percent(error: float) -> str:
-    """Signed, 9 characters wide; what rounding alone makes is 0."""
-    percent = 100 * error
-    size = abs(percent)
-    if size < 5e-5:
-        return f"{'0 %' if size < 1e-9 else '<0.0001 %':>9}"
-    if size >= 100:
-        return f"{percent:+7.3g} %"
-    return f"{percent:+7.3f} %" if size >= 0.01 else f"{percent:+7.4f} %"
+        said = "full mass matrices; they couple the nodes, and no single mass stands at a node"
+        return Answer(
+            f"Largest error of {counted(len(self.nodes), 'frequency', 'frequencies')}: {', '.join(worst)}.",
+            warnings=self.warnings,
+            notes=(f"{listing(full, 'and')}: {said}",) if full else (),
+            tables=(text(self._columns()),),
+            more="frequencies and shapes of each method",
+        )

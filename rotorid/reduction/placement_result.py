@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import fem
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, numbered
+from rotorid.base.result import Column, frame, numbered, text
 from rotorid.base.text import counted
 
 if TYPE_CHECKING:
@@ -36,9 +37,12 @@ SMALL_ERROR = 1e-3
 SMALL_LOSS = 1e-2
 """So do values of 1 − MAC below this."""
 
+_TOP = 10
+"""Choices of the table."""
+
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class Placement(Answered):
     """Every choice of n nodes for the masses, best frequencies first.
 
     A choice is ranked where all its masses are positive and its model vibrates in n modes. The rows
@@ -229,59 +233,66 @@ class Placement:
             "condition_number": self.condition[i],
         }
 
-    def summary(self, top: int = 10) -> str:
-        """Text for an engineer: the best choices by frequency, by MAC, the compromise, the book's rule."""
+    @property
+    def answer(self) -> Answer:
+        """The compromise beside the best by frequency, by MAC and the book's rule; behind it the best ten."""
         n = self.nodes.shape[1]
-        lines = [f"Warning: {w}" for w in self.warnings]
-        lines.append(
-            f"{self.considered} choices of {n} of {len(self.candidates)} nodes, masses from "
-            f"{counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}"
-        )
-        lines.append(
-            f"  ranked {self.ranked}; with masses that are not positive {self.unphysical}; not determined "
-            f"{self.undetermined}; a mode has a node at the first mass {self.at_node}"
-        )
+        asked = f"Of {self.considered} choices of {n} of {len(self.candidates)} nodes"
         if not self.ranked:
-            return "\n".join([*lines, "no choice gives a physical model; use other candidates or more modes"])
-        lines.append(" rank   largest error   smallest MAC (mode)   condition   nodes: masses, kg")
-        lines += [self._line(i) for i in range(min(top, self.ranked))]
-        named = (
-            ("best by frequency", self.best_by_frequency),
-            ("best by MAC", self.best_by_mac),
-            ("compromise (closest to both bests, as factors)", self.compromise),
-            ("the book's rule (antinodes)", self.book),
+            said = f"{asked} no choice gives a physical model; use other candidates or more modes."
+            return Answer(said, warnings=self.warnings)
+        i = self.compromise
+        assert i is not None
+        places = ", ".join(map(str, self.nodes[i]))
+        named = {
+            "best by frequency": self.best_by_frequency,
+            "best by MAC": self.best_by_mac,
+            "compromise": i,
+            "the book's antinodes": self.book,
+        }
+        counts = (
+            f"Masses from {counted(self.modes, 'mode')}, checked on {counted(self.check, 'mode')}: ranked "
+            f"{self.ranked}; with masses that are not positive {self.unphysical}; not determined "
+            f"{self.undetermined}; a mode has a node at the first mass {self.at_node}."
         )
-        for words, i in named:
-            lines.append(f"{words}:")
-            lines.append(self._line(i) if i is not None else f"       none: {self.book_note}")
-        lines.append(self._trap())
-        return "\n".join(lines)
+        best = self._choices({str(k + 1): k for k in range(min(_TOP, self.ranked))})
+        return Answer(
+            f"{asked} the compromise is {places}: frequencies within {100 * self.error[i]:.2g} %, "
+            f"MAC {self.mac[i]:.3g}.",
+            self._choices({words: int(row) for words, row in named.items() if row is not None}),
+            self.warnings,
+            (self._trap(), *((f"the book's rule: {self.book_note}",) if self.book is None else ())),
+            (f"{counts}\n{best}",),
+            f"the best {min(_TOP, self.ranked)} choices",
+        )
 
-    def _line(self, i: int) -> str:
-        places = ", ".join(str(node) for node in self.nodes[i])
-        masses = ", ".join(f"{m:.2f}" for m in self.masses[i])
-        if i >= self.ranked:
-            return f"       not ranked, no physical model   nodes {places}: {masses}"
-        return (
-            f"{i + 1:>5}   {100 * self.error[i]:11.4f} %   {self.mac[i]:12.4f} ({self.worst_mode[i]})"
-            f"   {self.condition[i]:13.3g}   {places}: {masses}"
+    def _choices(self, named: Mapping[str, int]) -> str:
+        """Choices as a table."""
+        chosen = [*named.values()]
+        macs = [f"{self.mac[i]:.4f} ({self.worst_mode[i]})" if i < self.ranked else "" for i in chosen]
+        columns = (
+            Column("choice", [*named], str),
+            Column("error", 100 * self.error[chosen], "{:.4f}".format, "largest error, %"),
+            Column("mac", macs, str, "MAC (mode)"),
+            Column("condition", self.condition[chosen], "{:.3g}".format),
+            Column("nodes", [", ".join(map(str, self.nodes[i])) for i in chosen], str),
+            Column("masses", [", ".join(f"{m:.1f}" for m in self.masses[i]) for i in chosen], str, "kg"),
         )
+        return text(columns, width=COLUMNS)
 
     def _trap(self) -> str:
         if self.nodes.shape[1] == 1:
-            return "One mass has no shape to compare, and every place gives its one frequency exactly."
+            return "One mass has no shape to compare, and every place gives its one frequency exactly"
         traps = self.traps()
-        text = "Frequencies alone are a trap: a model can match them and still move unlike the rotor. "
+        said = "frequencies alone are a trap: a model can match them and still move unlike the rotor. "
         if not traps.size:
-            text += f"Here no choice matches within {100 * CLOSE:g} % with a MAC below {ALIKE:g}."
-        else:
-            i = int(traps[0])
-            text += (
-                f"Here {traps.size} of the choices match all checked frequencies within {100 * CLOSE:g} % "
-                f"with a MAC below {ALIKE:g}, first nodes {', '.join(map(str, self.nodes[i]))} (rank "
-                f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns."
-            )
-        return fill(text, 110)
+            return f"{said}Here no choice matches within {100 * CLOSE:g} % with a MAC below {ALIKE:g}"
+        i = int(traps[0])
+        return (
+            f"{said}Here {traps.size} of the choices match all checked frequencies within {100 * CLOSE:g} % "
+            f"with a MAC below {ALIKE:g}, first nodes {', '.join(map(str, self.nodes[i]))} (rank "
+            f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns"
+        )
 
     def with_warnings(self, *more: str) -> Placement:
         """The same with further warnings."""

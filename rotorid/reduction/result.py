@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 import fem
+from rotorid.base.answer import Answer, Answered, together
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
+from rotorid.base.result import Column, text
 from rotorid.base.rpm import RPM
+from rotorid.base.text import counted, error_figures, percent
 from rotorid.reduction.equivalent.changed_inputs import Shift
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
 from rotorid.reduction.equivalent.mass_uncertainty import InputErrors, MassUncertainty, mass_uncertainty
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from rotorid.reduction.dynamics.small_rotor import SmallRotor
+
+_RESIDUAL = "± is one standard deviation from the regression's residuals (model error, not measurement)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +68,7 @@ class Choices:
 
 
 @dataclass(frozen=True, eq=False)
-class Reduction:
+class Reduction(Answered):
     """An n-mass model of a rotor beside the rotor itself.
 
     Attributes
@@ -247,60 +252,59 @@ class Reduction:
         frame.insert(0, "table", ["masses"] * n + ["modes"] * n)
         return frame
 
-    def summary(self) -> str:
-        """Text for an engineer."""
-        lines = [f"Warning: {w}" for w in self.warnings]
-        lines.append(
-            f"{len(self.nodes)} equivalent masses from {self.choices.words(self.modes)}, formula (50)"
-        )
-        lines += self._mass_lines()
-        whose = "measured" if self.choices.source == "measured" else "rotor"
-        lines.append(f"mode   n-mass model            {whose:<8}                error      MAC")
-        for k, f in enumerate(self.frequencies):
-            if k >= len(self.rotor_frequencies):
-                lines.append(f"{k + 1:>4}   {_speed(f) if np.isfinite(f) else 'does not vibrate':<21}")
-                continue
-            g, error = self.rotor_frequencies[k], self.relative_error[k]
-            lines.append(
-                f"{k + 1:>4}   {_speed(f)}   {_speed(g)}   {100 * error:+7.3f} %  {self.mac[k]:.5f}"
-                if np.isfinite(f)
-                else f"{k + 1:>4}   {'does not vibrate':<21}   {_speed(g)}"
-            )
-        lines.append(f"condition number of the regression {self.masses.condition_number:.3g}")
-        if self.masses.std is not None:
-            lines.append(
-                "± is one standard deviation from the regression's residuals (model error, not measurement)"
-            )
-        if self.separated is not None:
-            lines += ["", self.separated.summary()]
-        if self.uncertainty is not None:
-            lines += ["", self.uncertainty.summary()]
-        return "\n".join(lines)
-
-    def _mass_lines(self) -> list[str]:
-        std, positions = self.masses.std, self.positions
-        lines = []
-        for i, node in enumerate(self.nodes):
-            known = std is not None and np.isfinite(std[i])
-            spread = f" ± {_plain(std[i])}" if std is not None and known else ""
-            where = "" if positions is None else f"  at {positions[i]:7.3f} m"
-            lines.append(f"  node {node:>3}{where}   {self.masses.solution[i]:10.3f} kg{spread}")
+    @property
+    def answer(self) -> Answer:
+        """How well the masses stand for the rotor, the masses, and both frequencies beside each other."""
+        n = len(self.nodes)
         whole = "" if self.rotor is None else f" of the rotor's {self.rotor.total_mass:.1f} kg"
-        return [*lines, f"  together {self.masses.solution.sum():.1f} kg{whole}"]
+        told = Answer(
+            f"{counted(n, 'equivalent mass', 'equivalent masses')} from {self.choices.words(self.modes)}, "
+            f"formula (50), together {self.masses.solution.sum():.1f}{whole or ' kg'}.\n"
+            f"{self._judgement()}; condition number {self.masses.condition_number:.3g}.",
+            f"{text(self._masses())}\n\n{text(self._modes())}",
+            self.warnings[::-1],  # of the model as it came out before those of what it is made for
+            (_RESIDUAL,) if self.masses.std is not None else (),
+        )
+        more = [part.answer for part in (self.uncertainty, self.separated) if part is not None]
+        return together([told, *more])
+
+    def _judgement(self) -> str:
+        """How near the modes are."""
+        errors, macs = np.abs(self.relative_error[: self.modes]), self.mac[: self.modes]
+        if (self.masses.solution <= 0).any():
+            return "NO physical model, a mass is not positive"
+        if not np.isfinite(errors).all():
+            return "NO model of these modes, not all of them vibrate"
+        whose = "measured" if self.choices.source == "measured" else "rotor's"
+        said = f"Frequencies within {percent(round(errors.max(), 8))} % of the {whose}, MAC {macs.min():.4g}"
+        k = self.modes
+        if k < len(self.nodes) and np.isfinite(self.relative_error[k]):
+            said += f"; mode {k + 1} off by {100 * self.relative_error[k]:+.3g} %"
+        return said
+
+    def _masses(self) -> tuple[Column, ...]:
+        std, positions = self.masses.std, self.positions
+        at = () if positions is None else (Column("at, m", positions, "{:.3f}".format),)
+        spread = () if std is None else (Column("±", std, error_figures),)
+        masses = Column("mass, kg", self.masses.solution, "{:.3f}".format)
+        return (Column("node", self.nodes, str), *at, masses, *spread)
+
+    def _modes(self) -> tuple[Column, ...]:
+        own, other = self.frequencies, self._padded(self.rotor_frequencies)
+        whose = "measured" if self.choices.source == "measured" else "rotor"
+        still = ["" if np.isfinite(f) else "does not vibrate" for f in own]
+        return (
+            Column("mode", range(1, len(self.nodes) + 1), str),
+            Column("model", own * RPM, "{:.1f}".format, "model, rpm"),
+            Column("rad/s", own, "{:.4f}".format),
+            Column("rotor", other * RPM, "{:.1f}".format, f"{whose}, rpm"),
+            Column("rotor_rad_s", other, "{:.4f}".format, "rad/s"),
+            Column("error", 100 * self.relative_error, "{:+.3f}".format, "error, %"),
+            Column("MAC", np.where(np.isfinite(own), self.mac, np.nan), "{:.5f}".format),
+            *((Column("", still, str),) if any(still) else ()),
+        )
 
     def _padded(self, values: FloatArray) -> FloatArray:
         out = np.full(len(self.nodes), np.nan)
         out[: len(values)] = values[: len(out)]
         return out
-
-
-def _speed(omega: float) -> str:
-    return f"{omega:9.4f} rad/s {omega * RPM:7.1f}/min"
-
-
-def _plain(value: float) -> str:
-    """Two significant digits, never as a power of ten."""
-    if value == 0 or not np.isfinite(value):
-        return f"{value:g}"
-    places = 1 - int(np.floor(np.log10(abs(value))))
-    return f"{round(value, places):.{max(places, 0)}f}"

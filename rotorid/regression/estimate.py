@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
+from rotorid.base.text import error_figures, percent, sentence, table
 from rotorid.regression.undetermined_combinations import Combination, combination_words, echelon
 
 if TYPE_CHECKING:
@@ -81,6 +83,21 @@ def parameter_columns(names: Sequence[str], found: Uncertain) -> tuple[Column, .
     )
 
 
+def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str]) -> str:
+    """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
+    lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
+    for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, found)), strict=True):
+        digits = _digits(value, std)
+        numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
+        share = percent(std / abs(value)) if value else ""
+        reason = why.get(name, "not determined" if np.isnan(value) else "")
+        error = "" if np.isnan(std) else error_figures(std)
+        cells = [name, numbers[0], error, share, *numbers[1:], reason]
+        lines.append(["" if cell == "nan" else cell for cell in cells])
+    told = [column for column in zip(*lines, strict=True) if any(column[1:])]
+    return table([list(line) for line in zip(*told, strict=True)], width=COLUMNS)
+
+
 def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
     """Value, std and ci95 of each parameter by name, as JSON types; what is unknown is None."""
     table = rows(parameter_columns(names, found))
@@ -95,7 +112,7 @@ def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate(Uncertain):
+class Estimate(Answered, Uncertain):
     """Parameters estimated from `K θ = Y`, and what the data do not say about them.
 
     Attributes
@@ -206,42 +223,22 @@ class Estimate(Uncertain):
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
         return frame(parameter_columns(self.names, self))
 
-    def summary(self, at_bounds: Sequence[str] = ()) -> str:
-        """Text for an engineer: values ± standard deviations, intervals, and what is not determined.
+    @property
+    def answer(self) -> Answer:
+        """Values ± standard deviations, intervals, and what is not determined."""
+        return self.told()
 
-        Parameters
-        ----------
-        at_bounds
-            Parameters that stand at a bound, which is said instead of an interval.
-        """
-        width = max(len(n) for n in self.names)
-        lines = [
-            f"{name:<{width}} = {self.values[i]:.6g}   at its bound"
-            if name in at_bounds
-            else self._line(i, width)
-            for i, name in enumerate(self.names)
-        ]
-        lines += [c.line() for c in self.combinations]
-        lines.append(self.describe_rank())
-        if self.covariance is None:
-            lines.append("no intervals: no errors are stated and there are no more equations than parameters")
+    def told(self, at_bounds: Sequence[str] = ()) -> Answer:
+        """The answer where some parameters stand at a bound, which is said instead of an interval."""
+        notes = []
         if self.chi_square is not None and self.dof > 0:
             ratio = np.sqrt(self.chi_square / self.dof)
-            lines.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
-        return "\n".join(lines)
-
-    def _line(self, i: int, width: int) -> str:
-        name, std, ci95 = self.names[i], self.std, self.ci95
-        if np.isnan(self.values[i]):
-            return f"{name:<{width}} = not determined by these data"
-        digits = _digits(self.values[i], None if std is None else std[i])
-        text = f"{name:<{width}} = {self.values[i]:.{digits}g}"
-        if std is not None:
-            share = f" ({100 * std[i] / abs(self.values[i]):.2g} %)" if self.values[i] else ""
-            text += f" ± {std[i]:.2g}{share}"
-        if ci95 is not None:
-            text += f"   95 %: {ci95[i, 0]:.{digits}g} … {ci95[i, 1]:.{digits}g}"
-        return text
+            notes.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
+        if self.covariance is None and self.dof <= 0:
+            notes.append("no intervals: no errors are stated and there are no more equations than parameters")
+        found = [parameter_text(self.names, self, dict.fromkeys(at_bounds, "at its bound"))]
+        found += [f"  {c.line()}" for c in self.combinations]
+        return Answer(sentence(self.describe_rank()), "\n".join(found), notes=tuple(notes))
 
 
 def coverage_factor(dof: float | None) -> float | None:

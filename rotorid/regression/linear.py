@@ -162,9 +162,11 @@ def least_squares(  # noqa: PLR0915
     Examples
     --------
     >>> print(least_squares([[1, 0], [1, 1], [1, 2]], [1.0, 3.1, 4.9], names=["a", "b"]).summary())
-    a = 1.05 ± 0.11 (11 %)   95 %: -0.370597 … 2.4706
-    b = 1.95 ± 0.087 (4.4 %)   95 %: 0.84961 … 3.05039
-    all 2 parameters are determined (condition number 2.81)
+    All 2 parameters are determined (condition number 2.81).
+    <BLANKLINE>
+      parameter  estimate      ±    %  95 %: from       to
+      a              1.05   0.11   11   -0.370597   2.4706
+      b              1.95  0.087  4.4     0.84961  3.05039
     """
     A, y, labels, doubled = _real_problem(K, Y, names)
     m, n = A.shape

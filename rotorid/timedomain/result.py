@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame
-from rotorid.base.text import counted
+from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
 from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.methods.iteration_history import Path
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Fit(Path):
+class Fit(Answered, Path):
     """Parameters of a model in time, fitted to records: the way of the search, and what became of it.
 
     Attributes
@@ -122,20 +125,28 @@ class Fit(Path):
         values = (Column(*pair) for pair in zip(self.parameters, self.history.T, strict=True))
         return frame((Column("iteration", range(1 + self.iterations)), *values, Column("cost", self.costs)))
 
-    def summary(self) -> str:
-        """Text for an engineer: method, values ± standard deviations, intervals, and what to beware of."""
-        lines = self.estimate.summary(self.at_bounds).splitlines()
+    @property
+    def answer(self) -> Answer:
+        """Whether there is an answer, the values with their intervals, and what the model leaves."""
+        own, judged = self.estimate.told(self.at_bounds), self.estimate.describe_rank()
+        said = own.judgement if self.reliable else f"NO intervals, see why. {own.judgement}"
         if not self.converged:  # nothing is said of a place that is no minimum
-            lines = [line for line in lines if line != self.estimate.describe_rank()]
-        if self.estimate.covariance is None and self.estimate.dof > 0:
-            lines = [line for line in lines if not line.startswith("no intervals: ")]
-        lines.insert(0, f"{self.method}, integrator {self.integrator}: {self.message}")
-        lines.append(f"residual rms {self.residual_rms:.4g}")
+            said = "No estimates: the values are where the search stopped."
+        found = [own.found, f"\n  {self.method}, integrator {self.integrator}: {self.message}"]
+        found.append(f"  residual rms {self.residual_rms:.4g}")
+        data = np.concatenate([values for record in self.records for values in record.outputs.values()])
+        if self.reliable and np.nan_to_num(data).any():
+            left = self.residual_rms / float(np.sqrt(np.nanmean(data**2)))
+            said += f"\nThe model leaves {percent(left)} % of the record (rms)."
         if self.errors:
             sizes = ", ".join(f"{name} {size:.3g}" for name, size in self.errors.items())
-            lines.append(f"estimated standard deviations, used as weights: {sizes}")
+            found.append(f"  estimated standard deviations, used as weights: {sizes}")
         for i, m in enumerate(self.minima if len(self.minima) > 1 else ()):
             values = ", ".join(f"{name} = {value:.6g}" for name, value in m.values.items())
-            lines.append(f"minimum {i + 1} ({counted(m.starts, 'start')}): {values}; cost {m.cost:.4g}")
-        said = set(lines)
-        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings if text not in said)])
+            found.append(f"  minimum {i + 1} ({counted(m.starts, 'start')}): {values}; cost {m.cost:.4g}")
+        return Answer(
+            said,
+            "\n".join(found),
+            tuple(w for w in self.warnings if w != judged and not w.startswith(self.message)),
+            own.notes if self.reliable or self.estimate.dof <= 0 else (),
+        )

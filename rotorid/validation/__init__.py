@@ -11,6 +11,7 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rotorid.base.answer import Answer
 from rotorid.base.text import listing, sentence
 from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
 from rotorid.workflows.result_provenance import Outcome, provenance
@@ -63,7 +64,7 @@ class ValidateOptions:
     Attributes
     ----------
     every
-        Every number, not only the sources.
+        Every number, too; with all tables.
     """
 
     every: bool = False
@@ -108,28 +109,41 @@ class Validation(Outcome):
             f"; not computed: {failed}" if failed else ""
         )
 
-    def summary(self) -> str:
-        """Text: a line for each source, then what differs, errata and wide tolerances with their reasons."""
+    @property
+    def answer(self) -> Answer:
+        """Whether every number holds, and what differs; behind it sources, errata and wide tolerances."""
+        said = "Every printed number is met, or is known as an erratum of the print."
+        differ = [r for r in self.rows if r.status == DIFFERS]
+        failed = [
+            f"{group.title}: FAILED, none of its numbers was computed: {group.failure}"
+            for group in self.groups
+            if group.failure
+        ]
+        errata = [r for r in self.rows if r.status == ERRATUM]
+        wide = [r for r in self.rows if r.reason]
+        chapters = (
+            self._sources(),
+            _chapter("Errata of the print", errata, _erratum),
+            _chapter("Tolerances other than half a unit of the last printed digit", wide, _tolerance),
+        )
+        return Answer(
+            f"{said if self.holds else 'NOT every printed number is met.'}\n{self.last_line}.",
+            "\n".join([*failed, *_chapter("Differ", differ, _difference)]),
+            tables=tuple("\n".join(lines) for lines in chapters if lines),
+            more="every source, errata, wide tolerances",
+        )
+
+    def _sources(self) -> list[str]:
+        """A line for each source, and where asked for each number."""
         width = max([len(source) for group in self.groups for source in group.sources()] or [0]) + 2
-        head = f"{'':{width}}{'numbers':>8}{'agree':>8}{'errata':>8}{'differ':>8}   worst agreement"
-        lines = [head]
+        lines = [f"{'':{width}}{'numbers':>8}{'agree':>8}{'errata':>8}{'differ':>8}   worst agreement"]
         for group in self.groups:
             lines.append(group.title)
-            if group.failure:
-                lines.append(f"  FAILED, none of its numbers was computed: {group.failure}")
             for source, rows in group.sources().items():
                 lines.append(_source_line(source, rows, width))
-                if self.every:
-                    lines += [_row_line(r) for r in rows]
-        lines += [
-            "",
-            "Worst agreement: the largest difference among those that agree, in percent of its tolerance.",
-        ]
-        lines += _chapter("Differ", [r for r in self.rows if r.status == DIFFERS], _difference)
-        lines += _chapter("Errata of the print", [r for r in self.rows if r.status == ERRATUM], _erratum)
-        wide = [r for r in self.rows if r.reason]
-        lines += _chapter("Tolerances other than half a unit of the last printed digit", wide, _tolerance)
-        return "\n".join([*lines, "", self.last_line])
+                lines += [_row_line(r) for r in rows] if self.every else []
+        said = "Worst agreement: the largest difference among those that agree, in percent of its tolerance."
+        return [*lines, "", said]
 
     def to_frame(self) -> pd.DataFrame:
         """One row per number, with the group before the columns of `to_dict`."""
@@ -240,7 +254,7 @@ def _chapter(title: str, rows: Sequence[Row], words: Callable[[Sequence[Row]], s
     """A heading and a paragraph for each source and reason."""
     if not rows:
         return []
-    lines = ["", f"{title}:"]
+    lines = [f"{title}:"]
     for own in _by(rows, lambda r: (r.source, r.erratum, r.reason)).values():
         lines += textwrap.wrap(words(own), WIDTH, initial_indent="  ", subsequent_indent="    ")
     return lines

@@ -53,10 +53,6 @@ class CampbellDiagram(Parts):
         peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
         return {"": self.whirl, "operating": self.operating and Separation(peaks, self.operating)}
 
-    def summary(self) -> str:
-        """For the terminal."""
-        return "\n".join(part.summary() for part in self.parts.values() if part is not None)
-
     def figure(self) -> Figure:
         """The Campbell diagram over the logarithmic decrements."""
         from fem.plots import campbell_figure

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.answer import Answer, Answered
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -42,7 +43,7 @@ class CriticalOptions:
 
 
 @dataclass(frozen=True)
-class Separation:
+class Separation(Answered):
     """Critical speeds beside the operating range, all in rad/s."""
 
     speeds: Sequence[float]
@@ -54,11 +55,12 @@ class Separation:
 
         return separation(self.speeds, self.operating)
 
-    def summary(self) -> str:
+    @property
+    def answer(self) -> Answer:
         """In words."""
-        from fem.api684_separation import separation_text
+        from fem.api684_separation import separation_answer
 
-        return separation_text(self.to_dict())
+        return separation_answer(self.to_dict())
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

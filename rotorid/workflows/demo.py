@@ -5,11 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 import shlex
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.suggestions import one_of
 from rotorid.workflows.demo_samples import SAMPLES, Sample
 from rotorid.workflows.input_checks import file_of
@@ -44,10 +46,12 @@ class Samples(Outcome):
         """As JSON types, without the provenance."""
         return {"samples": [{"name": name, "about": one.about} for name, one in self.samples.items()]}
 
-    def summary(self) -> str:
+    @property
+    def answer(self) -> Answer:
         """One line each."""
         width = max(map(len, self.samples))
-        return "\n".join(f"{name:{width}}  {sample.about}" for name, sample in self.samples.items())
+        lines = (f"{name:{width}}  {sample.about}" for name, sample in self.samples.items())
+        return Answer("\n".join(lines))
 
     def to_frame(self) -> pd.DataFrame:
         """One row each."""
@@ -96,7 +100,7 @@ class Demo(Outcome):
         """The heading of each command, and the command."""
         both = zip(self.sample.steps, self.commands, strict=True)
         for number, (step, command) in enumerate(both, start=1):
-            yield f"{number}. {step.title}\n$ {shlex.join(command)}\n", command
+            yield f"{number}. {step.title}\n{_typed(command)}", command
 
     def run(self, command: Callable[[list[str]], Mapping[str, Any]]) -> Demo:
         """The same with the documents that a function gives of the commands, without their provenance."""
@@ -106,9 +110,10 @@ class Demo(Outcome):
         }
         return dataclasses.replace(self, documents=found)
 
-    def summary(self) -> str:
+    @property
+    def answer(self) -> Answer:
         """Where the pictures are."""
-        return "Pictures:\n" + "\n".join(f"  {self.folder / name}" for name in self.sample.pictures)
+        return Answer(f"Pictures: {', '.join(str(self.folder / name) for name in self.sample.pictures)}")
 
     def to_frame(self) -> pd.DataFrame:
         """One row per command."""
@@ -120,6 +125,13 @@ class Demo(Outcome):
                 for step, command in zip(self.sample.steps, self.commands, strict=True)
             ]
         )
+
+
+def _typed(command: list[str]) -> str:
+    """The command after `$`, in lines that a shell joins again."""
+    words = (shlex.quote(word).replace(" ", "\0") for word in command)  # a quoted word is not broken
+    lines = textwrap.wrap(" ".join(words), COLUMNS - 6, break_long_words=False, break_on_hyphens=False)
+    return "$ " + " \\\n    ".join(lines).replace("\0", " ")
 
 
 def samples() -> Samples:

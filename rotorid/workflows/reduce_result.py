@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted
 from rotorid.workflows.option_values import one_of
 from rotorid.workflows.result_provenance import Parts
@@ -75,6 +76,13 @@ class ReducedRotor(Parts):
             "stability": self.stability,
             "small_model": self.small,
         }
+
+    @property
+    def answer(self) -> Answer:
+        """The ranking where it was asked for, before the masses at its compromise."""
+        first = [] if self.placement is None else [self.placement.answer]
+        rest = (part for part in self.parts.values() if part not in (None, self.placement))
+        return together([*first, *(part.answer for part in rest)])
 
     def to_frame(self) -> pd.DataFrame:
         """The ranking where it was asked for, else masses and modes."""

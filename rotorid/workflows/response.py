@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from rotorid.base.rpm import RPM, phase_deg
-from rotorid.base.text import counted
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.result import Column, text
+from rotorid.base.rpm import RPM, phase_deg, rpm_text
+from rotorid.base.text import counted, figures, listing
 from rotorid.workflows.input_checks import file_of, rotor_source
 from rotorid.workflows.option_values import (
     Band,
@@ -27,13 +30,14 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from fem import Peaks, Response, Rotor
+    from fem import Peak, Peaks, Response, Rotor
     from fem.model.sensors import SensorLike
     from fem.response import Unbalance
     from rotorid.base.arrays import FloatArray
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
+_APART = 1.05  # ratio of speeds from which peaks belong to different critical speeds
 
 
 @dataclass(frozen=True)
@@ -107,24 +111,53 @@ class RotorResponse(Outcome):
             "warnings": warnings,
         }
 
-    def summary(self) -> str:
-        """For the terminal: how many speeds were asked for, and what is largest with those between."""
-        lines = [
-            *self.response.summary().splitlines()[:1],
-            *self.finer.summary().splitlines()[1:],
-            "",
-            f"{'sensor':>20} {'largest, µm':>14} {'at rpm':>11}",
-        ]
-        for name, size, speed in self._largest_readings():
-            if size is None or speed is None:
-                lines.append(f"{name:>20} {'none':>14} {'-':>11}")
-            else:
-                lines.append(f"{name:>20} {1e6 * size:14.4g} {speed * RPM:11.1f}")
-        if self.response.rotor.supports:
-            lines += ["", self.finer.bearing_forces().summary()]
-        for name, found in zip(self.labels, self.peaks, strict=False):
-            lines += ["", f"peaks at {name}", found.summary("µm", 1e6)]
-        return "\n".join(lines)
+    @property
+    def answer(self) -> Answer:
+        """The margins, what is largest, a peak of each critical speed; behind it readings and forces."""
+        found = sorted(
+            ((name, peak) for name, own in zip(self.labels, self.peaks, strict=False) for peak in own.peaks),
+            key=lambda one: (one[1].enough is not False, one[1].enough is None, -one[1].amplitude),
+        )
+        near = {round(math.log(peak.speed, _APART)): (name, peak) for name, peak in reversed(found)}
+        chief = sorted(near.values(), key=lambda one: one[1].speed)
+        behind = [self.finer.bearing_forces().summary()] if self.response.rotor.supports else []
+        return Answer(
+            f"{self._judgement([peak for _, peak in chief])}\n{self.finer.highest}",
+            "\n\n".join([*([_peak_table(chief)] if chief else []), self._readings()]),
+            self.response.warnings,
+            tuple(
+                f"peak at {rpm_text(peak.speed)}, {name}: {peak.note}" for name, peak in found if peak.note
+            ),
+            (*behind, _peak_table(found)) if found else tuple(behind),
+            "forces on the supports; the peaks of every reading",
+        )
+
+    def _judgement(self, chief: Sequence[Peak]) -> str:
+        """Whether it runs steadily, and whether the margins are as required."""
+        from fem.response_result import speed_range
+
+        unstable = listing([window.where() for window in self.response.windows], "and")
+        said = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
+        known = [peak for peak in chief if peak.enough is not None]
+        if self.operating is None or not known:
+            asked = f"at {speed_range(self.response.speeds)}, {counted(len(self.sensors), 'reading')}"
+            return f"{said}{counted(len(chief), 'peak') if chief else 'No peak'} {asked}."
+        low, high = self.operating
+        beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
+        near = [rpm_text(peak.speed) for peak in known if not peak.enough]
+        if near:
+            return f"{said}NOT far enough {beside}: critical speed {listing(near, 'and')}."
+        return f"{said}{counted(len(known), 'critical speed')} far enough {beside}."
+
+    def _readings(self) -> str:
+        """The largest reading of each sensor."""
+        names, sizes, speeds = zip(*self._largest_readings(), strict=True)
+        columns = (
+            Column("sensor", names, str),
+            Column("µm", [size and 1e6 * size for size in sizes], figures, "largest reading, µm"),
+            Column("rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, "at rpm"),
+        )
+        return text(columns)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and sensor."""
@@ -219,6 +252,13 @@ class RotorResponse(Outcome):
             "inclination_deg": np.degrees(ellipses.inclination).T.tolist(),
             "direction": [[names[int(way)] for way in row] for row in ellipses.direction.T],
         }
+
+
+def _peak_table(found: Sequence[tuple[str, Peak]]) -> str:
+    from fem.api684_peaks import peak_columns
+
+    names, peaks = zip(*found, strict=True)
+    return text((Column("peak at", names, str), *peak_columns(peaks, "µm", 1e6)), width=COLUMNS)
 
 
 @workflow

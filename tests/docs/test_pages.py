@@ -60,8 +60,8 @@ def test_a_line_that_is_not_printed_in_its_place_is_found(expected, wrong):
 def test_a_wrong_number_on_a_page_is_found(tmp_path, workplace, cli, capsys):
     text = (DOCS / "getting_started" / "rotor.md").read_text(encoding="utf-8")
     page = tmp_path / "wrong.md"
-    page.write_text(text.replace("135.2404       1291.45", "135.2405       1291.45"), encoding="utf-8")
-    with pytest.raises(AssertionError, match=r"not printed: 1 135\.2405"):
+    page.write_text(text.replace("135.2404\n", "135.2405\n"), encoding="utf-8")
+    with pytest.raises(AssertionError, match=r"not printed: 1 forward 1291\.45 21\.5242 135\.2405"):
         run_page(page, workplace, cli, capsys)
 
 

@@ -149,7 +149,7 @@ def test_results_speak():
     found = peaks_of(speeds, damped(0.05), operating=(110.0, 150.0))
     assert "NOT ENOUGH" in found.summary()
     assert "amplitude, µm" in found.summary("µm", 1e6)
-    assert f"{1e6 * found.peaks[0].amplitude:.5g}" in found.summary("µm", 1e6)
+    assert f"{1e6 * found.peaks[0].amplitude:.4g}" in found.summary("µm", 1e6)
     assert len(found.to_frame()) == 1
     assert found.to_dict()["peaks"][0]["enough"] is False
 

@@ -38,11 +38,13 @@ def test_rates_and_results():
     assert document["elements"] == 23
     assert document["relative_error"] == check.errors.tolist()
     assert check.to_frame().shape == (3, 5)
-    assert "error of the mesh (23 elements)" in check.summary()
+    assert check.summary().startswith("The mesh of 23 elements changes these speeds by at most ")
+    worst = 100 * np.abs(check.errors).max()
+    assert f"{worst:.2g} % (critical speed {np.argmax(np.abs(check.errors)) + 1})" in check.summary()
     coarse = fem.mesh_check(
         fem.Rotor([0.5, 0.5], 0.05, supports=[fem.Support(1, 1e8), fem.Support(3, 1e8)]), 3
     )
-    assert "times shorter would bring all errors below 0.1 %" in coarse.summary()
+    assert "times shorter would bring all errors below 0.1 %" in coarse.answer.judgement
 
 
 def test_rigid_motions_have_no_error_and_rounding_no_rate():
@@ -52,7 +54,7 @@ def test_rigid_motions_have_no_error_and_rounding_no_rate():
     fine = fem.mesh_check(uniform(150, supports=[fem.Support(1, 1e8), fem.Support(151, 1e8)]), 1)
     assert math.isnan(fine.rates[0])
     assert fine.to_dict()["rate"] == [None]
-    assert "rounding" in fine.summary()
+    assert "rate (none: rounding)" in fine.answer.whole()
 
 
 def test_cutting_elements_moves_everything_along():

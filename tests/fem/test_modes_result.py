@@ -205,7 +205,7 @@ def test_ignored_inertia_is_said():
     (text,) = fem.critical_speeds(rotor).warnings
     assert "'wheel' at node 3" in text
     assert "ignored" in text
-    assert f"Warning: {text}" in fem.critical_speeds(rotor).summary()
+    assert f"Warning: {text}" in " ".join(fem.critical_speeds(rotor).summary().split())
 
 
 @pytest.mark.parametrize(

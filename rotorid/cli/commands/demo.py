@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from rotorid.base.answer import LINES
 from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination, json_text
 from rotorid.workflows.demo import DemoOptions, samples
@@ -16,7 +17,7 @@ from rotorid.workflows.demo import demo as work
 from rotorid.workflows.demo_samples import SAMPLES
 
 
-@command(to=("json",))
+@command(to=("table", "json"))
 def demo(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
@@ -41,11 +42,34 @@ def demo(
     if to.json:
         typer.echo(json_text(made.run(_document).document))
         return
+    room, left = LINES - 2, len(made.commands)
     for heading, words in made.told():
         typer.echo(heading)
-        _run(words)
-        typer.echo("")
-    typer.echo(made.summary())
+        if to.table:
+            typer.echo("")
+            _run(words)
+            typer.echo("")
+            continue
+        with contextlib.redirect_stdout(io.StringIO()) as text:
+            _run(words)
+        lines = heading.count("\n") + 1
+        said = _beginning(text.getvalue(), max(room // left - lines, 2))
+        typer.echo("\n".join(said))
+        room, left = room - lines - len(said), left - 1
+    typer.echo(made.answer.whole())
+    if not to.table:
+        typer.echo("All that a command says: type it; that all of them say: add --table.")
+
+
+def _beginning(text: str, room: int) -> list[str]:
+    """As many whole paragraphs as there is room for, of the first as many lines."""
+    said: list[str] = []
+    for part in text.split("\n\n"):
+        lines = part.splitlines()
+        if said and len(said) + len(lines) > room:
+            break
+        said += lines[:room]
+    return said
 
 
 def _run(command: list[str]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import typer
 
 from rotorid.cli.common_options import command
@@ -10,7 +12,7 @@ from rotorid.validation import ValidateOptions
 from rotorid.validation import validate as work
 
 
-@command(ValidateOptions, names={"every": ("--all",)}, to=("json", "output"))
+@command(ValidateOptions, names={"every": ("--all",)}, to=("table", "json", "output"))
 def validate(options: ValidateOptions, to: Destination) -> None:
     """Every number that the references print, beside what this program computes now.
 
@@ -22,6 +24,7 @@ def validate(options: ValidateOptions, to: Destination) -> None:
     reason; an erratum of the print has its reason, too. A group that fails is said, the others are
     shown. Exit status 0 if no number differs and no group fails, else 1.
     """
+    to = dataclasses.replace(to, table=to.table or options.every)
     proof = to.deliver("validation", lambda: work(options=options))
     if not proof.holds:
         raise typer.Exit(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,10 +12,12 @@ from numpy.typing import ArrayLike
 import fem
 from fem.critical import critical_speeds_below
 from fem.model.sensors import SensorLike, label
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import phase_deg
+from rotorid.base.rpm import RPM, phase_deg, rpm_text
+from rotorid.base.text import counted, sentence
 from rotorid.reduction.dynamics.instability_threshold import stability_threshold
 from rotorid.reduction.dynamics.small_rotor import SmallRotor, readings
 
@@ -30,7 +33,7 @@ POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseCost:
+class ResponseCost(Answered):
     """Influence coefficients of both models: unbalance at the masses, readings at the masses.
 
     Attributes
@@ -88,28 +91,34 @@ class ResponseCost:
         """Bands around the critical speeds, rad/s."""
         return [(w * (1 - self.bands), w * (1 + self.bands)) for w in self.criticals.tolist()]
 
-    def summary(self) -> str:
+    @property
+    def answer(self) -> Answer:
         """What the reduction costs, in words."""
         used = self.speeds[~self.excluded]
         speed, sensor, plane = self.where
-        lines = [f"Warning: {text}" for text in self.warnings]
-        lines += [
-            f"in the range {used[0]:.6g} to {used[-1]:.6g} rad/s the small model's response at its "
-            f"{len(self.nodes)} masses is within {_percent(self.largest)} of the full rotor's, median "
-            f"{_percent(self.median)}",
-            "  of the largest influence coefficient at the same speed; of the largest in the range within "
-            f"{_percent(self.largest_to_highest)}, median {_percent(self.median_to_highest)}",
-            f"  worst at {speed:.6g} rad/s: reading at node {label(sensor)}, unbalance at node {plane}",
-        ]
         if self.criticals.size:
-            bands = ", ".join(f"{a:.6g} to {b:.6g}" for a, b in self.left_out)
-            lines.append(
-                f"  left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
-                f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands} rad/s)"
+            bands = ", ".join(f"{a * RPM:.6g} to {b * RPM:.6g}" for a, b in self.left_out)
+            left_out = (
+                f"left out: {np.count_nonzero(self.excluded)} of {self.speeds.size} speeds, within "
+                f"±{100 * self.bands:.3g} % of the full rotor's critical speeds ({bands} rpm)"
             )
         else:
-            lines.append("  no critical speed of the full rotor lies near the range; no band is left out")
-        return "\n".join(lines)
+            left_out = "no critical speed of the full rotor lies near the range; no band is left out"
+        details = (
+            "the difference is in percent of the largest influence coefficient at the same speed; of the "
+            f"largest in the range it is within {_percent(self.largest_to_highest)}, median "
+            f"{_percent(self.median_to_highest)}",
+            f"worst at {rpm_text(speed)}: reading at node {label(sensor)}, unbalance at node {plane}",
+            left_out,
+        )
+        return Answer(
+            f"From {used[0] * RPM:.6g} to {rpm_text(used[-1])} the small model's response at its "
+            f"{counted(len(self.nodes), 'mass', 'masses')} is within {_percent(self.largest)} of the full "
+            f"rotor's, median {_percent(self.median)}.",
+            warnings=self.warnings,
+            tables=("\n".join(fill(sentence(text), COLUMNS, subsequent_indent="  ") for text in details),),
+            more="where the response differs most",
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane."""

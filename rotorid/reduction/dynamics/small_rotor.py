@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 import fem
 from fem.matrices.lateral_planes import Quadratic, both_planes, project
 from fem.state_space import StateSpace, state_space
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.text import counted
@@ -45,7 +46,7 @@ _INFINITE = 1e13  # response times largest stiffness, per unit force: beyond, on
 
 
 @dataclass(frozen=True, eq=False)
-class SmallRotor:
+class SmallRotor(Answered):
     """Masses at some nodes of a rotor; made by `small_rotor`.
 
     Attributes
@@ -219,21 +220,17 @@ class SmallRotor:
         positions = self.rotor.positions[np.array(self.nodes) - 1]
         return pd.DataFrame({"node": self.nodes, "position_m": positions, "mass_kg": self.masses})
 
-    def summary(self) -> str:
-        """The model as text."""
-        lines = [f"Warning: {text}" for text in self.warnings]
-        lines.append(f"{counted(len(self.nodes), 'mass', 'masses')} on a massless shaft, both planes")
-        lines += [
-            f"  node {node:>3}  at {self.rotor.positions[node - 1]:7.3f} m   {mass:10.3f} kg"
-            for node, mass in zip(self.nodes, self.masses, strict=True)
-        ]
+    @property
+    def answer(self) -> Answer:
+        """Where its masses and supports stand."""
+        said = f"{counted(len(self.nodes), 'mass', 'masses')} on a massless shaft, both planes"
         alone = self.kept[len(self.nodes) :]
         if alone:
-            lines.append(f"  supports without mass at node {', '.join(map(str, alone))}")
+            said += f"; supports without mass at node {', '.join(map(str, alone))}"
         if self.modal_damping:
             ratios = ", ".join(f"{100 * ratio:.3g} %" for ratio in self.modal_damping)
-            lines.append(f"  damping ratios of the first modes of each plane: {ratios}")
-        return "\n".join(lines)
+            said += f"; damping ratios of the first modes of each plane: {ratios}"
+        return Answer(f"{said}.", warnings=self.warnings)
 
     def _at(self, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
         D, K = self.quadratic.at(speeds)

@@ -14,8 +14,10 @@ from fem.orbits import DIRECTION_NAMES
 from fem.solvers.reduced_whirl import Whirl, solve_whirl
 from fem.stability import least_damped, range_of_speeds
 from fem.whirl import available_modes, checked_number
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.json import plain
-from rotorid.base.text import counted
+from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.text import counted, sentence
 from rotorid.reduction.dynamics.instability_threshold import STEPS, stability_threshold, threshold_of
 from rotorid.reduction.dynamics.response_comparison import without_modal_damping
 from rotorid.reduction.dynamics.small_rotor_whirl import whirl_of
@@ -24,7 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.rpm import RPM
 from rotorid.reduction.dynamics.small_rotor import SmallRotor
 
 __all__ = ["StabilityCost", "compare_stability", "stability_threshold"]
@@ -45,7 +46,7 @@ UNDAMPED = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityCost:
+class StabilityCost(Answered):
     """Stability of the small model over speed beside the full rotor's.
 
     Attributes
@@ -96,17 +97,16 @@ class StabilityCost:
             return None
         return self.small.threshold / self.full.threshold - 1.0
 
-    def summary(self) -> str:
+    @property
+    def answer(self) -> Answer:
         """What the reduction costs, in words and a table."""
-        lines = [f"Warning: {text}" for text in self.warnings]
-        lines.append(self._verdict())
-        lines.append(f"{'':28}{'full rotor':>14}{counted(len(self.nodes), 'mass', 'masses'):>14}")
+        lines = [f"{'':28}{'full rotor':>14}{counted(len(self.nodes), 'mass', 'masses'):>14}"]
         both = (self.full, self.small)
-        rpm = [None if each.threshold is None else each.threshold * RPM for each in both]
         rows = (
             ("status", [each.status for each in both]),
+            ("threshold, rpm", [_text(each.threshold and each.threshold * RPM, 7) for each in both]),
             ("threshold, rad/s", [_text(each.threshold, 7) for each in both]),
-            ("threshold, rpm", [_text(speed, 7) for speed in rpm]),
+            ("whirl frequency, rpm", [_text(each.frequency and each.frequency * RPM, 7) for each in both]),
             ("whirl frequency, rad/s", [_text(each.frequency, 7) for each in both]),
             ("whirl by running speed", [_text(each.whirl_ratio, 5) for each in both]),
             ("direction", [_way(each.direction) for each in both]),
@@ -114,15 +114,18 @@ class StabilityCost:
             ("modes watched", [str(self.n_full), str(self.n_small)]),
         )
         lines += [f"{label:28}{a:>14}{b:>14}" for label, (a, b) in rows]
-        return "\n".join(lines)
+        said, table = sentence(self._verdict()), "\n".join(lines)
+        return Answer(said, warnings=self.warnings, tables=(table,), more="both thresholds of stability")
 
     def _verdict(self) -> str:
-        where = f"from {self.speeds[0]:.6g} to {self.speeds[-1]:.6g} rad/s"
+        where = f"from {range_text(self.speeds[0], self.speeds[-1])}"
+        begin = rpm_text(self.speeds[0])
         difference = self.relative_difference
         if difference is not None:
+            small, full = (rpm_text(each.threshold or 0.0) for each in (self.small, self.full))
             return (
-                f"the small model loses stability at {self.small.threshold:.6g} rad/s, the full rotor at "
-                f"{self.full.threshold:.6g} rad/s: {100 * difference:+.3g} %"
+                f"the small model loses stability at {small}, the full rotor at {full}: "
+                f"{100 * difference:+.3g} %"
             )
         if self.full.status == self.small.status == "stable":
             known = [a for a in (self.full_decrement, self.small_decrement) if np.isfinite(a).any()]
@@ -130,13 +133,10 @@ class StabilityCost:
                 return f"no damping acts on either model {where}: no motion grows, and none decays"
             return f"both models are stable {where}"
         if self.full.status == self.small.status:
-            return f"both models are unstable already at {self.speeds[0]:.6g} rad/s"
-        words = {
-            "stable": f"is stable {where}",
-            "unstable": f"is unstable already at {self.speeds[0]:.6g} rad/s",
-        }
+            return f"both models are unstable already at {begin}"
+        words = {"stable": f"is stable {where}", "unstable": f"is unstable already at {begin}"}
         full, small = (
-            words.get(each.status, f"loses stability at {each.threshold or 0.0:.6g} rad/s")
+            words.get(each.status, f"loses stability at {rpm_text(each.threshold or 0.0)}")
             for each in (self.full, self.small)
         )
         return f"the models disagree: the full rotor {full}, the small model {small}"

@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
+from rotorid.base.result import Column, text
+from rotorid.base.rpm import RPM
 
 
 @dataclass(frozen=True, eq=False)
-class Shift:
+class Shift(Answered):
     """What given changes of the inputs do; unpacks as `masses, frequencies` (first order).
 
     Attributes
@@ -49,21 +52,21 @@ class Shift:
             }
         )
 
-    def summary(self) -> str:
-        """Text: what each mass and frequency changes by, predicted and recomputed."""
+    @property
+    def answer(self) -> Answer:
+        """What each mass and frequency changes by, predicted and recomputed."""
+        masses = ", ".join(f"{change:+.4g}" for change in self.exact_masses)
+        speeds = ", ".join(f"{change * RPM:+.4g}" for change in self.exact_frequencies)
+        said = f"The changed inputs move the masses by {masses} kg and the frequencies by {speeds} rpm."
         n = len(self.masses)
-        predicted, exact = (*self.masses, *self.frequencies), (*self.exact_masses, *self.exact_frequencies)
-        rows = [
-            f"{label:<8} {first:+10.4g} {now:+10.4g} {unit}"
-            for label, first, now, unit in zip(labels(n), predicted, exact, units(n), strict=True)
-        ]
-        return "\n".join(
-            [
-                f"{'change':<8} {'predicted':>10} {'exact':>10}",
-                *rows,
-                *(f"Warning: {w}" for w in self.warnings),
-            ]
+        columns = (
+            Column("change", labels(n), str),
+            Column("predicted", (*self.masses, *self.frequencies), "{:+.4g}".format),
+            Column("exact", (*self.exact_masses, *self.exact_frequencies), "{:+.4g}".format),
+            Column("unit", units(n), str, ""),
         )
+        more = "these changes by first order"
+        return Answer(said, warnings=self.warnings, tables=(text(columns),), more=more)
 
 
 def labels(n: int) -> list[str]:

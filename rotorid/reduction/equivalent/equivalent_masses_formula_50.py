@@ -12,13 +12,13 @@ depend on how large the rows are: how each shape is scaled and how each row is w
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.regression import Estimate, least_squares
@@ -196,9 +196,10 @@ class BoundedEstimate(Estimate):
             "choose others",
         )
 
-    def summary(self, at_bounds: Sequence[str] = ()) -> str:
-        """Text: masses ± standard deviations, and those at the bound."""
-        return super().summary((*self.at_bounds, *at_bounds))
+    @property
+    def answer(self) -> Answer:
+        """Masses ± standard deviations, and those at the bound."""
+        return self.told(self.at_bounds)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; the keys of an estimate, `at_bounds` and `warnings`."""

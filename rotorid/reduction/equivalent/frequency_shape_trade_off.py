@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 import fem
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, FloatArray, IndexArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, numbered, rows
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class TradeOff:
+class TradeOff(Answered):
     """Alternative masses at the same nodes: rows r, each an n-mass model with the same compliance.
 
     Attributes
@@ -116,45 +116,55 @@ class TradeOff:
             }
         )
 
-    def summary(self) -> str:
-        """Text for an engineer: two lines per alternative, and the trap in words."""
-        lines = [f"Warning: {w}" for w in self.warnings]
-        masses, at = counted(len(self.nodes), "mass", "masses"), "node" if len(self.nodes) == 1 else "nodes"
-        lines.append(f"{masses} at {at} {', '.join(map(str, self.nodes))}")
+    @property
+    def answer(self) -> Answer:
+        """Which alternative to take, and the trap in words; behind it a few lines per alternative."""
+        lines = []
         for r, name in enumerate(self.names):
             lines.append(f"{name}: " + ", ".join(f"{m:.2f}" for m in self.masses[r]) + " kg")
             errors = "  ".join(_cell(round(100 * e, 4) + 0.0, "+10.4f") for e in self.relative_error[r])
             lines.append(f"    error, %  {errors}")
             lines.append("    MAC       " + "  ".join(_cell(value, "10.4f") for value in self.mac[r]))
-        lines.append(fill(self._verdict(), 110))
-        return "\n".join(lines)
+        return Answer(
+            self._verdict(),
+            warnings=self.warnings,
+            notes=self._trap(),
+            tables=("\n".join(lines),),
+            more="each alternative of masses",
+        )
 
-    def _verdict(self) -> str:
+    def _trap(self) -> tuple[str, ...]:
+        """What frequencies alone lead to."""
         n, count = len(self.nodes), int(self.matching.sum())
         if n == 1:
-            return "One mass has no shape to compare: its MAC is always 1."
+            return ()
         if not self.complete:
-            text = f"Masses that match all frequencies are searched for up to {MOST} masses only. "
+            said = f"masses that match all frequencies are searched for up to {MOST} masses only"
         elif not count:
-            text = f"No set of positive masses at these nodes has all {n} frequencies. "
+            said = f"no set of positive masses at these nodes has all {n} frequencies"
         else:
-            text = (
+            said = (
                 f"{counted(count, 'different set')} of masses {'has' if count == 1 else 'have'} the rotor's "
-                f"{n} frequencies exactly. Frequencies alone are a trap: they do not say where the mass is. "
+                f"{n} frequencies exactly: frequencies alone are a trap, they do not say where the mass is"
             )
         if self.traps.size:
             told = "; ".join(f"{self.names[r]} has MAC {self._worst(r)}" for r in self.traps)
-            text += f"Do not use {'this one' if self.traps.size == 1 else 'these'}: {told}. "
+            said += f". Do not use {'this one' if self.traps.size == 1 else 'these'}: {told}"
+        return (said,)
+
+    def _verdict(self) -> str:
+        if len(self.nodes) == 1:
+            return "One mass has no shape to compare: its MAC is always 1."
         physical = np.flatnonzero((self.masses > 0).all(axis=1))
         if not physical.size:
-            return text + "No model here has positive masses: choose other nodes."
+            return "No model here has positive masses: choose other nodes."
         best = int(physical[self.mac[physical].min(axis=1).argmax()])
         if self.mac[best].min() < ALIKE:
-            return text + (
-                f"None of these models moves like the rotor in all {n} modes (the closest has MAC "
-                f"{self._worst(best)}): choose other nodes, such as by rank_nodes."
+            return (
+                f"None of these models moves like the rotor in all {len(self.nodes)} modes (the closest has "
+                f"MAC {self._worst(best)}): choose other nodes, such as by rank_nodes."
             )
-        return text + (
+        return (
             f"Closest in shape: {self.names[best]}, smallest MAC {self._worst(best)}, largest frequency "
             f"error {100 * np.abs(self.relative_error[best]).max():.2f} %."
         )

@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM
+from rotorid.base.text import error_figures
 from rotorid.reduction.equivalent.changed_inputs import Shift, labels, units
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
 from rotorid.reduction.equivalent.mass_sensitivity import (
@@ -41,7 +44,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class MassUncertainty:
+class MassUncertainty(Answered):
     """Equivalent masses and frequencies of the small model with what stated input errors do to them.
 
     Attributes
@@ -176,33 +179,35 @@ class MassUncertainty:
             }
         )
 
-    def summary(self) -> str:
-        """Text: value ± std, and the inputs that make up most of each variance."""
-        n, lines = len(self.masses), []
-        values = np.concatenate((self.masses, self.frequencies))
-        std = np.concatenate((self.masses_std, self.frequencies_std))
+    @property
+    def answer(self) -> Answer:
+        """What the errors do to masses and frequencies; behind it the inputs that make up most of each."""
+        n, first = len(self.masses), np.array((self.masses_std, self.frequencies_std))
+        masses, speeds = first if self.drawn is None else self.drawn
+        known = (", ".join(map(error_figures, row)) for row in (masses, speeds * RPM))
+        said = "By the stated errors the masses are ± {} kg, the frequencies ± {} rpm".format(*known)
+        if lost := [
+            label for label, size in zip(labels(n), (*masses, *speeds), strict=True) if np.isnan(size)
+        ]:
+            said += (
+                ". Some of the drawn inputs give masses that are not positive, and then no "
+                f"{lost[0]}: these errors do not determine {', '.join(lost)}"
+            )
         parts = {name: part.ravel() for name, part in self.contributions.items()}
-        for q, (label, unit) in enumerate(zip(labels(n), units(n), strict=True)):
-            if not np.isfinite(values[q]):
-                lines.append(f"{label:<6} does not vibrate")
-                continue
-            text = f"{label:<6} = {values[q]:.6g} ± {std[q]:.2g} {unit}"
-            if values[q]:
-                text += f" ({100 * std[q] / abs(values[q]):.2g} %)"
+        shares = []
+        for q, std in enumerate(first.ravel()):
             top = sorted(parts, key=lambda name: -parts[name][q])[:3]
-            shares = [(name, 100 * parts[name][q] / std[q] ** 2) for name in top] if std[q] > 0 else []
-            said = ", ".join(f"{name} {share:.0f} %" for name, share in shares if share >= 1)
-            lines.append(text + (f"   of the variance: {said}" if said else ""))
-        if self.drawn is not None:
-            half = list(zip(labels(n), self.drawn.ravel(), units(n), strict=True))
-            known = [f"{label} ± {value:.2g} {unit}" for label, value, unit in half if np.isfinite(value)]
-            lines.append(f"drawn inputs instead of first order: {', '.join(known)}")
-            if lost := [label for label, value, _ in half if not np.isfinite(value)]:
-                lines.append(
-                    f"  some of the drawn inputs give masses that are not positive, and then no {lost[0]}: "
-                    f"these errors do not determine {', '.join(lost)}"
-                )
-        return "\n".join([*lines, *(f"warning: {text}" for text in self.warnings)])
+            known_parts = [(name, 100 * parts[name][q] / std**2) for name in top] if std > 0 else []
+            shares.append(", ".join(f"{name} {share:.0f} %" for name, share in known_parts if share >= 1))
+        columns = (
+            Column("quantity", labels(n), str, ""),
+            Column("value", (*self.masses, *self.frequencies), "{:.6g}".format),
+            Column("std", first.ravel(), error_figures, "±"),
+            Column("unit", units(n), str, ""),
+            Column("shares", shares, str, "of the variance"),
+        )
+        more = "which inputs make up the errors"
+        return Answer(f"{said}.", warnings=self.warnings, tables=(text(columns),), more=more)
 
 
 def mass_uncertainty(

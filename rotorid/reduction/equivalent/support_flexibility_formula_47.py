@@ -21,9 +21,10 @@ from numpy.typing import ArrayLike
 
 import fem
 from fem.matrices.banded_matrices import assemble, held, rounding_error
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray, IndexArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, text
 from rotorid.reduction.equivalent.plane_at_rest import mass_nodes
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Separated:
+class Separated(Answered):
     """Compliance at masses as that of the shaft plus that of two supports.
 
     Attributes
@@ -65,17 +66,18 @@ class Separated:
         c1, c2 = _stiffness(stiffness)
         return separated_compliance(self.delta, self.positions, self.span, c1, c2)
 
-    def summary(self) -> str:
-        """Text: share of the supports in a force at each mass, and its own flexibility δ."""
+    @property
+    def answer(self) -> Answer:
+        """Share of the supports in a force at each mass, and its own flexibility δ."""
         a, b = self.supports
-        lines = [f"supports at nodes {a} and {b}, {self.span:.6g} m apart"]
-        for i, node in enumerate(self.nodes):
-            left, right = self.fractions[i]
-            lines.append(
-                f"mass at node {node}: {100 * left:.4g} % on node {a}, {100 * right:.4g} % on node {b}; "
-                f"shaft on rigid supports {self.delta[i, i]:.6g} m/N"
-            )
-        return "\n".join(lines)
+        columns = (
+            Column("node", self.nodes, str, "mass at node"),
+            Column("a", 100 * self.fractions[:, 0], "{:.4g}".format, f"% on node {a}"),
+            Column("b", 100 * self.fractions[:, 1], "{:.4g}".format, f"% on node {b}"),
+            Column("delta", np.diag(self.delta), "{:.6g}".format, "shaft on rigid supports, m/N"),
+        )
+        said = f"The shaft apart from its supports at nodes {a} and {b}, {self.span:.6g} m apart."
+        return Answer(said, tables=(text(columns),), more="shares of the supports")
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""

@@ -276,8 +276,7 @@ def test_the_readme_shows_what_the_command_prints(cli, monkeypatch):
     command, shown = re.search(r"```\nrotorid (fit .*?)\n.*?```text\n(.*?)```", README, re.DOTALL).groups()
     monkeypatch.chdir(ROOT)
     outcome = cli(*[word for word in command.split() if word not in ("--plot", "run_down.png")])
-    lines = [line for line in shown.splitlines() if "±" in line]
-    assert lines == [line for line in outcome.out.splitlines() if "±" in line]
+    assert shown.rstrip("\n") in outcome.out
 
 
 def test_the_model_file_of_the_readme(cli, tmp_path):

@@ -86,7 +86,7 @@ def test_nothing_is_taken_from_a_window(cli, window):
     assert {row["amplitude_m"] for row in document["largest"]} == {None}
     assert document["bearing_forces"]["largest_N"] == [None] * 3
     text = cli(*inside).out
-    assert "no steady response at any of these speeds" in text
+    assert "No steady response at any of these speeds." in text
     assert "from the first speed, 150 rad/s" in text
     orbits = ("--view", "orbits", "--plot", window / "o.png")
     assert "no orbit to draw" in cli(*inside, *orbits).err

@@ -1,5 +1,7 @@
 """From combinations back to parameters: the singular exercises, several solutions, none, null spaces."""
 
+import re
+
 import numpy as np
 import pytest
 from harmonic_cases import FEEDBACK, PUMP, ROTOR
@@ -50,7 +52,8 @@ def test_41_in_words():
     assert document["parameters"]["c"]["value"] == pytest.approx(1e5, rel=1e-9)
     assert document["parameters"]["b"] == {"value": None, "std": None, "ci95": None}
     assert document["combinations"]["b*(1 - delta)"]["value"] == pytest.approx(5000, rel=1e-9)
-    assert "b             = not determined by these data" in found.summary()
+    assert found.summary().startswith("Only c and b*(1 - delta) are determined; ")
+    assert re.search(r"^  b +not determined$", found.summary(), re.MULTILINE)
 
 
 @pytest.mark.parametrize(

@@ -317,12 +317,14 @@ def test_a_formula_that_is_right_again_agrees_again():
 
 
 def test_the_summary_has_a_line_for_each_source_and_every_reason(proof):
-    text = proof.summary()
+    text = proof.answer.whole()
     lines = text.splitlines()
     n = proof.counts
-    assert lines[-1] == (
-        f"{len(proof.rows)} numbers: {n['agrees']} agree, {n['erratum']} errata, {n['differs']} differ"
-    )
+    assert lines[:2] == [
+        "Every printed number is met, or is known as an erratum of the print.",
+        f"{len(proof.rows)} numbers: {n['agrees']} agree, {n['erratum']} errata, {n['differs']} differ.",
+    ]
+    assert proof.summary().splitlines()[:2] == lines[:2]
     for r in proof.rows:
         assert any(line.startswith(f"  {r.source} ") for line in lines)
     flat = " ".join(text.split()).lower()
@@ -331,18 +333,20 @@ def test_the_summary_has_a_line_for_each_source_and_every_reason(proof):
         assert " ".join(r.reason.lower().split()) in flat
     assert max(map(len, lines)) <= 110
     assert "Differ:" not in text
-    shown = dataclasses.replace(proof, every=True).summary()
+    shown = dataclasses.replace(proof, every=True).answer.whole()
     assert all(r.quantity in shown for r in proof.rows)
     assert len(shown.splitlines()) == len(lines) + len(proof.rows)
 
 
 def test_numbers_that_differ_are_all_named():
     rows = tuple(row("a source", f"number {i}", "1.0", 2.0 + i) for i in range(20))
-    text = Validation(groups=(Group("one", "One group", rows),), provenance={}).summary()
+    text = Validation(groups=(Group("one", "One group", rows),), provenance={}).answer.whole()
     assert all(
         f"number {i}: printed 1.0, computed {2.0 + i:.5g}" in " ".join(text.split()) for i in range(20)
     )
-    assert text.endswith("20 numbers: 0 agree, 0 errata, 20 differ")
+    assert text.startswith(
+        "NOT every printed number is met.\n20 numbers: 0 agree, 0 errata, 20 differ.\n\nDiffer:\n"
+    )
 
 
 def test_documents_and_frames_hold_every_row(proof):
@@ -388,7 +392,7 @@ def test_a_group_that_fails_is_said_and_the_others_are_shown(cli, monkeypatch):
     assert not found.holds
     assert [group.failure for group in found.groups] == ["KeyError: 'a table is gone'", ""]
     assert found.groups[1].rows == tuple(rotor.rows())
-    assert "FAILED, none of its numbers was computed: KeyError: 'a table is gone'" in found.summary()
+    assert "FAILED, none of its numbers was computed: KeyError: 'a table is gone'" in found.answer.found
     assert found.last_line.endswith("differ; not computed: 'masses'")
     outcome = cli("validate", "--json")
     assert outcome.code == 1

@@ -11,7 +11,8 @@ def test_files_are_written_and_commands_told(tmp_path, cli):
         str(path) for path in (tmp_path / "d").rglob("*") if path.is_file()
     }
     assert document["provenance"]["options"] == {"sample": "identification"}
-    assert [heading.splitlines()[1] for heading, _ in made.told()] == [f"$ {c}" for c in document["commands"]]
+    typed = [heading.partition("\n")[2].replace(" \\\n    ", " ") for heading, _ in made.told()]
+    assert typed == [f"$ {command}" for command in document["commands"]]
     assert made.to_frame()["command"].tolist() == document["commands"]
     ran = made.run(lambda words: {"words": words, "provenance": None}).to_dict()
     assert [ran[step.key] for step in made.sample.steps] == [{"words": words} for words in made.commands]

@@ -371,7 +371,6 @@ def test_document_frame_and_text(rotor, reduction):
     np.testing.assert_array_equal(frame["mass_kg"], small.masses)
     np.testing.assert_allclose(frame["position_m"], rotor.positions[[6, 11, 17]])
     text = small.summary()
-    assert "134.203 kg" in text
     assert "supports without mass at node 2, 22" in text
     assert "2 %" in text
     assert small.warnings == ()

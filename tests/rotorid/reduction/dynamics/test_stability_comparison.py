@@ -150,7 +150,7 @@ def test_cross_coupling_at_the_limit(factor, status):
     q = factor * damping * CRITICAL
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), damping, kind="seal")), 500.0)
     assert cost.full.status == cost.small.status == status
-    assert ("both models are stable" in cost.summary()) == (status == "stable")
+    assert ("Both models are stable" in cost.summary()) == (status == "stable")
 
 
 @pytest.mark.parametrize("part", [0.3, 0.5, 0.8])
@@ -167,7 +167,7 @@ def test_cross_coupling_that_grows_with_speed(part):
         assert found.whirl_ratio == pytest.approx(part, rel=1e-6)
         assert found.direction == 1
     assert cost.relative_difference == pytest.approx(0.0, abs=1e-10)
-    assert f"{part:.5g}" in cost.summary()
+    assert f"{part:.5g}" in cost.answer.whole()
 
 
 def test_split_stiffness_with_cross_coupling():
@@ -312,7 +312,10 @@ def test_undamped_is_not_unstable():
     assert cost.full.status == cost.small.status == "stable"
     assert cost.small_threshold is None
     assert cost.relative_difference is None
-    assert "no damping acts on either model from 0 to 1000 rad/s" in cost.summary()
+    assert cost.answer.judgement == (
+        "No damping acts on either model from 0 to 9549.3 rpm (0 to 1000 rad/s): no motion grows, and none "
+        "decays."
+    )
 
 
 def test_unstable_from_the_start():
@@ -320,7 +323,7 @@ def test_unstable_from_the_start():
     cost = compare_stability(jeffcott(fem.Support(2, ((0, q), (-q, 0)), 10.0, kind="seal")), 500.0)
     assert cost.small.status == "unstable"
     assert cost.small.direction == 1
-    assert "both models are unstable already at 0 rad/s" in cost.summary()
+    assert "Both models are unstable already at 0 rpm" in cost.summary()
     away = stability_threshold(jeffcott(fem.Support(2, -2 * STIFFNESS, 10.0, kind="seal")), 500.0)
     assert (away.status, away.mode) == ("unstable", None)
 
@@ -337,8 +340,8 @@ def test_disagreement_is_said():
     calm = small_rotor(rotor, (7, 12, 18), [89.0, 196.0, 198.0], modal_damping=(0.3, 0.3, 0.3))
     second = dataclasses.replace(first, small=stability_threshold(calm, 500.0))
     assert second.small.status == "stable"
-    assert "the models disagree: the full rotor is unstable already at 0 rad/s" in second.summary()
-    assert "the small model is stable from 0 to 500 rad/s" in second.summary()
+    assert "The models disagree: the full rotor is unstable already at 0 rpm" in second.summary()
+    assert "the small model is stable from 0 to 4774.65 rpm" in second.answer.judgement
 
 
 def test_other_mode_is_said():
@@ -347,7 +350,7 @@ def test_other_mode_is_said():
     rotor = jeffcott(fem.Support(2, 0.0, 20.0), material=material).rotor
     cost = compare_stability(small_rotor(rotor, (2,), [2 * MASS]), 900.0)
     assert "not the same mode" in " ".join(cost.warnings)
-    assert cost.summary().startswith("Warning: the full rotor loses stability with whirl at")
+    assert "\nWarning: the full rotor loses stability with whirl at" in cost.summary()
 
 
 def test_full_threshold_is_checked(monkeypatch):
@@ -423,8 +426,9 @@ def test_outputs():
     frame = cost.to_frame()
     assert frame.small_log_decrement.to_numpy() == pytest.approx(cost.small_decrement)
     assert len(frame) == 10
-    text = cost.summary()
+    text = cost.answer.whole()
     assert f"{cost.small_threshold:.7g}" in text
+    assert f"loses stability at {cost.small_threshold * 30 / np.pi:.6g} rpm" in cost.answer.judgement
     assert "forward" in text
     assert not cost.small_decrement.flags.writeable
 
