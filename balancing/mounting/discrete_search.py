@@ -81,7 +81,14 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
 
 
 def search(
-    form: Form, sets: Sequence[Attainable], squares: Squares, start: Found, until: float, chunk: int = 4096
+    form: Form,
+    sets: Sequence[Attainable],
+    squares: Squares,
+    start: Found,
+    until: float,
+    chunk: int = 4096,
+    pieces: int | None = None,
+    least: Sequence[int] = (),
 ) -> float:
     """Improve `start` until nothing better can exist, or the time (`time.perf_counter`) is `until`.
 
@@ -99,13 +106,16 @@ def search(
         When to stop.
     chunk
         How many objectives are asked for at a time.
+    pieces, least
+        Of all planes together at most; of each plane at least, in the order of the form. None: any number.
 
     Returns
     -------
     The lowest bound of what was not looked at, infinite if nothing was left out.
     """
     run = _Run(form, sets, squares, start, until, chunk)
-    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
+    run.below = np.cumsum([0, *least], dtype=np.int64)
+    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound, pieces)
 
 
 class _Run:
@@ -124,17 +134,18 @@ class _Run:
         """Squares from here on are no gain."""
         return self.best.square * (1 - _ROUNDING)
 
-    def descend(self, k: int, D: ComplexArray, bound: float) -> float:
+    def descend(self, k: int, D: ComplexArray, bound: float, pieces: int | None) -> float:
         """Look at everything below a node with planes k+1 … fixed; lowest bound of what was left out.
 
-        `bound` counts the planes fixed exactly and m of the others.
+        `bound` counts the planes fixed exactly and m of the others; `pieces` are left for these.
         """
+        here = None if pieces is None else pieces - int(self.below[k])
         c, size, shift = self._centre(k, D)
         # |R|²|d − c|² + linear(d) = |R|²|d − z|² + shift
         base = bound - self.form.m[k] + shift
         everything = 2 * self.sets[k].reach + abs(c)
         low, left = apart(self.sets[k], c), np.inf
-        known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST))
+        known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST)) if here is None else everything
         while True:
             needed = everything
             if np.isfinite(self.best.square):
@@ -149,14 +160,14 @@ class _Run:
             if time.perf_counter() > self.until:
                 return min(left, float(max(bound, base + size * inner**2)))
             radius = min(max(known, 1e-9 * everything), needed)
-            hit = self.sets[k].near(c, low, radius, MOST)
+            hit = self.sets[k].near(c, low, radius, MOST, pieces=here)
             if hit is None:
                 thinner = inner + (radius - inner) / 4
                 if thinner - inner < 1e-9 * everything or not thinner < radius:
                     return min(left, float(max(bound, base + size * inner**2)))
                 known = thinner
                 continue
-            left = min(left, self._ring(k, D, c, base, size, hit))
+            left = min(left, self._ring(k, D, c, base, size, hit, pieces))
             low = radius
             count = len(hit[0])
             known = inner + (radius - inner) * (2.0 if count < 200 else 1.3) if inner else radius * 2
@@ -181,6 +192,7 @@ class _Run:
         base: float,
         size: float,
         hit: tuple[ComplexArray, IntArray],
+        pieces: int | None,
     ) -> float:
         """Look below the vectors of one ring, nearest first."""
         points, keys = hit
@@ -193,13 +205,15 @@ class _Run:
                 self._leaves(D, points[part], keys[part], bounds[part])
             return np.inf
         left = np.inf
+        used = np.zeros(len(keys), dtype=np.int64) if pieces is None else self.sets[k].pieces(keys)
         for n, (point, key, bound) in enumerate(zip(points, keys, bounds, strict=True)):
             if bound > self.target:
                 break  # the others are further away
             if n and time.perf_counter() > self.until:
                 return min(left, float(bound))
             D[k], self.keys[k] = point, key
-            left = min(left, self.descend(k - 1, D, float(bound)))
+            rest = None if pieces is None else pieces - int(used[n])
+            left = min(left, self.descend(k - 1, D, float(bound), rest))
         return left
 
     def _leaves(self, D: ComplexArray, points: ComplexArray, keys: IntArray, bounds: FloatArray) -> None:

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from balancing.data.limits import Limits
 from balancing.mounting.discrete_bounds import best_form, form, project_out, relax
 from balancing.mounting.discrete_search import Found, polish, search
+from balancing.mounting.fewest_pieces import fewest
 from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
 from balancing.mounting.mountable_vectors import Attainable, nearest
@@ -35,6 +36,8 @@ __all__ = ["Discrete", "solve_discrete"]
 
 _KEPT = 1 + 1e-9
 _SHARP = 1e-9
+_SAME = 1e-9
+"""What is left counts as nothing below this share of what vibrates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,9 @@ class Discrete:
     rounded_objective
         Of the continuous answer rounded plane by plane to the nearest attainable vectors; infinite where that
         breaks a limit.
+    best
+        The best choice, where this one is of fewer pieces: `bound` and `gap` are then its own, and `proven`
+        says as well that no fewer pieces are within reach, and none of so many is better. None: this one.
     """
 
     mountings: tuple[Mounting | None, ...]
@@ -66,6 +72,12 @@ class Discrete:
     gap: float
     proven: bool
     rounded_objective: float
+    best: Discrete | None = None
+
+    @property
+    def pieces(self) -> int:
+        """How many pieces all planes take together; free amounts do not count."""
+        return sum(int(one.counts.sum()) for one in self.mountings if one is not None)
 
 
 def solve_discrete(
@@ -78,8 +90,9 @@ def solve_discrete(
     limits: Limits | None = None,
     time_limit: float = 5.0,
     names: Sequence[str] = (),
+    within: float = 1.0,
 ) -> Discrete:
-    """The mounting of all planes that leaves the least vibration.
+    """The mounting of all planes that leaves the least vibration, or little more with fewer pieces.
 
     Parameters
     ----------
@@ -95,9 +108,12 @@ def solve_discrete(
         Largest amplitudes (S·C = N, speed by speed), largest weights of the planes (of what is mounted and
         added together) and arcs in which no hole is used.
     time_limit
-        s; what is found until then is returned with its gap.
+        s; what is found until then is returned with its gap; as long again for fewer pieces.
     names
         Of the planes, for messages.
+    within
+        So many times the least objective is good enough for fewer pieces: of the choices within it the one
+        of the fewest pieces, and of these the best; 1: the best of all.
 
     Raises
     ------
@@ -111,6 +127,8 @@ def solve_discrete(
         raise ValueError(f"the method must be 'least-squares' or 'minmax'; got {method!r}")
     if not (np.isfinite(time_limit) and time_limit > 0):
         raise ValueError("the time limit must be a number of seconds above 0")
+    if not 1 <= within < np.inf:
+        raise ValueError(f"the objective can be within 1 or more times of the least, not {within!r}")
     residual = None if limits is None else limits.residual.ravel()
     most = None if limits is None else limits.max_weight
     task = problem(W, Y, row_weights, most, residual, minmax=method == "minmax")
@@ -120,7 +138,7 @@ def solve_discrete(
         raise ValueError(f"there must be holes, or None, and a name for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
     usable = [_usable(h, a, name) for h, a, name in zip(planes, arcs, named, strict=True)]
-    return _Joint(task, planes, usable, named).best(start, time_limit)
+    return _Joint(task, planes, usable, named).best(start, time_limit, within)
 
 
 def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray:
@@ -191,7 +209,7 @@ class _Joint:
         amounts = FreeAmounts(holes, usable, heaviest, needed)
         return None if not holes.step and amounts.surround and np.isinf(heaviest) else amounts
 
-    def best(self, start: float, limit: float) -> Discrete:
+    def best(self, start: float, limit: float, within: float = 1.0) -> Discrete:
         """Solve; `solve_discrete` says what it raises."""
         continuous = self._continuous()
         if not self.own:
@@ -204,6 +222,7 @@ class _Joint:
         if np.isinf(found.square):
             found = self._feasible(start, limit)
         polish(self.own, self._squares, found, start + (0.2 if self.exact else 0.1) * limit)
+        chunk = 4096 if self.exact else 8
         if self.task.minmax:
             shares = (self.A, self.y, prices, self.fixed, self.own, np.sqrt(found.square))
             sharp, q = best_form(*shares, (0.0,)).bound, best_form(*shares)
@@ -213,13 +232,29 @@ class _Joint:
             sharp = q.bound
         unexplored = sharp
         if found.square * (1 - _SHARP) > sharp:
-            unexplored = search(q, self.own, self._squares, found, start + limit, 4096 if self.exact else 8)
+            unexplored = search(q, self.own, self._squares, found, start + limit, chunk)
             if not all(s.complete for s in self.own):
                 unexplored = min(unexplored, q.bound)
             unexplored = max(unexplored, sharp)
+        rounded = continuous.copy()
+        rounded[self.fixed] = plane_by_plane
+        result = self._placed(found, rounded, unexplored)
+        if within == 1 or not result.pieces:
+            return result
+        nothing = float(np.linalg.norm(self.task.row_weights * self.task.Y))
+        enough = max(within * result.objective, _SAME * nothing) ** 2 * _KEPT
+        until = max(start + limit, time.perf_counter()) + limit
+        few, sure = fewest(q, self.own, self._squares, enough, result.pieces, until, chunk)
+        if few is None:
+            return replace(result, proven=result.proven and sure)
+        chosen = self._placed(few, rounded, unexplored)
+        return replace(chosen, bound=result.bound, gap=result.gap, proven=result.proven and sure, best=result)
+
+    def _placed(self, found: Found, rounded: ComplexArray, unexplored: float) -> Discrete:
+        """Pieces in their holes, and the continuous planes beside them."""
         mountings = tuple(s.mount(key) for s, key in zip(self.own, found.keys, strict=True))
-        weights, rounded = continuous.copy(), continuous.copy()
-        weights[self.fixed], rounded[self.fixed] = found.D, plane_by_plane
+        weights = rounded.copy()
+        weights[self.fixed] = found.D
         weights[self.free] = self._follow(found.D)
         return self._result(weights, mountings, rounded, unexplored)
 

@@ -63,8 +63,23 @@ class FreeAmounts:
     def aim(self, z: complex) -> None:
         """See `Attainable`; nothing needs to be listed."""
 
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        return np.zeros(len(keys), dtype=np.int64)
+
+    def lists_all(self, pieces: int) -> bool:
+        """See `Attainable`."""
+        return self.complete
+
     def near(
-        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
+        self,
+        z: complex,
+        low: float,
+        high: float,
+        most: int,
+        *,
+        fitting: bool = False,
+        pieces: int | None = None,
     ) -> tuple[ComplexArray, IntArray] | None:
         """See `Attainable`."""
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))

@@ -57,12 +57,25 @@ class Attainable(Protocol):
         """Get ready to look vectors up; where not all can be, those near z."""
 
     def near(
-        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
+        self,
+        z: complex,
+        low: float,
+        high: float,
+        most: int,
+        *,
+        fitting: bool = False,
+        pieces: int | None = None,
     ) -> tuple[ComplexArray, IntArray] | None:
         """Vectors with low < |d − z| ≤ high, nearest first, and keys (n, 3); None if there may be > most.
 
-        `fitting` counts only what fits the limits of pieces, which takes longer.
+        `fitting` counts only what fits the limits of pieces, which takes longer; `pieces` allows so many.
         """
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """How many each vector takes at least, shape (n,); 0 where amounts are free."""
+
+    def lists_all(self, pieces: int) -> bool:
+        """Whether no vector of so many pieces was left out."""
 
     def lowest(self, g: complex) -> float:
         """Lower bound of Re(ḡ d) over the set (also over what was left out)."""

@@ -93,6 +93,7 @@ class PieceSums:
         longest: int = LONGEST,
     ) -> None:
         self.holes, self.max_weight, self.mounted, self.longest = holes, max_weight, holes.mounted, longest
+        self.usable, self._few = usable, dict[int, PieceSums]()
         where = np.flatnonzero(usable)
         self.where = where[np.argsort(np.mod(holes.angles[where], 2 * np.pi), kind="stable")]
         self.ways = np.exp(1j * holes.angles[self.where])
@@ -102,6 +103,7 @@ class PieceSums:
 
     def aim(self, z: complex) -> None:
         """See `Attainable`."""
+        self._aimed = z
         self.limits, self.base = self.contents.limits, np.zeros(len(self.where), dtype=np.int64)
         found = self._halves(np.arange(len(self.where)))
         self.complete = found is not None
@@ -166,10 +168,46 @@ class PieceSums:
         aside = abs(nearest_allowed(z, self.mounted, self.max_weight) - z)
         return max(self._relaxed(z)[0] - SAME * self.reach, apart(self, z), aside)
 
-    def near(
-        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
-    ) -> tuple[ComplexArray, IntArray] | None:
+    def few(self, pieces: int) -> PieceSums:
+        """The sums of at most so many pieces (1 or more), by themselves."""
+        if pieces not in self._few:
+            self._few[pieces] = PieceSums(self.holes, self.usable, self.max_weight, pieces, self.longest)
+            self._few[pieces].aim(self._aimed)
+        return self._few[pieces]
+
+    def lists_all(self, pieces: int) -> bool:
         """See `Attainable`."""
+        return all(one.complete for most, one in self._few.items() if most <= pieces)
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        number = np.zeros(len(keys), dtype=np.int64)
+        for most in np.unique(keys[:, 2]):
+            own, one = keys[:, 2] == most, self.few(most) if most else self
+            i, j = keys[own, :2].T
+            cost = one.halves[0].cost[i] + one.halves[1].cost[j] + one.contents.cost[one.base].sum()
+            number[own] = np.floor(cost + SAME)
+        return number
+
+    def near(
+        self,
+        z: complex,
+        low: float,
+        high: float,
+        most: int,
+        *,
+        fitting: bool = False,
+        pieces: int | None = None,
+    ) -> tuple[ComplexArray, IntArray] | None:
+        """See `Attainable`; the third part of a key is the number of pieces that were allowed, or 0."""
+        if pieces is not None:
+            few = self.few(max(pieces, 1))
+            hit = few.near(z, low, high, most) or few.near(z, low, high, most, fitting=True)
+            if hit is None:
+                return None
+            keys = hit[1] + [0, 0, max(pieces, 1)]
+            fits = self.pieces(keys) <= pieces
+            return hit[0][fits], keys[fits]
         first, second = self.halves
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
         along = np.conj(z) / (abs(z) or 1.0)  # vectors near z are as far out as |z| − high
@@ -280,6 +318,8 @@ class PieceSums:
 
     def mount(self, key: IntArray) -> Mounting:
         """See `Attainable`."""
+        if key[2]:
+            return self.few(int(key[2])).mount(key * [1, 1, 0])
         picks = self.base.copy()
         for part, half, row in zip(self.parts, self.halves, key[:2], strict=True):
             picks[part] = half.picks[row]

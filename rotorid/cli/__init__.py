@@ -11,7 +11,8 @@ from collections.abc import Callable
 
 import typer
 
-from rotorid.cli.choices import Command
+from rotorid.base.answer import COLUMNS
+from rotorid.cli.choices import Command, Group
 from rotorid.cli.commands import (
     balance,
     campbell,
@@ -34,31 +35,42 @@ from rotorid.cli.verbose import verbosely
 
 app = typer.Typer(
     name="rotorid",
+    cls=Group,
     rich_markup_mode=markup_mode(),
-    no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "demo": demo.demo,
-    "critical": critical.critical,
-    "campbell": campbell.campbell,
-    "response": response.response,
-    "influence": influence.influence,
-    "balance": balance.balance,
-    "trial-weight": trial_weight.trial_weight,
-    "split": split.split,
-    "tolerance": tolerance.tolerance,
-    "unbalance": unbalance.unbalance,
-    "reduce": reduce.reduce,
-    "identify": identify.identify,
-    "fit": fit.fit,
-    "schema": schema.schema,
-    "validate": validate.validate,
+_COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
+    "Balance rotors": {
+        "balance": balance.balance,
+        "trial-weight": trial_weight.trial_weight,
+        "split": split.split,
+        "tolerance": tolerance.tolerance,
+        "unbalance": unbalance.unbalance,
+    },
+    "Compute rotors": {
+        "critical": critical.critical,
+        "campbell": campbell.campbell,
+        "response": response.response,
+        "influence": influence.influence,
+    },
+    "Make a small model": {"reduce": reduce.reduce},
+    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit},
+    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
-for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=Command)(verbosely(_command))
+_EXAMPLES = (
+    "rotorid balance sample_data/turbo_job/job.toml --plot corrections.png",
+    "rotorid critical sample_data/rotor23.csv -n 3",
+    "rotorid reduce sample_data/rotor23.csv --nodes 7,12,18",
+    "rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv",
+    "rotorid demo DIR   (where there is no sample_data: writes some, and runs it)",
+)
+"""One for each job."""
+for _job, _commands in _COMMANDS.items():
+    for _name, _command in _commands.items():
+        app.command(_name, cls=Command, rich_help_panel=_job)(verbosely(_command))
 
 
 def _version(show: bool) -> None:
@@ -71,6 +83,7 @@ def _version(show: bool) -> None:
 
 @app.callback()
 def _rotorid(
+    ctx: typer.Context,
     version: bool = typer.Option(
         False, "--version", callback=_version, is_eager=True, help="Print the version and end."
     ),
@@ -81,6 +94,18 @@ def _rotorid(
     make sense, --verbose for the numbers behind a result (on standard error), and --help with an example.
     Exit status: 0, or 2 for bad input with one message; `validate` ends with 1 where a number differs.
     """
+    if ctx.invoked_subcommand is None:
+        typer.echo(_overview())
+
+
+def _overview() -> str:
+    """The jobs, each with an example and its commands."""
+    lines = ["Four jobs, each with an example. More of a command: rotorid COMMAND --help", ""]
+    for (job, commands), example in zip(_COMMANDS.items(), _EXAMPLES, strict=True):
+        short = len(job) + len(example) + 2 <= COLUMNS
+        lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
+        lines += [f"  {name:<12}  {(told.__doc__ or '').partition('.')[0]}" for name, told in commands.items()]
+    return "\n".join(lines)
 
 
 def main() -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import typer
 
-from rotorid.cli.common_options import command
+from rotorid.cli.common_options import OUTPUT, command
 from rotorid.cli.output import Destination
 from rotorid.validation import ValidateOptions
 from rotorid.validation import validate as work
 
 
-@command(ValidateOptions, names={"every": ("--all",)}, to=("json", "output"))
+@command(ValidateOptions, names={"every": ("--all",)}, panels={OUTPUT: "every"}, to=("output", "json"))
 def validate(options: ValidateOptions, to: Destination) -> None:
     """Every number that the references print, beside what this program computes now.
 
