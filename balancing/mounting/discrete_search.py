@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from balancing.mounting.discrete_bounds import Form
-from balancing.mounting.mountable_vectors import MOST, Attainable, apart
+from balancing.mounting.mountable_vectors import MOST, Attainable, apart, nearest
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-__all__ = ["Found", "Squares", "polish", "search"]
+__all__ = ["Found", "Squares", "polish", "rounded", "search"]
 
 Squares = Callable[[ComplexArray, FloatArray, float], FloatArray]
 """Squared objectives (M,) of vectors (M, P), given lower bounds (M,) and the best known square."""
@@ -37,6 +37,14 @@ class Found:
     square: float
     D: ComplexArray
     keys: IntArray
+
+
+def rounded(sets: Sequence[Attainable], squares: Squares, D: ComplexArray) -> Found:
+    """Every plane by itself: the nearest vectors that can be mounted."""
+    picks = [nearest(s, complex(z)) for s, z in zip(sets, D, strict=True)]
+    near = np.array([vectors[0] for vectors, _ in picks])
+    square = float(squares(near[None], np.zeros(1), np.inf)[0])
+    return Found(square, near, np.array([keys[0] for _, keys in picks]))
 
 
 def polish(sets: Sequence[Attainable], squares: Squares, best: Found, until: float) -> None:
@@ -87,8 +95,7 @@ def search(
     start: Found,
     until: float,
     chunk: int = 4096,
-    pieces: int | None = None,
-    least: Sequence[int] = (),
+    pieces: int = 1 << 30,
 ) -> float:
     """Improve `start` until nothing better can exist, or the time (`time.perf_counter`) is `until`.
 
@@ -106,15 +113,14 @@ def search(
         When to stop.
     chunk
         How many objectives are asked for at a time.
-    pieces, least
-        Of all planes together at most; of each plane at least, in the order of the form. None: any number.
+    pieces
+        Of all planes together, at most.
 
     Returns
     -------
     The lowest bound of what was not looked at, infinite if nothing was left out.
     """
     run = _Run(form, sets, squares, start, until, chunk)
-    run.below = np.cumsum([0, *least], dtype=np.int64)
     return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound, pieces)
 
 
@@ -134,18 +140,17 @@ class _Run:
         """Squares from here on are no gain."""
         return self.best.square * (1 - _ROUNDING)
 
-    def descend(self, k: int, D: ComplexArray, bound: float, pieces: int | None) -> float:
+    def descend(self, k: int, D: ComplexArray, bound: float, pieces: int) -> float:
         """Look at everything below a node with planes k+1 … fixed; lowest bound of what was left out.
 
-        `bound` counts the planes fixed exactly and m of the others; `pieces` are left for these.
+        `bound` counts the planes fixed exactly and m of the others; so many `pieces` are left for these.
         """
-        here = None if pieces is None else pieces - int(self.below[k])
         c, size, shift = self._centre(k, D)
         # |R|²|d − c|² + linear(d) = |R|²|d − z|² + shift
         base = bound - self.form.m[k] + shift
         everything = 2 * self.sets[k].reach + abs(c)
         low, left = apart(self.sets[k], c), np.inf
-        known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST)) if here is None else everything
+        known = max(low, 0.0) + self.sets[k].spacing * float(np.sqrt(_FIRST))
         while True:
             needed = everything
             if np.isfinite(self.best.square):
@@ -160,7 +165,7 @@ class _Run:
             if time.perf_counter() > self.until:
                 return min(left, float(max(bound, base + size * inner**2)))
             radius = min(max(known, 1e-9 * everything), needed)
-            hit = self.sets[k].near(c, low, radius, MOST, pieces=here)
+            hit = self.sets[k].near(c, low, radius, MOST)
             if hit is None:
                 thinner = inner + (radius - inner) / 4
                 if thinner - inner < 1e-9 * everything or not thinner < radius:
@@ -192,10 +197,11 @@ class _Run:
         base: float,
         size: float,
         hit: tuple[ComplexArray, IntArray],
-        pieces: int | None,
+        pieces: int,
     ) -> float:
         """Look below the vectors of one ring, nearest first."""
-        points, keys = hit
+        rest = pieces - self.sets[k].pieces(hit[1])
+        points, keys, rest = hit[0][rest >= 0], hit[1][rest >= 0], rest[rest >= 0]
         bounds = np.maximum(base + size * np.abs(points - z) ** 2, 0.0)
         if not k:
             for first in range(0, len(points), self.chunk):
@@ -205,15 +211,13 @@ class _Run:
                 self._leaves(D, points[part], keys[part], bounds[part])
             return np.inf
         left = np.inf
-        used = np.zeros(len(keys), dtype=np.int64) if pieces is None else self.sets[k].pieces(keys)
         for n, (point, key, bound) in enumerate(zip(points, keys, bounds, strict=True)):
             if bound > self.target:
                 break  # the others are further away
             if n and time.perf_counter() > self.until:
                 return min(left, float(bound))
             D[k], self.keys[k] = point, key
-            rest = None if pieces is None else pieces - int(used[n])
-            left = min(left, self.descend(k - 1, D, float(bound), rest))
+            left = min(left, self.descend(k - 1, D, float(bound), int(rest[n])))
         return left
 
     def _leaves(self, D: ComplexArray, points: ComplexArray, keys: IntArray, bounds: FloatArray) -> None:

@@ -1,8 +1,7 @@
 """The fewest pieces that leave little more than the least vibration.
 
-For one number of pieces after the other, from the least that every plane needs, the best choice of so many is
-searched (`balancing.mounting.discrete_search`): vectors of few pieces can be listed where all cannot. The first
-number with a choice that is good enough is the fewest, and what that search found is the best of so many.
+For one number of pieces after the other, the best choice of so many is searched: vectors of few pieces can be
+listed where all of them cannot. The first number of which a choice is good enough is the fewest.
 """
 
 from __future__ import annotations
@@ -13,13 +12,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from balancing.mounting.discrete_bounds import Form
-from balancing.mounting.discrete_search import Found, Squares, search
+from balancing.mounting.discrete_search import Found, Squares, polish, rounded, search
 from balancing.mounting.mountable_vectors import MOST, Attainable
 
-__all__ = ["FEW", "fewest"]
+__all__ = ["FEW", "Choice", "fewest"]
 
 FEW = 1.2
 """So many times the least is good enough for fewer pieces."""
+Choice = tuple[Found, Sequence[Attainable]]
+"""What was found, in which sets."""
 
 
 def fewest(
@@ -30,8 +31,8 @@ def fewest(
     pieces: int,
     until: float,
     chunk: int,
-) -> tuple[Found | None, bool]:
-    """The best choice of the fewest pieces whose squared objective is at most `enough`, and whether it is sure.
+) -> tuple[Choice | None, bool]:
+    """The best choice of the fewest pieces whose square is at most `enough`, and whether that is sure.
 
     Parameters
     ----------
@@ -44,27 +45,33 @@ def fewest(
     """
     least, sure = _least(form, sets, enough, pieces), True
     for number in range(sum(least), pieces):
+        spare = number - sum(least)
+        few = [one.few(own + spare) for one, own in zip(sets, least, strict=True)]
         found = Found(enough, np.zeros(len(sets), dtype=complex), np.zeros((len(sets), 3), dtype=np.int64))
         now = time.perf_counter()
-        left = search(form, sets, squares, found, now + (until - now) / 2, chunk, number, least)
-        sure &= left >= found.square and all(one.lists_all(number) for one in sets)
+        left = search(form, few, squares, found, now + (until - now) / 3, chunk, number)
+        sure &= left >= found.square and all(one.complete for one in few)
+        if not sure and found.square == enough:
+            few = [one.few(own + spare // len(sets)) for one, own in zip(sets, least, strict=True)]
+            found = rounded(few, squares, form.D0[np.argsort(form.order)])
+            polish(few, squares, found, until)
         if found.square < enough:
-            return found, sure
+            return (found, few), sure
     return None, sure
 
 
-def _least(form: Form, sets: Sequence[Attainable], enough: float, pieces: int) -> list[int]:
-    """How many pieces each plane needs at least, in the order of the form: its part of q ≤ enough is a disc."""
-    size = np.sqrt(max(enough - form.const - float(form.m.sum()), 0.0))
-    with np.errstate(all="ignore"):
-        across = np.linalg.norm(np.linalg.pinv(form.R), axis=1)
-    whole = np.linalg.matrix_rank(form.R) == len(form.R)
+def _least(form: Form, sets: Sequence[Attainable], enough: float, most: int) -> list[int]:
+    """How many pieces each plane needs at least: its part of q ≤ enough is a disc."""
     least = [0] * len(sets)
-    for k, p in enumerate(form.order if whole else ()):
-        radius = float(size * across[k]) * (1 + 1e-9)
-        while least[k] < pieces:
-            hit = sets[p].near(complex(form.D0[k]), -1.0, radius, MOST, pieces=least[k])
-            if hit is None or len(hit[0]):
+    if np.linalg.matrix_rank(form.R) < len(form.R):
+        return least
+    room = np.sqrt(max(enough - form.const - float(form.m.sum()), 0.0))
+    radii = room * np.linalg.norm(np.linalg.inv(form.R), axis=1) * (1 + 1e-9)
+    for p, z, radius in zip(form.order, form.D0, radii, strict=True):
+        while least[p] < most:
+            few = sets[p].few(least[p])
+            hit = few.near(complex(z), -1.0, float(radius), MOST)
+            if hit is None or (few.pieces(hit[1]) <= least[p]).any():
                 break
-            least[k] += 1
+            least[p] += 1
     return least

@@ -63,23 +63,8 @@ class FreeAmounts:
     def aim(self, z: complex) -> None:
         """See `Attainable`; nothing needs to be listed."""
 
-    def pieces(self, keys: IntArray) -> IntArray:
-        """See `Attainable`."""
-        return np.zeros(len(keys), dtype=np.int64)
-
-    def lists_all(self, pieces: int) -> bool:
-        """See `Attainable`."""
-        return self.complete
-
     def near(
-        self,
-        z: complex,
-        low: float,
-        high: float,
-        most: int,
-        *,
-        fitting: bool = False,
-        pieces: int | None = None,
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
     ) -> tuple[ComplexArray, IntArray] | None:
         """See `Attainable`."""
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
@@ -110,6 +95,14 @@ class FreeAmounts:
         one = distinct((key[:, 1:] > 0).sum(axis=1), places(d, quantum))
         one = one[np.argsort(distance[one], kind="stable")]
         return d[one], key[one]
+
+    def few(self, pieces: int) -> FreeAmounts:
+        """See `Attainable`."""
+        return self
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        return np.zeros(len(keys), dtype=np.int64)
 
     def lowest(self, g: complex) -> float:
         """See `Attainable`."""

@@ -19,13 +19,14 @@ from balancing.mounting.discrete_weights import Discrete
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import figures, wrap
+from rotorid.base.text import counted, figures, wrap
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from balancing.mounting.holes import Holes, Mounting
 
+_COUNTED = {"minmax": "the largest", "weighted": "every reading counted by its error"}
 AGAINST = 3.0
 """Pieces that weigh more than this times what they make are said to act against each other."""
 
@@ -104,11 +105,38 @@ class Mounted:
                 "residuals": rows(residuals),
                 "rms_after": rms(after),
                 "max_after": after.max(),
+                "pieces": self.found.pieces,
+                "best": self._best(),
                 "proven": self.found.proven,
                 "gap": self.found.gap,
                 "plane_by_plane": self.plane_by_plane,
             }
         )
+
+    def _best(self) -> dict[str, Any] | None:
+        """What more pieces would leave; None where these are the best."""
+        best = self.found.best
+        if best is None:
+            return None
+        ratio = self.found.objective / best.objective if best.objective > 0 else None
+        left = self.correction.labels.vibration(best.residual)[0]
+        return {
+            "pieces": best.pieces,
+            "objective_ratio": ratio,
+            "rms_after": rms(left),
+            "max_after": left.max(),
+        }
+
+    def _certificate(self) -> str:
+        """How sure the choice is."""
+        found = self.found
+        if found.proven and found.best is None:
+            return "No other choice of pieces is better (proven)."
+        if found.proven:
+            return "No fewer pieces are as good as that, and no other choice of so many is better (proven)."
+        if found.gap:
+            return f"A better choice, if there is one, is better by at most {100 * found.gap:.2g} %."
+        return "Fewer pieces may be as good: the time of --split-seconds was up before that was known."
 
     def to_frame(self) -> pd.DataFrame:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
@@ -129,15 +157,21 @@ class Mounted:
             lines.append(
                 wrap(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
             )
-        lines.append(text(columns, left=2) if used else "  nothing: every piece would make it worse")
+        best = self._best()
+        worse = "" if best else ": every piece would make it worse"
+        lines.append(text(columns, left=2) if used else f"  nothing{worse}")
         scale = float(labels.vibration(c.before)[0].max())
         left = []
         for z in (self.after, c.after):
             size = labels.vibration(z)[0]
             left.append(f"rms {small(rms(size), scale)}, largest {small(size.max(), scale)}")
         lines.append(f"{labels.vibration_in} left: {left[0]}; with any weights {left[1]}".strip())
+        if best:
+            few, many = counted(self.found.pieces, "piece"), best["pieces"]
+            times = "what" if best["objective_ratio"] is None else f"{best['objective_ratio']:.3g} times what"
+            lines.append(f"{few}: {times} {many} would leave (--best), {_COUNTED.get(c.method, 'rms')}.")
         lines += [
-            f"Plane {plane}: nothing; no pieces that it can take make it better."
+            f"Plane {plane}: nothing{'' if best else '; no pieces that it can take make it better'}."
             for plane in c.planes
             if plane not in used
         ]
@@ -145,11 +179,7 @@ class Mounted:
             lines.append(
                 f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
             )
-        lines.append(
-            "No other choice of pieces is better (proven)."
-            if self.found.proven
-            else f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
-        )
+        lines.append(self._certificate())
         return "\n".join(lines)
 
 

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from balancing.mounting.holes import Mounting
+from balancing.mounting.holes import Holes, Mounting
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, IntArray
 
 __all__ = [
@@ -45,6 +45,7 @@ _THIN = 1e-12
 class Attainable(Protocol):
     """A set of vectors, and how each is mounted."""
 
+    holes: Holes
     complete: bool
     reach: float
     """No vector is larger."""
@@ -57,25 +58,18 @@ class Attainable(Protocol):
         """Get ready to look vectors up; where not all can be, those near z."""
 
     def near(
-        self,
-        z: complex,
-        low: float,
-        high: float,
-        most: int,
-        *,
-        fitting: bool = False,
-        pieces: int | None = None,
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
     ) -> tuple[ComplexArray, IntArray] | None:
         """Vectors with low < |d − z| ≤ high, nearest first, and keys (n, 3); None if there may be > most.
 
-        `fitting` counts only what fits the limits of pieces, which takes longer; `pieces` allows so many.
+        `fitting` counts only what fits the limits of pieces, which takes longer.
         """
+
+    def few(self, pieces: int) -> Attainable:
+        """The vectors of so many pieces, or all, whichever can be looked up with less."""
 
     def pieces(self, keys: IntArray) -> IntArray:
         """How many each vector takes at least, shape (n,); 0 where amounts are free."""
-
-    def lists_all(self, pieces: int) -> bool:
-        """Whether no vector of so many pieces was left out."""
 
     def lowest(self, g: complex) -> float:
         """Lower bound of Re(ḡ d) over the set (also over what was left out)."""

@@ -93,7 +93,7 @@ class PieceSums:
         longest: int = LONGEST,
     ) -> None:
         self.holes, self.max_weight, self.mounted, self.longest = holes, max_weight, holes.mounted, longest
-        self.usable, self._few = usable, dict[int, PieceSums]()
+        self.usable = usable
         where = np.flatnonzero(usable)
         self.where = where[np.argsort(np.mod(holes.angles[where], 2 * np.pi), kind="stable")]
         self.ways = np.exp(1j * holes.angles[self.where])
@@ -168,46 +168,10 @@ class PieceSums:
         aside = abs(nearest_allowed(z, self.mounted, self.max_weight) - z)
         return max(self._relaxed(z)[0] - SAME * self.reach, apart(self, z), aside)
 
-    def few(self, pieces: int) -> PieceSums:
-        """The sums of at most so many pieces (1 or more), by themselves."""
-        if pieces not in self._few:
-            self._few[pieces] = PieceSums(self.holes, self.usable, self.max_weight, pieces, self.longest)
-            self._few[pieces].aim(self._aimed)
-        return self._few[pieces]
-
-    def lists_all(self, pieces: int) -> bool:
-        """See `Attainable`."""
-        return all(one.complete for most, one in self._few.items() if most <= pieces)
-
-    def pieces(self, keys: IntArray) -> IntArray:
-        """See `Attainable`."""
-        number = np.zeros(len(keys), dtype=np.int64)
-        for most in np.unique(keys[:, 2]):
-            own, one = keys[:, 2] == most, self.few(most) if most else self
-            i, j = keys[own, :2].T
-            cost = one.halves[0].cost[i] + one.halves[1].cost[j] + one.contents.cost[one.base].sum()
-            number[own] = np.floor(cost + SAME)
-        return number
-
     def near(
-        self,
-        z: complex,
-        low: float,
-        high: float,
-        most: int,
-        *,
-        fitting: bool = False,
-        pieces: int | None = None,
+        self, z: complex, low: float, high: float, most: int, *, fitting: bool = False
     ) -> tuple[ComplexArray, IntArray] | None:
-        """See `Attainable`; the third part of a key is the number of pieces that were allowed, or 0."""
-        if pieces is not None:
-            few = self.few(max(pieces, 1))
-            hit = few.near(z, low, high, most) or few.near(z, low, high, most, fitting=True)
-            if hit is None:
-                return None
-            keys = hit[1] + [0, 0, max(pieces, 1)]
-            fits = self.pieces(keys) <= pieces
-            return hit[0][fits], keys[fits]
+        """See `Attainable`."""
         first, second = self.halves
         middle, radius = lens(z, high, -self.mounted, self.max_weight * (1 + 1e-9))
         along = np.conj(z) / (abs(z) or 1.0)  # vectors near z are as far out as |z| − high
@@ -305,6 +269,21 @@ class PieceSums:
             self._grids[level] = order, keys[order], h, origin, width
         return self._grids[level]
 
+    def few(self, pieces: int) -> PieceSums:
+        """See `Attainable`."""
+        few = PieceSums(self.holes, self.usable, self.max_weight, max(pieces, 1), self.longest)
+        few.aim(self._aimed)
+        return min(
+            (self, few), key=lambda one: (not one.complete, sum(len(half.sums) for half in one.halves))
+        )
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        first, second = self.halves
+        there = self.contents.cost[self.base].sum()
+        cost = first.cost[keys[:, 0]] + second.cost[keys[:, 1]] + there
+        return np.asarray(np.floor(cost + SAME), dtype=np.int64)
+
     def lowest(self, g: complex) -> float:
         """See `Attainable`."""
         # the heaviest pieces stand where they reach farthest
@@ -318,8 +297,6 @@ class PieceSums:
 
     def mount(self, key: IntArray) -> Mounting:
         """See `Attainable`."""
-        if key[2]:
-            return self.few(int(key[2])).mount(key * [1, 1, 0])
         picks = self.base.copy()
         for part, half, row in zip(self.parts, self.halves, key[:2], strict=True):
             picks[part] = half.picks[row]

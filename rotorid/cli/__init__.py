@@ -104,7 +104,9 @@ def _overview() -> str:
     for (job, commands), example in zip(_COMMANDS.items(), _EXAMPLES, strict=True):
         short = len(job) + len(example) + 2 <= COLUMNS
         lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
-        lines += [f"  {name:<12}  {(told.__doc__ or '').partition('.')[0]}" for name, told in commands.items()]
+        lines += [
+            f"  {name:<12}  {(told.__doc__ or '').partition('.')[0]}" for name, told in commands.items()
+        ]
     return "\n".join(lines)
 
 

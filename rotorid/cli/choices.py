@@ -63,7 +63,7 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
 
 
 def compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
-    """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges of numbers."""
+    """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
     paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
     command.help = "\n\n".join(" ".join(each.split()) for each in paragraphs)
     for parameter in command.get_params(ctx):
