@@ -129,14 +129,12 @@ class Mounted:
 
     def _certificate(self) -> str:
         """How sure the choice is."""
-        found = self.found
-        if found.proven and found.best is None:
-            return "No other choice of pieces is better (proven)."
-        if found.proven:
-            return "No fewer pieces are as good as that, and no other choice of so many is better (proven)."
-        if found.gap:
-            return f"A better choice, if there is one, is better by at most {100 * found.gap:.2g} %."
-        return "Fewer pieces may be as good: the time of --split-seconds was up before that was known."
+        if self.found.gap:
+            return f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
+        if not self.found.proven:
+            return "Fewer pieces may do as well: there was no time to know (--split-seconds)."
+        fewer = "No fewer pieces do as well, and no " if self.found.best else "No "
+        return f"{fewer}other choice of pieces is better (proven)."
 
     def to_frame(self) -> pd.DataFrame:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import typer
 
 from rotorid.base.answer import COLUMNS
-from rotorid.cli.choices import Command, Group
+from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
     campbell,
@@ -35,7 +35,6 @@ from rotorid.cli.verbose import verbosely
 
 app = typer.Typer(
     name="rotorid",
-    cls=Group,
     rich_markup_mode=markup_mode(),
     invoke_without_command=True,
     add_completion=False,
@@ -90,8 +89,10 @@ def _rotorid(
 ) -> None:
     """Rotor models, flexible-rotor balancing and identification of oscillating systems.
 
-    Every command has --json (one JSON document on standard output), --plot FILE and --output FILE where they
-    make sense, --verbose for the numbers behind a result (on standard error), and --help with an example.
+    Every command has --json (one JSON document on standard output), --plot FILE and --output FILE
+    where they make sense, --table for every table, --verbose for the numbers behind a result (on
+    standard error), and --help with examples. `rotorid` alone shows an example of each job.
+
     Exit status: 0, or 2 for bad input with one message; `validate` ends with 1 where a number differs.
     """
     if ctx.invoked_subcommand is None:

@@ -7,20 +7,11 @@ import re
 from typing import Any, get_type_hints
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 
 from rotorid.base.suggestions import suggest
 
 _CHOICE = re.compile(r"(?:Value error, )?('([^']*)' is not one of (.+?))\.?", re.DOTALL)
-
-
-class Group(TyperGroup):
-    """The program, its help as compact as that of its commands."""
-
-    def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - as typer declares it
-        """As typer's, compact."""
-        compact(self, ctx)
-        super().format_help(ctx, formatter)
 
 
 class Command(TyperCommand):
@@ -29,7 +20,7 @@ class Command(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - as typer declares it
         """As typer's, with the methods of the registries, and compact."""
         tell_choices(self)
-        compact(self, ctx)
+        _compact(self, ctx)
         super().format_help(ctx, formatter)
 
     def get_help_option(self, ctx: Any) -> Any:  # noqa: ANN401 - as typer declares it
@@ -62,12 +53,12 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
             parameter.help = f"{declared[0].help} {described(choices[parameter.name])}"
 
 
-def compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
+def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
     """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
     paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
     command.help = "\n\n".join(" ".join(each.split()) for each in paragraphs)
     for parameter in command.get_params(ctx):
-        parameter.min = parameter.max = None  # a refusal tells them
+        parameter._get_number_range_help_str = lambda: ""  # a refusal tells it
         if parameter.param_type_name == "argument" or parameter.is_flag:
             parameter.display_type_rich = lambda ctx: ""
 

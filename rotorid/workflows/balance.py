@@ -60,7 +60,7 @@ class BalanceOptions:
     method : METHOD
         How the readings count; default: weighted where their errors are known, else least-squares.
     influence : FILE
-        Stored influence coefficients.
+        Stored influence coefficients, in place of trial runs.
     coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.

@@ -63,10 +63,12 @@ def balance(
 
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
 
-    Example: rotorid balance runs.csv weights.csv --amplitude-error 2 --phase-error 2 --max-mass 5g
+    Example: rotorid balance sample_data/turbo_job/runs.csv sample_data/turbo_job/weights.csv --phase lead
 
-    Example: rotorid balance --template job.xlsx, and when it is filled in: rotorid balance job.xlsx --output
-    sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
+    Example: rotorid balance --template job.xlsx
+
+    The workbook, filled in, is a job: --output sheet.xlsx writes it with its results, and --output
+    weights.csv the corrections alone.
     """
     if template is not None:
         _write_template(template, files or ())

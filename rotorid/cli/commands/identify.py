@@ -37,6 +37,9 @@ def identify(
 
     Example: rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv
 
-    With --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3: which frequencies to measure next.
+    Which frequencies to measure next:
+
+    Example: rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv
+    --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
     """
     to.deliver("identification", lambda: work(model, data, options))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -33,7 +33,7 @@ def reduce(
     rotor: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[ROTOR]",
+            metavar="ROTOR",
             help="Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.",
         ),
     ] = None,
@@ -54,7 +54,10 @@ def reduce(
             "--state-space", metavar="FILE", help="Write A, B, C, D in both planes: .json, .npz or .mat."
         ),
     ] = None,
-    view: Annotated[View | None, typer.Option("--view", help="What --plot draws.")] = None,
+    view: Annotated[
+        View | None,
+        typer.Option("--view", metavar="WHAT", help=f"What --plot draws: {', '.join(get_args(View))}."),
+    ] = None,
     to: Destination,
 ) -> None:
     """A rotor as a few masses at chosen nodes (formula 50), and how good they are.

@@ -36,10 +36,10 @@ def split(
 ) -> None:
     """Mount one given weight: in holes, at two angles, or by drilling or grinding.
 
-    Examples: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
+    Example: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
 
-    rotorid split 35g@120 --two 20g,30g
+    Example: rotorid split 35g@120 --two 20g,30g
 
-    rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
+    Example: rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
     to.deliver("split", lambda: work(vector, options))

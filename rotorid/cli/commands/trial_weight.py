@@ -27,7 +27,7 @@ def trial_weight(
     job: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[JOB]",
+            metavar="JOB",
             help="Job (.toml, .xlsx) with coefficients, a rotor or trial runs: they give amount and angle.",
         ),
     ] = None,

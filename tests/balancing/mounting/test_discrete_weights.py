@@ -95,7 +95,7 @@ def test_equals_exhaustive_enumeration(seed):
 
 
 def fewest_of_all(planes, size):
-    """Of all mountings within 1.2 times of the least: the fewest pieces, and the least objective of so many."""
+    """Of all mountings within 1.2 times of the least: the fewest pieces, the least objective of so many."""
     counts = [np.array(list(least_pieces(holes).values())) for holes in planes]
     number = np.sum(np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1), axis=-1).ravel()
     good = size <= 1.2 * size.min() * (1 + 1e-9)

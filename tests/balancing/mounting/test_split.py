@@ -35,7 +35,7 @@ def exhaustive(target, holes, most):
 
 
 def fewest_of_all(target, holes, most, times=1.2):
-    """Of all choices within 1.2 times of the smallest error: the fewest pieces, the smallest error of so many."""
+    """Of all choices within 1.2 times of the least error: the fewest pieces, the least error of so many."""
     found = list(everything(target, holes, most))
     enough = times * min(found)[0] + 2e-11
     return min((pieces, error) for error, pieces in found if error <= enough)
