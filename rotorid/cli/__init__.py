@@ -59,14 +59,6 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Identify coefficients": {"identify": identify.identify, "fit": fit.fit},
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
-_EXAMPLES = (
-    "rotorid balance sample_data/turbo_job/job.toml --plot corrections.png",
-    "rotorid critical sample_data/rotor23.csv -n 3",
-    "rotorid reduce sample_data/rotor23.csv --nodes 7,12,18",
-    "rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv",
-    "rotorid demo DIR   (where there is no sample_data: writes some, and runs it)",
-)
-"""One for each job."""
 for _job, _commands in _COMMANDS.items():
     for _name, _command in _commands.items():
         app.command(_name, cls=Command, rich_help_panel=_job)(verbosely(_command))
@@ -100,15 +92,18 @@ def _rotorid(
 
 
 def _overview() -> str:
-    """The jobs, each with an example and its commands."""
-    lines = ["Four jobs, each with an example. More of a command: rotorid COMMAND --help", ""]
-    for (job, commands), example in zip(_COMMANDS.items(), _EXAMPLES, strict=True):
+    """The jobs, each with the first example of its first command, and their commands."""
+    lines = [
+        "Four jobs, each with an example (without a checkout, rotorid demo DIR writes files to try):",
+        "",
+    ]
+    for job, commands in _COMMANDS.items():
+        told = {name: command.__doc__ or "" for name, command in commands.items()}
+        example = " ".join("".join(told.values()).split("Example: ")[1].partition("\n\n")[0].split())
         short = len(job) + len(example) + 2 <= COLUMNS
         lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
-        lines += [
-            f"  {name:<12}  {(told.__doc__ or '').partition('.')[0]}" for name, told in commands.items()
-        ]
-    return "\n".join(lines)
+        lines += [f"  {name:<12}  {text.partition('.')[0]}" for name, text in told.items()]
+    return "\n".join([*lines, "", "More of each: rotorid COMMAND --help"])
 
 
 def main() -> None:

@@ -72,7 +72,7 @@ SAMPLES = {
         ),
     ),
     "balancing": Sample(
-        "trial runs to weights, the smallest largest amplitude, a check run and its trim",
+        "trial runs to weights, the smallest largest amplitude, a check run and the trim after it",
         ("turbo_job",),
         (
             Step("balance", "Weights", "balance {}/turbo_job/job.toml --plot {}/balance.png"),
