@@ -94,7 +94,8 @@ def _rotorid(
 def _overview() -> str:
     """The jobs, each with the first example of its first command, and their commands."""
     lines = [
-        "Four jobs, each with an example (without a checkout, rotorid demo DIR writes files to try):",
+        "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
+        "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
         "",
     ]
     for job, commands in _COMMANDS.items():
@@ -103,7 +104,7 @@ def _overview() -> str:
         short = len(job) + len(example) + 2 <= COLUMNS
         lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
         lines += [f"  {name:<12}  {text.partition('.')[0]}" for name, text in told.items()]
-    return "\n".join([*lines, "", "More of each: rotorid COMMAND --help"])
+    return "\n".join(lines)
 
 
 def main() -> None:
