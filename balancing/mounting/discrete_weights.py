@@ -245,7 +245,8 @@ class _Joint:
         if few is None:
             return replace(result, proven=result.proven and sure)
         chosen = self._placed(*few, near, unexplored)
-        return replace(chosen, bound=result.bound, gap=result.gap, proven=result.proven and sure, best=result)
+        best = result if result.objective < chosen.objective else None  # otherwise it was not the best
+        return replace(chosen, bound=result.bound, gap=result.gap, proven=result.proven and sure, best=best)
 
     def _placed(
         self, found: Found, sets: Sequence[Attainable], near: ComplexArray, unexplored: float

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -49,12 +50,15 @@ def fewest(
         few = [one.few(own + spare) for one, own in zip(sets, least, strict=True)]
         found = Found(enough, np.zeros(len(sets), dtype=complex), np.zeros((len(sets), 3), dtype=np.int64))
         now = time.perf_counter()
+        if now > until:
+            return None, False
         left = search(form, few, squares, found, now + (until - now) / 3, chunk, number)
         sure &= left >= found.square and all(one.complete for one in few)
         if not sure and found.square == enough:
             few = [one.few(own + spare // len(sets)) for one, own in zip(sets, least, strict=True)]
-            found = rounded(few, squares, form.D0[np.argsort(form.order)])
-            polish(few, squares, found, until)
+            with suppress(ValueError):  # where so few are too heavy for a plane
+                found = rounded(few, squares, form.D0[np.argsort(form.order)])
+                polish(few, squares, found, until)
         if found.square < enough:
             return (found, few), sure
     return None, sure

@@ -133,8 +133,9 @@ class Mounted:
             return f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
         if not self.found.proven:
             return "Fewer pieces may do as well: there was no time to know (--split-seconds)."
-        fewer = "No fewer pieces do as well, and no " if self.found.best else "No "
-        return f"{fewer}other choice of pieces is better (proven)."
+        if self.found.best:
+            return "No fewer pieces do as well, and no other choice of so many is better (proven)."
+        return "No other choice of pieces is better (proven)."
 
     def to_frame(self) -> pd.DataFrame:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""

@@ -248,7 +248,8 @@ def split(
     few = _few(best, most_pieces, enough)
     if few.pieces == best.pieces:
         return best
-    return replace(few, bound=best.bound, proven=best.proven and few.proven, best=best)
+    more = best if size < abs(few.error) else None  # otherwise it was not the nearest
+    return replace(few, bound=best.bound, proven=best.proven and few.proven, best=more)
 
 
 def _few(best: Split, most_pieces: int | None, enough: float) -> Split:

@@ -70,7 +70,7 @@ def test_few_pieces_are_the_default(cli, method):
     words = " ".join(cli("balance", HOLES, "--split", "--method", method, "--table").out.split())
     times = f"{told['objective_ratio']:.3g} times what {best['pieces']} would leave (--best)"
     assert f"{few['pieces']} pieces: {times}" in words
-    assert "No fewer pieces do as well, and no other choice of pieces is better (proven)." in words
+    assert "No fewer pieces do as well, and no other choice of so many is better (proven)." in words
 
 
 def test_best_without_split_is_refused(cli):
