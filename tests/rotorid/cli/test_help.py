@@ -62,9 +62,7 @@ def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain
     text = cli(*name.split(), "--help").out
     assert max(map(len, text.splitlines())) <= COLUMNS
     if name:
-        ranges = (
-            ["[x>="] if hasattr(TyperOption, "_get_number_range_help_str") else []
-        )  # typer 0.29 and later
+        ranges = ["[x>="] if hasattr(TyperOption, "_get_number_range_help_str") else []  # typer 0.29
         for hidden in ("<bool>", "<path>", "list[", "<str>", "<int", "[[", "🅱", *ranges):
             assert hidden not in text, hidden
         for one in options(COMMANDS[name]):
