@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from balancing.mounting.discrete_bounds import Form
-from balancing.mounting.mountable_vectors import MOST, Attainable, apart
+from balancing.mounting.mountable_vectors import MOST, Attainable, apart, nearest
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 
-__all__ = ["Found", "Squares", "polish", "search"]
+__all__ = ["Found", "Squares", "polish", "rounded", "search"]
 
 Squares = Callable[[ComplexArray, FloatArray, float], FloatArray]
 """Squared objectives (M,) of vectors (M, P), given lower bounds (M,) and the best known square."""
@@ -37,6 +37,14 @@ class Found:
     square: float
     D: ComplexArray
     keys: IntArray
+
+
+def rounded(sets: Sequence[Attainable], squares: Squares, D: ComplexArray) -> Found:
+    """Every plane by itself: the nearest vectors that can be mounted."""
+    picks = [nearest(s, complex(z)) for s, z in zip(sets, D, strict=True)]
+    near = np.array([vectors[0] for vectors, _ in picks])
+    square = float(squares(near[None], np.zeros(1), np.inf)[0])
+    return Found(square, near, np.array([keys[0] for _, keys in picks]))
 
 
 def polish(sets: Sequence[Attainable], squares: Squares, best: Found, until: float) -> None:
@@ -81,7 +89,13 @@ def _around(one: Attainable, z: complex, count: int) -> tuple[ComplexArray, IntA
 
 
 def search(
-    form: Form, sets: Sequence[Attainable], squares: Squares, start: Found, until: float, chunk: int = 4096
+    form: Form,
+    sets: Sequence[Attainable],
+    squares: Squares,
+    start: Found,
+    until: float,
+    chunk: int = 4096,
+    pieces: int = 1 << 30,
 ) -> float:
     """Improve `start` until nothing better can exist, or the time (`time.perf_counter`) is `until`.
 
@@ -99,13 +113,15 @@ def search(
         When to stop.
     chunk
         How many objectives are asked for at a time.
+    pieces
+        Of all planes together, at most.
 
     Returns
     -------
     The lowest bound of what was not looked at, infinite if nothing was left out.
     """
     run = _Run(form, sets, squares, start, until, chunk)
-    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound)
+    return run.descend(len(form.order) - 1, np.zeros(len(form.order), dtype=complex), form.bound, pieces)
 
 
 class _Run:
@@ -124,10 +140,10 @@ class _Run:
         """Squares from here on are no gain."""
         return self.best.square * (1 - _ROUNDING)
 
-    def descend(self, k: int, D: ComplexArray, bound: float) -> float:
+    def descend(self, k: int, D: ComplexArray, bound: float, pieces: int) -> float:
         """Look at everything below a node with planes k+1 … fixed; lowest bound of what was left out.
 
-        `bound` counts the planes fixed exactly and m of the others.
+        `bound` counts the planes fixed exactly and m of the others; so many `pieces` are left for these.
         """
         c, size, shift = self._centre(k, D)
         # |R|²|d − c|² + linear(d) = |R|²|d − z|² + shift
@@ -156,7 +172,7 @@ class _Run:
                     return min(left, float(max(bound, base + size * inner**2)))
                 known = thinner
                 continue
-            left = min(left, self._ring(k, D, c, base, size, hit))
+            left = min(left, self._ring(k, D, c, base, size, hit, pieces))
             low = radius
             count = len(hit[0])
             known = inner + (radius - inner) * (2.0 if count < 200 else 1.3) if inner else radius * 2
@@ -181,9 +197,11 @@ class _Run:
         base: float,
         size: float,
         hit: tuple[ComplexArray, IntArray],
+        pieces: int,
     ) -> float:
         """Look below the vectors of one ring, nearest first."""
-        points, keys = hit
+        rest = pieces - self.sets[k].pieces(hit[1])
+        points, keys, rest = hit[0][rest >= 0], hit[1][rest >= 0], rest[rest >= 0]
         bounds = np.maximum(base + size * np.abs(points - z) ** 2, 0.0)
         if not k:
             for first in range(0, len(points), self.chunk):
@@ -199,7 +217,7 @@ class _Run:
             if n and time.perf_counter() > self.until:
                 return min(left, float(bound))
             D[k], self.keys[k] = point, key
-            left = min(left, self.descend(k - 1, D, float(bound)))
+            left = min(left, self.descend(k - 1, D, float(bound), int(rest[n])))
         return left
 
     def _leaves(self, D: ComplexArray, points: ComplexArray, keys: IntArray, bounds: FloatArray) -> None:

@@ -12,7 +12,7 @@ listed, the best that was found comes with a lower bound that holds for every mo
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,10 +21,11 @@ from numpy.typing import ArrayLike
 
 from balancing.data.limits import Limits
 from balancing.mounting.discrete_bounds import best_form, form, project_out, relax
-from balancing.mounting.discrete_search import Found, polish, search
+from balancing.mounting.discrete_search import Found, polish, rounded, search
+from balancing.mounting.fewest_pieces import fewest
 from balancing.mounting.free_amounts import FreeAmounts
 from balancing.mounting.holes import Holes, Mounting
-from balancing.mounting.mountable_vectors import Attainable, nearest
+from balancing.mounting.mountable_vectors import Attainable
 from balancing.mounting.piece_sums import LONGEST, PieceSums
 from balancing.solvers.certificate import Problem
 from balancing.solvers.cone import InfeasibleError, problem, solve_cone
@@ -35,6 +36,8 @@ __all__ = ["Discrete", "solve_discrete"]
 
 _KEPT = 1 + 1e-9
 _SHARP = 1e-9
+_SAME = 1e-9
+"""What is left counts as nothing below this share of what vibrates."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,9 @@ class Discrete:
     rounded_objective
         Of the continuous answer rounded plane by plane to the nearest attainable vectors; infinite where that
         breaks a limit.
+    best
+        The best choice, where this one is of fewer pieces: `bound` and `gap` are then its own, and `proven`
+        says as well that no fewer pieces are within reach, and none of so many is better. None: this one.
     """
 
     mountings: tuple[Mounting | None, ...]
@@ -66,27 +72,33 @@ class Discrete:
     gap: float
     proven: bool
     rounded_objective: float
+    best: Discrete | None = None
+
+    @property
+    def pieces(self) -> int:
+        """How many pieces all planes take together; free amounts do not count."""
+        return sum(int(one.counts.sum()) for one in self.mountings if one is not None)
 
 
 def solve_discrete(
     W: ArrayLike,
     Y: ArrayLike,
-    planes: Sequence[Holes | None],
+    planes: Mapping[str, Holes | None] | Sequence[Holes | None],
     *,
     method: Literal["least-squares", "minmax"] = "least-squares",
     row_weights: ArrayLike | None = None,
     limits: Limits | None = None,
     time_limit: float = 5.0,
-    names: Sequence[str] = (),
+    within: float = 1.0,
 ) -> Discrete:
-    """The mounting of all planes that leaves the least vibration.
+    """The mounting of all planes that leaves the least vibration, or little more with fewer pieces.
 
     Parameters
     ----------
     W, Y
         Influence coefficients (N, P) and readings (N,), complex.
     planes
-        What each plane can take; None for a plane that takes any weight.
+        What each plane can take, perhaps by its name for messages; None for a plane that takes any weight.
     method
         What is minimised.
     row_weights
@@ -95,9 +107,10 @@ def solve_discrete(
         Largest amplitudes (S·C = N, speed by speed), largest weights of the planes (of what is mounted and
         added together) and arcs in which no hole is used.
     time_limit
-        s; what is found until then is returned with its gap.
-    names
-        Of the planes, for messages.
+        s; what is found until then is returned with its gap; as long again for fewer pieces.
+    within
+        So many times the least objective is good enough for fewer pieces: of the choices within it the one
+        of the fewest pieces, and of these the best; 1: the best of all.
 
     Raises
     ------
@@ -111,16 +124,18 @@ def solve_discrete(
         raise ValueError(f"the method must be 'least-squares' or 'minmax'; got {method!r}")
     if not (np.isfinite(time_limit) and time_limit > 0):
         raise ValueError("the time limit must be a number of seconds above 0")
+    if not 1 <= within < np.inf:
+        raise ValueError(f"the objective can be within 1 or more times of the least, not {within!r}")
     residual = None if limits is None else limits.residual.ravel()
     most = None if limits is None else limits.max_weight
     task = problem(W, Y, row_weights, most, residual, minmax=method == "minmax")
     P = task.W.shape[1]
-    named = tuple(names) or tuple(str(p + 1) for p in range(P))
-    if len(planes) != P or len(named) != P:
-        raise ValueError(f"there must be holes, or None, and a name for each of the {P} planes")
+    named = planes if isinstance(planes, Mapping) else {str(p): h for p, h in enumerate(planes, start=1)}
+    if len(named) != P:
+        raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     arcs = limits.forbidden if limits is not None else ((),) * P
-    usable = [_usable(h, a, name) for h, a, name in zip(planes, arcs, named, strict=True)]
-    return _Joint(task, planes, usable, named).best(start, time_limit)
+    usable = [_usable(h, a, name) for (name, h), a in zip(named.items(), arcs, strict=True)]
+    return _Joint(task, tuple(named.values()), usable, tuple(named)).best(start, time_limit, within)
 
 
 def _usable(holes: Holes | None, arcs: Sequence[tuple[float, float]], name: str) -> BoolArray:
@@ -191,7 +206,7 @@ class _Joint:
         amounts = FreeAmounts(holes, usable, heaviest, needed)
         return None if not holes.step and amounts.surround and np.isinf(heaviest) else amounts
 
-    def best(self, start: float, limit: float) -> Discrete:
+    def best(self, start: float, limit: float, within: float = 1.0) -> Discrete:
         """Solve; `solve_discrete` says what it raises."""
         continuous = self._continuous()
         if not self.own:
@@ -199,11 +214,13 @@ class _Joint:
         relaxed, prices = relax(self.A, self.y, self.sets, minmax=self.task.minmax)
         for s, z in zip(self.own, relaxed[self.fixed], strict=True):
             s.aim(complex(z))
-        tried = [self._rounded(near[self.fixed]) for near in (continuous, relaxed, np.zeros_like(relaxed))]
+        nothing = np.zeros_like(relaxed)
+        tried = [rounded(self.own, self._squares, D[self.fixed]) for D in (continuous, relaxed, nothing)]
         found, plane_by_plane = min(tried, key=lambda one: one.square), tried[0].D
         if np.isinf(found.square):
             found = self._feasible(start, limit)
         polish(self.own, self._squares, found, start + (0.2 if self.exact else 0.1) * limit)
+        chunk = 4096 if self.exact else 8
         if self.task.minmax:
             shares = (self.A, self.y, prices, self.fixed, self.own, np.sqrt(found.square))
             sharp, q = best_form(*shares, (0.0,)).bound, best_form(*shares)
@@ -213,22 +230,33 @@ class _Joint:
             sharp = q.bound
         unexplored = sharp
         if found.square * (1 - _SHARP) > sharp:
-            unexplored = search(q, self.own, self._squares, found, start + limit, 4096 if self.exact else 8)
+            unexplored = search(q, self.own, self._squares, found, start + limit, chunk)
             if not all(s.complete for s in self.own):
                 unexplored = min(unexplored, q.bound)
             unexplored = max(unexplored, sharp)
-        mountings = tuple(s.mount(key) for s, key in zip(self.own, found.keys, strict=True))
-        weights, rounded = continuous.copy(), continuous.copy()
-        weights[self.fixed], rounded[self.fixed] = found.D, plane_by_plane
-        weights[self.free] = self._follow(found.D)
-        return self._result(weights, mountings, rounded, unexplored)
+        near = continuous.copy()
+        near[self.fixed] = plane_by_plane
+        result = self._placed(found, self.own, near, unexplored)
+        if within == 1 or not result.pieces:
+            return result
+        enough = max(within * result.objective, _SAME * float(np.linalg.norm(self.y))) ** 2 * _KEPT
+        until = max(start + limit, time.perf_counter()) + limit
+        few, sure = fewest(q, self.own, self._squares, enough, result.pieces, until, chunk)
+        if few is None:
+            return replace(result, proven=result.proven and sure)
+        chosen = self._placed(*few, near, unexplored)
+        best = result if result.objective < chosen.objective else None  # otherwise it was not the best
+        return replace(chosen, bound=result.bound, gap=result.gap, proven=result.proven and sure, best=best)
 
-    def _rounded(self, D: ComplexArray) -> Found:
-        """Every plane by itself: the nearest vectors that can be mounted."""
-        picks = [nearest(s, complex(z)) for s, z in zip(self.own, D, strict=True)]
-        near = np.array([vectors[0] for vectors, _ in picks])
-        square = float(self._squares(near[None], np.zeros(1), np.inf)[0])
-        return Found(square, near, np.array([keys[0] for _, keys in picks]))
+    def _placed(
+        self, found: Found, sets: Sequence[Attainable], near: ComplexArray, unexplored: float
+    ) -> Discrete:
+        """Pieces in their holes, and the continuous planes beside them."""
+        mountings = tuple(s.mount(key) for s, key in zip(sets, found.keys, strict=True))
+        weights = near.copy()
+        weights[self.fixed] = found.D
+        weights[self.free] = self._follow(found.D)
+        return self._result(weights, mountings, near, unexplored)
 
     def _feasible(self, start: float, limit: float) -> Found:
         """A mounting that keeps every limit: the largest share of a limit made smallest."""
@@ -250,7 +278,7 @@ class _Joint:
                 "no mounting that keeps every limit was found in time: allow more time, or relax a limit"
             )
         self.own = other.own  # where not all vectors are listed these are near what keeps the limits
-        return self._rounded(answer.weights[self.fixed])
+        return rounded(self.own, self._squares, answer.weights[self.fixed])
 
     def _squares(self, D: ComplexArray, bounds: FloatArray, best: float) -> FloatArray:
         """Squared objectives of vectors (M, P'), infinite where a limit is broken; see `Squares`."""

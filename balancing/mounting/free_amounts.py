@@ -96,6 +96,14 @@ class FreeAmounts:
         one = one[np.argsort(distance[one], kind="stable")]
         return d[one], key[one]
 
+    def few(self, pieces: int) -> FreeAmounts:
+        """See `Attainable`."""
+        return self
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        return np.zeros(len(keys), dtype=np.int64)
+
     def lowest(self, g: complex) -> float:
         """See `Attainable`."""
         along = (np.conj(g) * self.directions).real

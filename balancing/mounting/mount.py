@@ -13,6 +13,7 @@ from balancing.correction.correction_errors import stack_errors
 from balancing.correction.correction_result import Correction
 from balancing.data.trials import Trials
 from balancing.mounting.discrete_weights import solve_discrete
+from balancing.mounting.fewest_pieces import FEW
 from balancing.mounting.holes import Holes
 from balancing.mounting.mount_result import Mounted
 from balancing.solvers.error_propagation import prediction_covariance
@@ -28,8 +29,9 @@ def mount(
     row_weights: FloatArray | None = None,
     time_limit: float = 5.0,
     on_top: bool = False,
+    within: float = FEW,
 ) -> Mounted:
-    """Choose pieces for all planes together that leave the least vibration.
+    """Choose the fewest pieces, for all planes together, that leave little more than the least vibration.
 
     Parameters
     ----------
@@ -42,6 +44,8 @@ def mount(
         By plane; planes without get any weight at any angle.
     time_limit
         s, for the proof of the optimum.
+    within
+        So many times the least vibration (what the method minimises) is good enough; 1: the least.
     on_top
         Whether what is mounted in the last run stays, and pieces are added to it; otherwise it is removed.
 
@@ -83,12 +87,12 @@ def mount(
     found = solve_discrete(
         W,
         Y.ravel(),
-        own,
+        dict(zip(planes, own, strict=True)),
         method="minmax" if correction.method == "minmax" else "least-squares",
         row_weights=rows,
         limits=correction.limits,
         time_limit=time_limit,
-        names=planes,
+        within=within,
     )
     after = Y + (W @ found.weights).reshape(Y.shape)
     after_covariance = None if errors is None else errors.check_run(total + found.weights, after)

@@ -25,7 +25,7 @@ from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import figures
+from rotorid.base.text import counted, figures
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _ANY = "any"
 """Hole of a plane that takes any weight at any angle."""
+_COUNTED = {"minmax": "the largest", "weighted": "every reading counted by its error"}
 AGAINST = 3.0
 """Pieces that weigh more than this times what they make are said to act against each other."""
 
@@ -112,11 +113,37 @@ class Mounted(Answered):
                 "residuals": rows(residuals),
                 "rms_after": rms(after),
                 "max_after": after.max(),
+                "pieces": self.found.pieces,
+                "best": self._best(),
                 "proven": self.found.proven,
                 "gap": self.found.gap,
                 "plane_by_plane": self.plane_by_plane,
             }
         )
+
+    def _best(self) -> dict[str, Any] | None:
+        """What more pieces would leave; None where these are the best."""
+        best = self.found.best
+        if best is None:
+            return None
+        ratio = self.found.objective / best.objective if best.objective > 0 else None
+        left = self.correction.labels.vibration(best.residual)[0]
+        return {
+            "pieces": best.pieces,
+            "objective_ratio": ratio,
+            "rms_after": rms(left),
+            "max_after": left.max(),
+        }
+
+    def _certificate(self) -> str:
+        """How sure the choice is."""
+        if self.found.gap:
+            return f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
+        if not self.found.proven:
+            return "Fewer pieces may do as well: there was no time to know (--split-seconds)."
+        if self.found.best:
+            return "No fewer pieces do as well, and no other choice of so many is better (proven)."
+        return "No other choice of pieces is better (proven)."
 
     def to_frame(self) -> pd.DataFrame:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
@@ -154,17 +181,22 @@ class Mounted(Answered):
             words = [f"{figures(row[4])} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
             words += equal_together((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
             gone = " (remove)" if plane in self.correction.remove else ""
-            nothing = "nothing; no pieces that it can take make it better"
+            nothing = "nothing" if self._best() else "nothing; no pieces that it can take make it better"
             lines.append(f"  {plane}{gone}: {'; '.join(words) or nothing}")
         return lines
 
     def _proof(self) -> str:
-        sure = "No other choice of pieces is better (proven)"
-        if not self.found.proven:
-            sure = f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %"
+        said, best = [self._certificate()], self._best()
+        if best:
+            few, ratio = counted(self.found.pieces, "piece"), best["objective_ratio"]
+            times = "what" if ratio is None else f"{ratio:.3g} times what"
+            how = _COUNTED.get(self.correction.method, "rms")
+            said.insert(0, f"{few}: {times} {best['pieces']} would leave (--best), {how}.")
         if np.isfinite(self.plane_by_plane):
-            sure += f"; plane by plane the nearest would leave {self.plane_by_plane:.3g} times as much"
-        return f"{sure}."
+            said.append(
+                f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
+            )
+        return "\n".join(said)
 
 
 def _action(correction: Correction, plane: str) -> str:

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from balancing.mounting.holes import Mounting
+from balancing.mounting.holes import Holes, Mounting
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray, IntArray
 
 __all__ = [
@@ -45,6 +45,7 @@ _THIN = 1e-12
 class Attainable(Protocol):
     """A set of vectors, and how each is mounted."""
 
+    holes: Holes
     complete: bool
     reach: float
     """No vector is larger."""
@@ -63,6 +64,12 @@ class Attainable(Protocol):
 
         `fitting` counts only what fits the limits of pieces, which takes longer.
         """
+
+    def few(self, pieces: int) -> Attainable:
+        """The vectors of so many pieces, or all, whichever can be looked up with less."""
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """How many each vector takes at least, shape (n,); 0 where amounts are free."""
 
     def lowest(self, g: complex) -> float:
         """Lower bound of Re(ḡ d) over the set (also over what was left out)."""

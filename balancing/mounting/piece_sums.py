@@ -93,6 +93,7 @@ class PieceSums:
         longest: int = LONGEST,
     ) -> None:
         self.holes, self.max_weight, self.mounted, self.longest = holes, max_weight, holes.mounted, longest
+        self.usable = usable
         where = np.flatnonzero(usable)
         self.where = where[np.argsort(np.mod(holes.angles[where], 2 * np.pi), kind="stable")]
         self.ways = np.exp(1j * holes.angles[self.where])
@@ -102,6 +103,7 @@ class PieceSums:
 
     def aim(self, z: complex) -> None:
         """See `Attainable`."""
+        self._aimed = z
         self.limits, self.base = self.contents.limits, np.zeros(len(self.where), dtype=np.int64)
         found = self._halves(np.arange(len(self.where)))
         self.complete = found is not None
@@ -266,6 +268,21 @@ class PieceSums:
             order = np.argsort(keys, kind="stable")
             self._grids[level] = order, keys[order], h, origin, width
         return self._grids[level]
+
+    def few(self, pieces: int) -> PieceSums:
+        """See `Attainable`."""
+        few = PieceSums(self.holes, self.usable, self.max_weight, max(pieces, 1), self.longest)
+        few.aim(self._aimed)
+        return min(
+            (self, few), key=lambda one: (not one.complete, sum(len(half.sums) for half in one.halves))
+        )
+
+    def pieces(self, keys: IntArray) -> IntArray:
+        """See `Attainable`."""
+        first, second = self.halves
+        there = self.contents.cost[self.base].sum()
+        cost = first.cost[keys[:, 0]] + second.cost[keys[:, 1]] + there
+        return np.asarray(np.floor(cost + SAME), dtype=np.int64)
 
     def lowest(self, g: complex) -> float:
         """See `Attainable`."""

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 
 from balancing.data.conventions import Labels
+from balancing.mounting.fewest_pieces import FEW
 from balancing.mounting.free_amounts import FreeAmounts
-from balancing.mounting.holes import Holes, Mounting, equal_together
-from balancing.mounting.mountable_vectors import Attainable, nearest
+from balancing.mounting.holes import Holes, Mounting, equal_together, mounting
+from balancing.mounting.mountable_vectors import MOST, Attainable, nearest
 from balancing.mounting.piece_sums import PieceSums
 from rotorid.base.answer import Answer
+from rotorid.base.arrays import IntArray
 from rotorid.base.text import capital, counted, percent
 
 _PROVEN = 1e-9
@@ -51,6 +53,9 @@ class Split:
         No other choice has a smaller |error| than this.
     proven
         Whether nothing better exists: `bound` is |error|.
+    best
+        The nearest, where this one is of fewer pieces: `bound` is then its own, and `proven` says as well
+        that no fewer pieces are good enough. None: this one.
     """
 
     target: complex
@@ -60,6 +65,7 @@ class Split:
     relative_error: float
     bound: float
     proven: bool
+    best: Split | None = None
 
     @property
     def pieces(self) -> int:
@@ -75,7 +81,8 @@ class Split:
             out.append(
                 f"{self._content(int(h), labels)} in hole {self.holes.names[h]} (at {_degrees(angle)})"
             )
-        return out or ["nothing is mounted: nothing that fits these holes is nearer to the wanted weight"]
+        why = "" if self.best else ": nothing that fits these holes is nearer to the wanted weight"
+        return out or [f"nothing is mounted{why}"]
 
     def _content(self, h: int, labels: Labels) -> str:
         unit = labels.weight_in
@@ -135,6 +142,9 @@ class Split:
         many = counted(self.pieces, "hole" if self.holes.free_amounts else "piece")
         what = f"in {many}" if self.holes.free_amounts else many
         lines = [f"  {words}" for words in self.in_holes(labels)]
+        if self.best is not None:
+            less = f"an error of {percent(self.best.relative_error)} %"
+            lines.append(f"{self.best.pieces} pieces would leave {less} (--best).")
         if not self.proven:
             lines.append(
                 f"These holes have more combinations than can be tried: nothing better than an error of "
@@ -147,7 +157,7 @@ class Split:
 
 @dataclass(frozen=True, eq=False)
 class OnHoles:
-    """The nearest vector in the holes, and those of fewer pieces."""
+    """The vector chosen in the holes, and the nearest ones of fewer pieces."""
 
     nearest: Split
     fewer: tuple[Split, ...]
@@ -158,6 +168,7 @@ class OnHoles:
             "method": "holes",
             **self.nearest.to_dict(labels),
             "words": self.nearest.lines(labels),
+            "best": None if self.nearest.best is None else self.nearest.best.to_dict(labels),
             "fewer_pieces": [one.to_dict(labels) for one in self.fewer],
         }
 
@@ -185,15 +196,25 @@ class OnHoles:
 
 
 def split_on_holes(
-    target: complex, holes: Holes, *, most_pieces: int | None = None, good_enough: float = 0.0
+    target: complex,
+    holes: Holes,
+    *,
+    most_pieces: int | None = None,
+    good_enough: float = 0.0,
+    within: float = FEW,
 ) -> OnHoles:
     """`split` and `fewer_pieces` together."""
-    nearest = split(target, holes, most_pieces=most_pieces, good_enough=good_enough)
-    return OnHoles(nearest, tuple(fewer_pieces(nearest)))
+    found = split(target, holes, most_pieces=most_pieces, good_enough=good_enough, within=within)
+    return OnHoles(found, tuple(fewer_pieces(found)))
 
 
 def split(
-    target: complex, holes: Holes, *, most_pieces: int | None = None, good_enough: float = 0.0
+    target: complex,
+    holes: Holes,
+    *,
+    most_pieces: int | None = None,
+    good_enough: float = 0.0,
+    within: float = 1.0,
 ) -> Split:
     """Mount what makes the vector nearest to a target, with the fewest pieces among equally near ones.
 
@@ -208,6 +229,8 @@ def split(
     good_enough
         Relative error that needs no more pieces: the nearest vector of the fewest pieces that keep to it; 0:
         the nearest of all. Has no meaning for free amounts.
+    within
+        So many times the least |error| needs no more pieces, either.
 
     Raises
     ------
@@ -228,23 +251,44 @@ def split(
         raise ValueError(f"the number of pieces must be 1 or more, not {most_pieces!r}")
     if not good_enough >= 0:
         raise ValueError(f"the relative error that is good enough must not be negative, not {good_enough!r}")
-    nearest = _nearest(complex(target), holes, most_pieces)
-    if nearest.relative_error > good_enough or holes.free_amounts or nearest.pieces == 0:
-        return nearest
-    for n in range(1, nearest.pieces):
-        one = _nearest(nearest.target, holes, n)
-        if one.relative_error <= good_enough:
-            return one
-    return nearest
+    best = _nearest(complex(target), holes, most_pieces)
+    size = abs(best.error)
+    enough = max(size * within, good_enough * abs(target), size + _TIE * _scale(best.target, holes))
+    if max(within - 1, good_enough) == 0 or holes.free_amounts or best.pieces == 0:
+        return best
+    few = _few(best, most_pieces, enough)
+    if few.pieces == best.pieces:
+        return best
+    more = best if size < abs(few.error) else None  # otherwise it was not the nearest
+    return replace(few, bound=best.bound, proven=best.proven and few.proven, best=more)
+
+
+def _few(best: Split, most_pieces: int | None, enough: float) -> Split:
+    """The nearest of the fewest pieces whose |error| is at most `enough`."""
+    target, holes = best.target, best.holes
+    sums = PieceSums(holes, holes.free, holes.max_weight, most_pieces)
+    sums.aim(target)
+    hit = sums.near(target, -1.0, enough, MOST) if sums.complete else None
+    if hit is not None:
+        number, distance = sums.pieces(hit[1]), np.abs(hit[0] - target)
+        distance[number > number.min()] = np.inf
+        tied = hit[1][distance <= distance.min() + _TIE * _scale(target, holes)]
+        return _of(target, holes, _lightest(sums, tied, target), np.inf)
+    if abs(target) <= enough and holes.allows(0.0):
+        return _of(target, holes, mounting(holes), np.inf)
+    each = (_nearest(target, holes, n) for n in range(1, best.pieces))
+    return next((one for one in each if abs(one.error) <= enough), best)
 
 
 def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
-    mounted, bound = _mounted(target, holes, most_pieces)
+    return _of(target, holes, *_mounted(target, holes, most_pieces))
+
+
+def _of(target: complex, holes: Holes, mounted: Mounting, bound: float) -> Split:
     error = mounted.vector - target
     size = abs(error)
     bound = min(bound, size)
     against = abs(target) or abs(mounted.vector)
-    scale = max(abs(target), float(holes.pieces.max(initial=0.0)))
     return Split(
         target=target,
         holes=holes,
@@ -252,17 +296,21 @@ def _nearest(target: complex, holes: Holes, most_pieces: int | None) -> Split:
         error=error,
         relative_error=size / against if against > 0 else 0.0,
         bound=bound,
-        proven=bool(size - bound <= _PROVEN * scale),
+        proven=bool(size - bound <= _PROVEN * _scale(target, holes)),
     )
+
+
+def _scale(target: complex, holes: Holes) -> float:
+    return max(abs(target), holes.step, float(holes.pieces.max(initial=0.0)))
 
 
 def _mounted(target: complex, holes: Holes, most_pieces: int | None) -> tuple[Mounting, float]:
     """The nearest vector, and a distance within which there is nothing else."""
-    scale = max(abs(target), holes.step, float(holes.pieces.max(initial=0.0)))
+    scale = _scale(target, holes)
     if not holes.free_amounts:
         sums = PieceSums(holes, holes.free, holes.max_weight, most_pieces)
         sums.aim(target)
-        found = _fewest(sums, target, scale)
+        found = _lightest(sums, nearest(sums, target, _TIE * scale)[1], target)
         if sums.complete:
             return found, np.inf
         if most_pieces is None or most_pieces > _FEW:
@@ -270,7 +318,9 @@ def _mounted(target: complex, holes: Holes, most_pieces: int | None) -> tuple[Mo
         return found, sums.bound(target)
     needed = np.inf if np.isfinite(holes.max_weight) else 2 * scale
     amounts = FreeAmounts(holes, holes.free, holes.max_weight, needed)
-    return _fewest(amounts, target, scale) if holes.step else amounts.place_nearest(target), np.inf
+    if not holes.step:
+        return amounts.place_nearest(target), np.inf
+    return _lightest(amounts, nearest(amounts, target, _TIE * scale)[1], target), np.inf
 
 
 def _of_few(target: complex, holes: Holes) -> tuple[Mounting, ...]:
@@ -281,8 +331,9 @@ def _of_few(target: complex, holes: Holes) -> tuple[Mounting, ...]:
         return ()
 
 
-def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
-    """Of the nearest vectors that of the fewest pieces (or holes in use), then of the least weight."""
+def _lightest(one: Attainable, keys: IntArray, target: complex) -> Mounting:
+    """Of these vectors that of the fewest pieces (or holes in use), then of the least weight."""
+    scale = _scale(target, one.holes)
     toward = np.conj(target) / (abs(target) or 1.0)
 
     def cost(found: Mounting) -> tuple[float, ...]:
@@ -290,7 +341,7 @@ def _fewest(one: Attainable, target: complex, scale: float) -> Mounting:
         along = (toward * found.vector).real  # of equal weights that nearest to the direction of the target
         return float(number), round(found.amounts.sum() / scale, 9), round(-along / scale, 9)
 
-    return min((one.mount(key) for key in nearest(one, target, _TIE * scale)[1]), key=cost)
+    return min(map(one.mount, keys), key=cost)
 
 
 def fewer_pieces(found: Split, most: int = _FEW) -> list[Split]:

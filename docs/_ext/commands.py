@@ -54,10 +54,12 @@ def describe(name: str, command: Any) -> nodes.section:  # noqa: ANN401 - typer 
     if examples:
         out += _code("\n".join(f"$ {example}" for example in examples))
     hints = get_type_hints(command.callback)
-    for title, params in (("Arguments", arguments), ("Options", options)):
-        if params:
-            out += nodes.rubric("", title)
-            out += nodes.definition_list("", *(_item(p, hints.get(p.name)) for p in params))
+    panels: dict[str, list[Any]] = {"Arguments": arguments} if arguments else {}
+    for option in options:
+        panels.setdefault(option.rich_help_panel, []).append(option)
+    for title, params in panels.items():
+        out += nodes.rubric("", title)
+        out += nodes.definition_list("", *(_item(p, hints.get(p.name)) for p in params))
     return out
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 
 import typer
 
-from rotorid.base.answer import kinds
+from rotorid.base.answer import COLUMNS, kinds
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
@@ -36,30 +36,32 @@ from rotorid.cli.verbose import verbosely
 app = typer.Typer(
     name="rotorid",
     rich_markup_mode=markup_mode(),
-    no_args_is_help=True,
+    invoke_without_command=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS: dict[str, Callable[..., None]] = {
-    "demo": demo.demo,
-    "critical": critical.critical,
-    "campbell": campbell.campbell,
-    "response": response.response,
-    "influence": influence.influence,
-    "balance": balance.balance,
-    "trial-weight": trial_weight.trial_weight,
-    "split": split.split,
-    "tolerance": tolerance.tolerance,
-    "unbalance": unbalance.unbalance,
-    "reduce": reduce.reduce,
-    "identify": identify.identify,
-    "fit": fit.fit,
-    "schema": schema.schema,
-    "validate": validate.validate,
+_COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
+    "Balance rotors": {
+        "balance": balance.balance,
+        "trial-weight": trial_weight.trial_weight,
+        "split": split.split,
+        "tolerance": tolerance.tolerance,
+        "unbalance": unbalance.unbalance,
+    },
+    "Compute rotors": {
+        "critical": critical.critical,
+        "campbell": campbell.campbell,
+        "response": response.response,
+        "influence": influence.influence,
+    },
+    "Make a small model": {"reduce": reduce.reduce},
+    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit},
+    "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
-for _name, _command in _COMMANDS.items():
-    app.command(_name, cls=Command)(verbosely(_command))
+for _job, _commands in _COMMANDS.items():
+    for _name, _command in _commands.items():
+        app.command(_name, cls=Command, rich_help_panel=_job)(verbosely(_command))
 
 
 def _version(show: bool) -> None:
@@ -72,16 +74,37 @@ def _version(show: bool) -> None:
 
 @app.callback()
 def _rotorid(
+    ctx: typer.Context,
     version: bool = typer.Option(
         False, "--version", callback=_version, is_eager=True, help="Print the version and end."
     ),
 ) -> None:
     """Rotor models, flexible-rotor balancing and identification of oscillating systems.
 
-    Every command has --json (one JSON document on standard output), --plot FILE and --output FILE where they
-    make sense, --verbose for the numbers behind a result (on standard error), and --help with an example.
+    Every command has --json (one JSON document on standard output), --plot FILE and --output FILE
+    where they make sense, --table for every table, --verbose for the numbers behind a result (on
+    standard error), and --help with examples. `rotorid` alone shows an example of each job.
+
     Exit status: 0, or 2 for bad input with one message; `validate` ends with 1 where a number differs.
     """
+    if ctx.invoked_subcommand is None:
+        typer.echo(_overview())
+
+
+def _overview() -> str:
+    """The jobs, each with the first example of its first command, and their commands."""
+    lines = [
+        "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
+        "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
+        "",
+    ]
+    for job, commands in _COMMANDS.items():
+        told = {name: command.__doc__ or "" for name, command in commands.items()}
+        example = " ".join("".join(told.values()).split("Example: ")[1].partition("\n\n")[0].split())
+        short = len(job) + len(example) + 2 <= COLUMNS
+        lines += [f"{job}: {example}"] if short else [f"{job}:", f"  {example}"]
+        lines += [f"  {name:<12}  {text.partition('.')[0]}" for name, text in told.items()]
+    return "\n".join(lines)
 
 
 def main() -> None:

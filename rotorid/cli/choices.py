@@ -1,7 +1,8 @@
-"""Options that choose one of a few: help from the registries, a suggestion for a misspelt one."""
+"""Help of commands, with the choices of the registries; a suggestion for a misspelt choice."""
 
 from __future__ import annotations
 
+import inspect
 import re
 from typing import Any, get_type_hints
 
@@ -17,9 +18,16 @@ class Command(TyperCommand):
     """A command whose help tells what its options choose from."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - as typer declares it
-        """As typer's, with the methods of the registries."""
+        """As typer's, with the methods of the registries, and compact."""
         tell_choices(self)
+        _compact(self, ctx)
         super().format_help(ctx, formatter)
+
+    def get_help_option(self, ctx: Any) -> Any:  # noqa: ANN401 - as typer declares it
+        """As typer's, among those of the output."""
+        found: Any = super().get_help_option(ctx)
+        found.rich_help_panel = "Output"
+        return found
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
         """As typer's, with the nearest choice in a complaint."""
@@ -43,6 +51,16 @@ def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public ty
         choices = declared[1]() if declared[1:] and declared[1] else {}
         if parameter.name in choices:
             parameter.help = f"{declared[0].help} {described(choices[parameter.name])}"
+
+
+def _compact(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
+    """Whole paragraphs, and without what the words say as well: `<bool>`, `<list[Path]>`, ranges."""
+    paragraphs = inspect.cleandoc(command.help or "").split("\n\n")
+    command.help = "\n\n".join(" ".join(each.split()) for each in paragraphs)
+    for parameter in command.get_params(ctx):
+        parameter._get_number_range_help_str = lambda: ""  # a refusal tells it
+        if parameter.param_type_name == "argument" or parameter.is_flag:
+            parameter.display_type_rich = lambda ctx: ""
 
 
 def nearest_choice(message: str) -> str:

@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
+from typer.models import OptionInfo
 
 from rotorid.cli.output import Destination
 
 Command = Callable[..., None]
-USUAL = ("table", "json", "plot", "output")
-WITH_REPORT = (*USUAL, "report")
+USUAL = ("plot", "output", "table", "json")
+WITH_REPORT = ("report", *USUAL)
+INPUT, OUTPUT = "Input", "Output"
 RotorArgument = Annotated[
     Path,
     typer.Argument(metavar="ROTOR", help="Rotor table (.csv, .xlsx) or rotor file (.toml)."),
@@ -30,6 +32,7 @@ def command(
     *,
     names: Mapping[str, Sequence[str]] | None = None,
     least: Mapping[str, float] | None = None,
+    panels: Mapping[str, str] | None = None,
     to: Sequence[str] = USUAL,
 ) -> Callable[[Command], Command]:
     """Replace the parameters `options` and `to` of a command by one for each field of these dataclasses.
@@ -45,6 +48,9 @@ def command(
         What is typed instead of `--field`.
     least
         The least value of a number.
+    panels
+        Of the help, in their order: title, and the options in it, the common ones first. Options that are
+        not named stand in `INPUT`, before these, or in `OUTPUT` (those of `to`).
     to
         Which fields of `Destination` the command has.
     """
@@ -66,12 +72,26 @@ def command(
             function(**given)
 
         only = inspect.Parameter.KEYWORD_ONLY
-        told = [parameter.replace(kind=only) for parameter in told]
+        told = _in_panels([parameter.replace(kind=only) for parameter in told], panels or {}, to)
         wrapper.__signature__ = inspect.Signature(told)  # type: ignore[attr-defined]
         wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in told}
         return wrapper
 
     return decorate
+
+
+def _in_panels(
+    told: Sequence[inspect.Parameter], panels: Mapping[str, str], to: Sequence[str]
+) -> list[inspect.Parameter]:
+    """Arguments, then options, panel by panel."""
+    titles = {**panels, OUTPUT: " ".join((*to, panels.get(OUTPUT, "")))}
+    panel_of = {name: title for title, names in titles.items() for name in names.split()}
+    order = list(panel_of)
+    for parameter in told:
+        declared = parameter.annotation.__metadata__[0]
+        if isinstance(declared, OptionInfo):
+            declared.rich_help_panel = panel_of.get(parameter.name, INPUT)
+    return sorted(told, key=lambda one: order.index(one.name) if one.name in panel_of else -1)
 
 
 def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind

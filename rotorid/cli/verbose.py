@@ -15,7 +15,9 @@ import typer
 
 VerboseOption = Annotated[
     bool,
-    typer.Option("--verbose", help="The numbers behind the result, too: on standard error."),
+    typer.Option(
+        "--verbose", rich_help_panel="Output", help="The numbers behind the result, too: on standard error."
+    ),
 ]
 SHOWN = (
     "method",

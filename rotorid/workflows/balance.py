@@ -61,7 +61,7 @@ class BalanceOptions:
     method : METHOD
         How the readings count; default: weighted where their errors are known, else least-squares.
     influence : FILE
-        Stored influence coefficients.
+        Stored influence coefficients, in place of trial runs.
     coefficients : KIND
         measured, computed, combined: from the runs, from the job's rotor, or both; default: measured where
         there are trial weights.
@@ -91,9 +91,12 @@ class BalanceOptions:
     truncate : NUMBER
         Keep this many combinations of planes (1, 2, …), or those above this share (below 1).
     split
-        Choose pieces in the holes of the job, all planes together (a picture of discs).
+        Choose pieces in the holes of the job, all planes together: the fewest that leave at most 1.2 times
+        the least vibration (a picture of discs).
+    best
+        The pieces that leave the least, however many they are.
     split_seconds : SECONDS
-        For the proof that no choice is better.
+        For the proof that no choice is better, and again for the one that no fewer pieces do.
     refine
         Add the job's check runs to its trial runs: coefficients and trim from all of them.
     history
@@ -132,6 +135,7 @@ class BalanceOptions:
     ridge: str | float | None = None
     truncate: float | None = None
     split: bool = False
+    best: bool = False
     split_seconds: float = 5.0
     refine: bool = False
     history: bool = False
@@ -314,6 +318,8 @@ def _check(options: BalanceOptions) -> None:
         one_of(options.coefficients, "--coefficients", KINDS)
     if options.ridge is not None and options.truncate is not None:
         raise ValueError("--ridge and --truncate are two ways to the same end: choose one")
+    if options.best and not options.split:
+        raise ValueError("--best chooses pieces: it means something only with --split")
     if options.split and (options.ridge is not None or options.truncate is not None):
         raise ValueError(
             "--split takes the planes as they are, and would undo --ridge and --truncate: use fewer planes "
@@ -417,6 +423,7 @@ def _again(
 
 
 def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) -> Mounted:
+    from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.mount import mount
 
     return mount(
@@ -426,6 +433,7 @@ def _mount(result: Correction, job: Job, known: Known, options: BalanceOptions) 
         row_weights=job.row_weights,
         time_limit=options.split_seconds,
         on_top=options.refine,
+        within=1.0 if options.best else FEW,
     )
 
 

@@ -25,9 +25,9 @@ class CampbellOptions:
 
     Attributes
     ----------
-    speeds
+    speeds : SPEEDS
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:250rpm.
-    number
+    number : N
         How many modes, by default 6; forward and backward whirl count apart.
     operating : A:B
         Operating speeds, such as 5300:6500rpm.

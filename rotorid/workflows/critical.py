@@ -26,7 +26,7 @@ class CriticalOptions:
 
     Attributes
     ----------
-    number
+    number : N
         How many critical speeds, by default 3; rigid-body motions come besides.
     mesh_check
         Estimate by refinement how far off the mesh makes each.

@@ -34,11 +34,11 @@ class IdentifyOptions:
     method : METHOD
         How the coefficients are found.
     loss : LOSS
-        Of output error.
+        What a residual counts, with output-error.
     amplitude_error : PERCENT
-        One standard deviation of an amplitude, in percent; before that of the model.
+        One standard deviation of an amplitude, in place of the one that the model states.
     phase_error : DEGREES
-        One standard deviation of a phase, in degrees; before that of the model.
+        One standard deviation of a phase, in place of the one that the model states.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N

@@ -26,11 +26,11 @@ class InfluenceOptions:
 
     Attributes
     ----------
-    planes
+    planes : LIST
         Correction planes: nodes or stations, such as 7,12,18.
-    sensors
+    sensors : LIST
         Sensors: nodes or stations, each with its angle from x in degrees: 2:45,22:45 (without: 0).
-    speeds
+    speeds : SPEEDS
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 1000:6000:50rpm.
     """
 

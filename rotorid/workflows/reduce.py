@@ -94,7 +94,7 @@ class ReduceOptions:
     methods
         Beside other reductions.
     response : A:B:STEP
-        Unbalance response beside the full rotor's: A:B:STEP, rad/s or with a unit; or auto.
+        Unbalance response beside the full rotor's, at speeds in rad/s or with a unit; or auto.
     stability : A:B
         Stability beside the full rotor's, 0:9000rpm.
     damping : LIST

@@ -46,7 +46,7 @@ class ResponseOptions:
 
     Attributes
     ----------
-    speeds
+    speeds : SPEEDS
         FIRST:LAST:STEP or a list, rad/s; or with a unit: 500:15000:20rpm.
     sensors : LIST
         Nodes or stations with angles from x in degrees, 2:45,22:45; default: all stations, or else all

@@ -27,7 +27,17 @@ if TYPE_CHECKING:
     Mount = Callable[[complex, Labels, float | None, "SplitOptions"], Found]
 
 _WAYS = ("holes", "two", "drill", "grind")
-_HOLES = ("first_hole", "pieces", "stock", "per_hole", "most_pieces", "good_enough", "taken", "max_mass")
+_HOLES = (
+    "first_hole",
+    "pieces",
+    "best",
+    "stock",
+    "per_hole",
+    "most_pieces",
+    "good_enough",
+    "taken",
+    "max_mass",
+)
 _DRILL = ("axial", "depth", "density", "tip_angle", "spacing")
 _BELONGS: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(_HOLES, ("holes",)),
@@ -51,7 +61,10 @@ class SplitOptions:
     first_hole : DEG
         Angle of hole 1 of equally spaced ones; default: 0.
     pieces : 10g,20g
-        Available pieces; without them amounts are free.
+        Available pieces; without them amounts are free. The fewest are taken whose error is at most 1.2
+        times the least.
+    best
+        The nearest to VECTOR, however many pieces that takes.
     stock : 8,4
         How many there are of each of the pieces.
     per_hole : N
@@ -95,6 +108,7 @@ class SplitOptions:
     holes: str | int | Sequence[float] | None = None
     first_hole: float | None = None
     pieces: str | Sequence[float] | None = None
+    best: bool = False
     stock: str | Sequence[int] | None = None
     per_hole: int | None = None
     most_pieces: int | None = None
@@ -226,13 +240,18 @@ def _way(options: SplitOptions, *, single: bool) -> str:
 
 
 def _on_holes(target: complex, labels: Labels, radius: float | None, options: SplitOptions) -> OnHoles:
+    from balancing.mounting.fewest_pieces import FEW
     from balancing.mounting.split import split_on_holes
 
     good_enough = options.good_enough or 0.0
     if not 0 <= good_enough <= 100:
         raise ValueError(f"--good-enough: {good_enough:g} is no error from 0 to 100 percent")
     holes = _holes(labels, radius, options)
-    return split_on_holes(target, holes, most_pieces=options.most_pieces, good_enough=good_enough / 100)
+    if options.best and good_enough:
+        raise ValueError("--best takes the nearest, --good-enough the fewest pieces: give one of them")
+    within = 1.0 if options.best else FEW
+    most = options.most_pieces
+    return split_on_holes(target, holes, most_pieces=most, good_enough=good_enough / 100, within=within)
 
 
 def _at_two_angles(

@@ -41,13 +41,13 @@ class TrialWeightOptions:
     carried_by : N
         Planes that share the mass of the rotor.
     speed : SPEED
-        Such as 3000rpm.
+        Of the trial run, such as 3000rpm.
     radius : RADIUS
         Where the weight goes, 200mm.
     fraction : PERCENT
-        Force of the weight, of the load (without a job).
+        Without a job: its force, percent of the load.
     share : PERCENT
-        Change, of the largest reading (with a job).
+        With a job: the change it makes, percent of the largest reading.
     plane : LIST
         Planes of the job; default: all of them.
     mass : MASS
@@ -55,9 +55,9 @@ class TrialWeightOptions:
     max_mass : MASS
         Largest weight of the plane, 30g.
     reading_phase : DEGREES
-        Of the largest initial reading, no job.
+        Without a job: phase of the largest reading.
     lag : below|at|above|DEGREES
-        Speed against the critical one, or the lag.
+        Where the speed is, seen from the critical one; or by how much the vibration lags.
     critical : SPEED
         Critical speed, in place of --lag: 2400rpm.
     damping : RATIO

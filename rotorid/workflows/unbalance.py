@@ -30,7 +30,7 @@ class UnbalanceOptions:
 
     Attributes
     ----------
-    stations
+    stations : LIST
         Nodes or stations where unbalance may be: 6,9,12.
     method : METHOD
         How the unbalance follows from the readings.

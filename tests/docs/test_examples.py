@@ -22,13 +22,13 @@ PINNED = {
         "left_deg": 168.931814,
         "largest_before_um_pp": 59.7,
         "largest_after_um_pp": 0.648889174,
-        "largest_with_pieces_um_pp": 1.51306549,
+        "largest_with_pieces_um_pp": 1.36203166,
         "largest_in_check_um_pp": 0.96,
         "trim_left_g_mm": 13.5870451,
     },
     "balance_workflow": {
-        "holes": 11,
-        "largest_after_um_pp": 1.51306549,
+        "holes": 7,
+        "largest_after_um_pp": 1.36203166,
         "readings_that_pass": 20,
     },
     "plan_a_trial_weight": {

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import WITH_REPORT, command
+from rotorid.cli.common_options import OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import TABLES, Destination, check_targets
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
@@ -24,6 +24,16 @@ from rotorid.workflows.balance import balance as work
         "run_error": 0.0,
         "split_seconds": 0.1,
         "best_planes": 1,
+    },
+    panels={
+        "Input and conventions": "phase angles amplitude_error phase_error run_error influence",
+        "Method": "method planes speeds best_planes trade_off coefficients",
+        "Limits": "max_mass limit",
+        "Mounting": "split best",
+        "Check run": "refine history",
+        "Grade": "grade rotor_mass service_speed positions bearings centre",
+        OUTPUT: "save_influence template",
+        "Expert": "model_error ridge truncate split_seconds",
     },
     to=WITH_REPORT,
 )
@@ -47,16 +57,18 @@ def balance(
     ] = None,
     to: Destination,
 ) -> None:
-    """Correction weights that minimise the vibration, with predicted residuals and uncertainty.
+    """Correction weights from trial runs or a rotor model, with ± and what will be left.
 
     Example: rotorid balance sample_data/turbo_job/job.toml --plot corrections.png
 
     Example: rotorid balance sample_data/turbo_job/holes.toml --split --report sheet.html
 
-    Example: rotorid balance runs.csv weights.csv --amplitude-error 2 --phase-error 2 --max-mass 5g
+    Example: rotorid balance sample_data/turbo_job/runs.csv sample_data/turbo_job/weights.csv --phase lead
 
-    Example: rotorid balance --template job.xlsx, and when it is filled in: rotorid balance job.xlsx --output
-    sheet.xlsx (the job and its results in one workbook; --output weights.csv: the corrections alone)
+    Example: rotorid balance --template job.xlsx
+
+    The workbook, filled in, is a job: --output sheet.xlsx writes it with its results, and --output
+    weights.csv the corrections alone.
     """
     if template is not None:
         _write_template(template, files or ())

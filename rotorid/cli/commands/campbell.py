@@ -10,7 +10,7 @@ from rotorid.workflows.campbell import campbell as work
 
 @command(CampbellOptions, names={"number": ("-n", "--number")}, least={"number": 1})
 def campbell(rotor: RotorArgument, options: CampbellOptions, to: Destination) -> None:
-    """Whirl frequencies, logarithmic decrements and directions over speed, and damped critical speeds.
+    """Whirl frequencies, decrements and directions over speed; damped critical speeds.
 
     The picture is a Campbell diagram with the 1× line, over the logarithmic decrements.
 

@@ -12,10 +12,11 @@ from rotorid.workflows.critical import critical as work
     CriticalOptions,
     names={"number": ("-n", "--number"), "speed_map": ("--map",)},
     least={"number": 1},
+    panels={"Method": "speed_map mesh_check"},
     to=WITH_REPORT,
 )
 def critical(rotor: RotorArgument, options: CriticalOptions, to: Destination) -> None:
-    """Critical speeds with their whirl directions, and mode shapes, of the rotor without damping.
+    """Critical speeds with whirl directions, and mode shapes, of the undamped rotor.
 
     Damping and cross-coupling that does work are left out; `rotorid campbell` has them.
 

@@ -19,7 +19,7 @@ from rotorid.workflows.demo_samples import SAMPLES
 
 @command(to=("table", "json"))
 def demo(
-    folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Where to write the sample job.")] = Path(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write the sample job.")] = Path(
         "rotorid-demo"
     ),
     sample: Annotated[

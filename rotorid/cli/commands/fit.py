@@ -7,13 +7,23 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import command
+from rotorid.cli.common_options import OUTPUT, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
 
 
-@command(FitOptions, least={"starts": 1, "seed": 0, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1})
+@command(
+    FitOptions,
+    least={"starts": 1, "seed": 0, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1},
+    panels={
+        "Input": "sigma start allow_missing",
+        "Method": "method loss starts",
+        "Limits": "max_seconds max_iterations",
+        OUTPUT: "",
+        "Expert": "integrator rtol trajectory pieces seed",
+    },
+)
 def fit(
     model: Annotated[
         Path,
@@ -30,7 +40,7 @@ def fit(
     options: FitOptions,
     to: Destination,
 ) -> None:
-    """Parameters of differential equations from time records, with intervals, and how they were found.
+    """Coefficients of differential equations from time records, with ±.
 
     Inputs are taken as exact, and as straight lines between their samples; only outputs have errors.
 

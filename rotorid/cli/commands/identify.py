@@ -13,7 +13,11 @@ from rotorid.workflows.identify import IdentifyOptions
 from rotorid.workflows.identify import identify as work
 
 
-@command(IdentifyOptions, least={"choose": 1})
+@command(
+    IdentifyOptions,
+    least={"choose": 1},
+    panels={"Method": "method loss", "Next test": "design choose"},
+)
 def identify(
     model: Annotated[
         Path, typer.Argument(metavar="MODEL.toml", help="Equations, known numbers, what to estimate.")
@@ -29,10 +33,13 @@ def identify(
     options: IdentifyOptions,
     to: Destination,
 ) -> None:
-    """Coefficients of a model from measured amplitudes, with intervals, or what the data do tell.
+    """Coefficients of a model from harmonic tests, with ±, or what the data do tell.
 
     Example: rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv
 
-    With --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3: which frequencies to measure next.
+    Which frequencies to measure next:
+
+    Example: rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv
+    --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
     """
     to.deliver("identification", lambda: work(model, data, options))

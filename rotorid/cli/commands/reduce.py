@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from rotorid.cli.common_options import WITH_REPORT, command
+from rotorid.cli.common_options import OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import STATE_SPACES, Destination
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
@@ -16,12 +16,24 @@ if TYPE_CHECKING:
     from rotorid.workflows.reduce_result import ReducedRotor
 
 
-@command(ReduceOptions, least={"masses": 1, "modes": 1}, to=WITH_REPORT)
+@command(
+    ReduceOptions,
+    least={"masses": 1, "modes": 1},
+    panels={
+        "Input": "nodes modes speed measured compliance seals",
+        "Method": "rank place masses candidates methods trade_off",
+        "Errors": "errors what_if",
+        "Small model": "response stability model state_space damping force both_planes",
+        OUTPUT: "view",
+        "Expert": "normalise rows nonnegative supports_apart",
+    },
+    to=WITH_REPORT,
+)
 def reduce(
     rotor: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[ROTOR]",
+            metavar="ROTOR",
             help="Rotor table (.csv, .xlsx) or rotor file (.toml); not needed with --compliance.",
         ),
     ] = None,
@@ -42,10 +54,13 @@ def reduce(
             "--state-space", metavar="FILE", help="Write A, B, C, D in both planes: .json, .npz or .mat."
         ),
     ] = None,
-    view: Annotated[View | None, typer.Option("--view", help="What --plot draws.")] = None,
+    view: Annotated[
+        View | None,
+        typer.Option("--view", metavar="WHAT", help=f"What --plot draws: {', '.join(get_args(View))}."),
+    ] = None,
     to: Destination,
 ) -> None:
-    """Equivalent masses at chosen nodes (formula 50), how good they are, and the small model to go on with.
+    """A rotor as a few masses at chosen nodes (formula 50), and how good they are.
 
     The formula is one of a plane at rest; bearings, seals, gyroscopic effect and damping come back with the
     small model (--response, --stability, --model, --state-space).

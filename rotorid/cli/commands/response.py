@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import WITH_REPORT, RotorArgument, command
+from rotorid.cli.common_options import OUTPUT, WITH_REPORT, RotorArgument, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.response import ResponseOptions, View
 from rotorid.workflows.response import response as work
 
 
-@command(ResponseOptions, to=WITH_REPORT)
+@command(ResponseOptions, panels={OUTPUT: "view at"}, to=WITH_REPORT)
 def response(
     rotor: RotorArgument,
     unbalance: Annotated[
@@ -29,7 +29,7 @@ def response(
     *,
     to: Destination,
 ) -> None:
-    """Vibration under unbalance: readings, orbits, bearing forces, and the peaks after API 684.
+    """Vibration under unbalance: readings, orbits, bearing forces, peaks after API 684.
 
     Example: rotorid response sample_data/compressor/rotor.toml
     --unbalance sample_data/compressor/unbalance.csv --speeds 1000:15000:20rpm

@@ -15,7 +15,7 @@ def schema(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job or rotor.")],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """Print the JSON schema of a settings file: an editor then completes, explains and checks its keys.
+    """JSON schema of a job or rotor file: an editor then completes and checks its keys.
 
     Example: rotorid schema job
     """

@@ -12,7 +12,16 @@ from rotorid.workflows.split import SplitOptions
 from rotorid.workflows.split import split as work
 
 
-@command(SplitOptions, names={"axial": ("--axial/--radial",)})
+@command(
+    SplitOptions,
+    names={"axial": ("--axial/--radial",)},
+    panels={
+        "Input": "mounted radius angles",
+        "Holes": "holes pieces best stock per_hole first_hole taken most_pieces good_enough",
+        "Limits and steps": "max_mass step angle_step",
+        "Instead of holes": "two drill depth axial spacing tip_angle density grind",
+    },
+)
 def split(
     vector: Annotated[
         str,
@@ -25,12 +34,12 @@ def split(
     options: SplitOptions,
     to: Destination,
 ) -> None:
-    """Mount one given weight: in holes (exactly the nearest), at two angles, or by drilling or grinding.
+    """Mount one given weight: in holes, at two angles, or by drilling or grinding.
 
-    Examples: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
+    Example: rotorid split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g
 
-    rotorid split 35g@120 --two 20g,30g
+    Example: rotorid split 35g@120 --two 20g,30g
 
-    rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
+    Example: rotorid split 35g@120 --drill 8mm --depth 20mm --radius 100mm
     """
     to.deliver("split", lambda: work(vector, options))

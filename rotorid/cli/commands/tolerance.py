@@ -10,7 +10,7 @@ from rotorid.workflows.tolerance import tolerance as work
 
 @command(ToleranceOptions)
 def tolerance(options: ToleranceOptions, to: Destination) -> None:
-    """Permissible residual unbalance of a rigid rotor (ISO 21940-11), and the share of each plane.
+    """Permissible residual unbalance of a rigid rotor (ISO 21940-11), plane by plane.
 
     Positions count along the shaft from any point. Two planes without positions share it in equal parts.
 

@@ -13,12 +13,21 @@ from rotorid.workflows.trial_weight import TrialWeightOptions
 from rotorid.workflows.trial_weight import trial_weight as work
 
 
-@command(TrialWeightOptions, least={"carried_by": 1})
+@command(
+    TrialWeightOptions,
+    least={"carried_by": 1},
+    panels={
+        "Input": "rotor_mass speed radius bearing_load carried_by",
+        "Weight": "fraction share mass max_mass plane",
+        "Angle": "reading_phase lag critical damping sensor_angle key_phasor measures",
+        "Conventions": "phase angles unit",
+    },
+)
 def trial_weight(
     job: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[JOB]",
+            metavar="JOB",
             help="Job (.toml, .xlsx) with coefficients, a rotor or trial runs: they give amount and angle.",
         ),
     ] = None,
@@ -26,7 +35,7 @@ def trial_weight(
     options: TrialWeightOptions,
     to: Destination,
 ) -> None:
-    """A first trial weight: amount from the load or the sensitivity, angle opposite to the heavy spot.
+    """A first trial weight: how heavy, and at which angle.
 
     Example: rotorid trial-weight --rotor-mass 500kg --speed 3000rpm --radius 200mm --fraction 10
 

@@ -13,7 +13,11 @@ from rotorid.workflows.unbalance import UnbalanceOptions
 from rotorid.workflows.unbalance import unbalance as work
 
 
-@command(UnbalanceOptions, least={"modes": 1, "ridge": 0.0, "model_error": 0.0})
+@command(
+    UnbalanceOptions,
+    least={"modes": 1, "ridge": 0.0, "model_error": 0.0},
+    panels={"Method": "method modes ridge"},
+)
 def unbalance(
     job: Annotated[
         Path, typer.Argument(metavar="JOB.toml", help="Job with a rotor and the place of every sensor in it.")
@@ -21,7 +25,7 @@ def unbalance(
     options: UnbalanceOptions,
     to: Destination,
 ) -> None:
-    """Unbalance at any stations of a rotor model that explains the readings of one run, without trial runs.
+    """Unbalance along a rotor model, from the readings of one run, without trial weights.
 
     Example: rotorid unbalance sample_data/model_job/job.toml --stations 6,12,19
     """

@@ -6,13 +6,18 @@ import dataclasses
 
 import typer
 
-from rotorid.cli.common_options import command
+from rotorid.cli.common_options import OUTPUT, command
 from rotorid.cli.output import Destination
 from rotorid.validation import ValidateOptions
 from rotorid.validation import validate as work
 
 
-@command(ValidateOptions, names={"every": ("--all",)}, to=("table", "json", "output"))
+@command(
+    ValidateOptions,
+    names={"every": ("--all",)},
+    panels={OUTPUT: "every"},
+    to=("table", "output", "json"),
+)
 def validate(options: ValidateOptions, to: Destination) -> None:
     """Every number that the references print, beside what this program computes now.
 

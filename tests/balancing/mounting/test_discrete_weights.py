@@ -8,6 +8,7 @@ import pytest
 from helpers.cones import minmax_cone
 
 from balancing.data.limits import Limits
+from balancing.mounting import fewest_pieces
 from balancing.mounting.discrete_weights import solve_discrete
 from balancing.mounting.holes import equal_holes, from_list
 from balancing.mounting.mountable_vectors import nearest
@@ -19,17 +20,23 @@ METHODS = ("least-squares", "minmax")
 
 def everything(holes):
     """All vectors that can be mounted, by trying all of it."""
+    return np.array(list(least_pieces(holes)))
+
+
+def least_pieces(holes):
+    """The fewest pieces of each vector that can be mounted, by trying all of it."""
     options = [
         c for c in product(range(holes.per_hole + 1), repeat=len(holes.pieces)) if sum(c) <= holes.per_hole
     ]
-    found = []
+    found = {}
     for choice in product(*(options if free else options[:1] for free in holes.free)):
         counts = np.array(choice)
         vector = (counts @ holes.pieces) @ np.exp(1j * holes.angles)
         enough = holes.stock is None or (counts.sum(axis=0) <= holes.stock).all()
         if enough and abs(vector + holes.mounted) <= holes.max_weight * (1 + 1e-9):
-            found.append(vector)
-    return np.unique(np.round(found, 10))
+            key = complex(np.round(vector, 10))
+            found[key] = min(found.get(key, counts.sum()), counts.sum())
+    return found
 
 
 def case(seed):
@@ -86,6 +93,102 @@ def test_equals_exhaustive_enumeration(seed):
             assert holes.allows(mounting.vector)
             assert holes.stock is None or (mounting.counts.sum(axis=0) <= holes.stock).all()
         assert np.allclose(found.residual, Y + W @ found.weights, rtol=0, atol=1e-12)
+
+
+def fewest_of_all(planes, size):
+    """Of all mountings within 1.2 times of the least: the fewest pieces, the least objective of so many."""
+    counts = [np.array(list(least_pieces(holes).values())) for holes in planes]
+    number = np.sum(np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1), axis=-1).ravel()
+    good = size <= 1.2 * size.min() * (1 + 1e-9)
+    fewest = number[good].min()
+    return fewest, size[good & (number == fewest)].min()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_fewest_pieces_within_reach_equal_enumeration(seed):
+    W, Y, planes, w = case(seed)
+    D = grid(planes)
+    for method in METHODS:
+        size = objectives(method, W, Y, w, D)
+        fewest, least = fewest_of_all(planes, size)
+        found = solve_discrete(W, Y, planes, method=method, row_weights=w, within=1.2)
+        assert found.proven
+        assert (found.pieces, found.objective) == (fewest, pytest.approx(least, rel=1e-8))
+        assert objectives(method, W, Y, w, found.weights[None])[0] == pytest.approx(found.objective)
+        best = solve_discrete(W, Y, planes, method=method, row_weights=w)
+        told = found if found.best is None else found.best
+        assert (told.objective, told.pieces) == (best.objective, best.pieces)
+        assert found.bound <= best.objective
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("seed", range(6))
+def test_the_fewest_pieces_keep_limits_and_forbidden_arcs(seed, method):
+    W, Y, planes, w = case(2000 + seed)
+    sizes = np.abs(Y + grid(planes) @ W.T)
+    best = solve_discrete(W, Y, planes, method=method, row_weights=w)
+    few = solve_discrete(W, Y, planes, method=method, row_weights=w, within=1.2)
+    worst = int(np.argmax(np.abs(few.residual) - np.abs(best.residual)))
+    residual = np.full((1, len(Y)), np.inf)
+    residual[0, worst] = np.abs(best.residual[worst]) * (1 + 1e-6)  # what the fewest without limits may break
+    limits = Limits(np.full(W.shape[1], np.inf), residual, ((),) * W.shape[1])
+    kept = np.where((sizes <= residual).all(axis=1), objectives(method, W, Y, w, grid(planes)), np.inf)
+    found = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=limits, within=1.2)
+    fewest, least = fewest_of_all(planes, kept)
+    assert (found.pieces, found.objective) == (fewest, pytest.approx(least, rel=1e-8))
+    used = [int(np.flatnonzero(holes.free)[0]) for holes in planes]
+    arcs = [((holes.angles[h] - 0.01, 0.02),) for holes, h in zip(planes, used, strict=True)]
+    free = [holes.free.sum() > 1 for holes in planes]
+    arcs = tuple(arc if more else () for arc, more in zip(arcs, free, strict=True))
+    without = Limits(np.full(W.shape[1], np.inf), np.full((1, len(Y)), np.inf), arcs)
+    found = solve_discrete(W, Y, planes, method=method, row_weights=w, limits=without, within=1.2)
+    for mounted, h, more in zip(found.mountings, used, free, strict=True):
+        assert not (more and mounted.counts[h].any())
+
+
+def test_an_error_of_nothing_takes_the_fewest_pieces_that_leave_nothing():
+    holes = [from_list(equal_holes(6), [0.2, 0.3], per_hole=2) for _ in range(2)]
+    rng = np.random.default_rng(4)
+    W = rng.standard_normal((4, 2)) + 1j * rng.standard_normal((4, 2))
+    Y = -W @ (np.array([0.5, 0.6]) * np.exp(1j * np.pi / 3 * np.array([1, 4])))
+    for method in METHODS:
+        found = solve_discrete(W, Y, holes, method=method, within=1.2)
+        assert found.objective == pytest.approx(0, abs=1e-12)
+        assert found.pieces == 4
+        assert found.proven
+
+
+def test_the_fewest_pieces_beside_a_plane_of_any_weight():
+    W, Y, _, _ = case(3)
+    W = np.column_stack((W[:, :1], W[::-1, :1] * 1j))
+    holes = from_list(equal_holes(5, 0.2), [0.2, 0.3])
+    found = solve_discrete(W, Y, [None, holes], within=1.2)
+    left = []
+    for d, number in least_pieces(holes).items():
+        rest = Y + W[:, 1] * d
+        own = np.linalg.lstsq(W[:, :1], -rest, rcond=None)[0]
+        left.append((np.linalg.norm(rest + W[:, 0] * own), number))
+    least = min(left)[0]
+    fewest = min(number for size, number in left if size <= 1.2 * least)
+    assert found.pieces == fewest
+    assert found.objective == pytest.approx(min(s for s, n in left if n == fewest), rel=1e-8)
+
+
+@pytest.mark.parametrize("time_is_up", [False, True])
+def test_without_a_stock_few_pieces_do_what_many_do(monkeypatch, time_is_up):
+    """24 holes, two sizes, three planes; without a search, few pieces are found near the optimum."""
+    rng = np.random.default_rng(1)
+    W = rng.standard_normal((20, 3)) + 1j * rng.standard_normal((20, 3))
+    wanted = 0.04 * np.exp(1j * np.array([0.3, 2.0, 4.0]))
+    noise = 0.01 * (rng.standard_normal(20) + 1j * rng.standard_normal(20))
+    planes = [from_list(equal_holes(24), [0.005, 0.015])] * 3
+    if time_is_up:
+        monkeypatch.setattr(fewest_pieces, "search", lambda *_: 0.0)
+    found = solve_discrete(W, noise - W @ wanted, planes, time_limit=60.0, within=1.2)
+    assert found.pieces < 0.7 * found.best.pieces
+    assert found.objective <= 1.2 * found.best.objective
+    assert found.best.proven
+    assert found.proven != time_is_up
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -240,16 +343,18 @@ def test_bad_input():
         solve_discrete(W, Y, [holes, holes])
     with pytest.raises(ValueError, match="method must be"):
         solve_discrete(W, Y, [holes], method="median")
+    with pytest.raises(ValueError, match="within 1 or more times"):
+        solve_discrete(W, Y, [holes], within=0.9)
     with pytest.raises(ValueError, match="time limit"):
         solve_discrete(W, Y, [holes], time_limit=0)
     with pytest.raises(ValueError, match="finite"):
         solve_discrete(W, [np.nan, 1], [holes])
     arcs = Limits(np.array([np.inf]), np.full((1, 2), np.inf), (((0.0, 2 * np.pi),),))
     with pytest.raises(ValueError, match="has forbidden angles but no holes"):
-        solve_discrete(W, Y, [None], limits=arcs, names=["DE"])
+        solve_discrete(W, Y, {"DE": None}, limits=arcs)
     most = Limits(np.array([np.inf]), np.full((1, 2), np.inf), (((-0.1, 6.2),),))
     with pytest.raises(ValueError, match="nothing can be mounted in plane DE"):
-        solve_discrete(W, Y, [from_list([0.5], [1.0])], limits=most, names=["DE"])
+        solve_discrete(W, Y, {"DE": from_list([0.5], [1.0])}, limits=most)
     twice = np.column_stack((Y, Y))
     with pytest.raises(ValueError, match="do not tell how much plane"):
         solve_discrete(twice, Y, [from_list(equal_holes(4), step=0.1)] * 2)

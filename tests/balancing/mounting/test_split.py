@@ -13,11 +13,10 @@ from balancing.mounting.split import fewer_pieces, percent, split
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 
 
-def exhaustive(target, holes, most):
-    """The smallest error and, at it, the fewest pieces, by trying everything; None: nothing is allowed."""
+def everything(target, holes, most):
+    """Error and pieces of every choice, by trying it."""
     K = len(holes.pieces)
     one = [c for c in itertools.product(range(holes.per_hole + 1), repeat=K) if sum(c) <= holes.per_hole]
-    best = None
     for combination in itertools.product(*[one if free else [(0,) * K] for free in holes.free]):
         counts = np.array(combination)
         if holes.stock is not None and (counts.sum(axis=0) > holes.stock).any():
@@ -27,9 +26,19 @@ def exhaustive(target, holes, most):
         vector = (counts @ holes.pieces) @ np.exp(1j * holes.angles)
         if not holes.allows(vector):
             continue
-        found = (round(float(abs(vector - target)), 11), int(counts.sum()))
-        best = found if best is None else min(best, found)
-    return best
+        yield round(float(abs(vector - target)), 11), int(counts.sum())
+
+
+def exhaustive(target, holes, most):
+    """The smallest error and, at it, the fewest pieces."""
+    return min(everything(target, holes, most))
+
+
+def fewest_of_all(target, holes, most, times=1.2):
+    """Of all choices within 1.2 times of the least error: the fewest pieces, the least error of so many."""
+    found = list(everything(target, holes, most))
+    enough = times * min(found)[0] + 2e-11
+    return min((pieces, error) for error, pieces in found if error <= enough)
 
 
 def problem(seed):
@@ -54,10 +63,13 @@ def problem(seed):
 def test_equal_to_trying_everything(seed):
     target, holes, most = problem(seed)
     expected = exhaustive(target, holes, most)
-    assert expected is not None
     found = split(target, holes, most_pieces=most)
     assert (round(abs(found.error), 11), found.pieces) == expected
     assert found.proven
+    few = split(target, holes, most_pieces=most, within=1.2)
+    assert (few.pieces, pytest.approx(abs(few.error), abs=2e-11)) == fewest_of_all(target, holes, most)
+    assert few.proven
+    assert abs((few.best or few).error) == pytest.approx(abs(found.error))
     assert found.mounting.vector - target == pytest.approx(found.error, abs=1e-15)
     assert (found.mounting.counts.sum(axis=1) <= holes.per_hole).all()
     assert not found.mounting.amounts[~holes.free].any()
@@ -189,6 +201,19 @@ def test_what_is_mounted_counts_for_the_largest_weight():
         split(0.01, hopeless)
     with pytest.raises(ValueError, match="no admissible weight at all"):
         split(0.01, from_list(np.radians([0, 10]), step=0.005, taken=[0.02, 0], max_weight=0.015))
+
+
+def test_out_of_reach_no_fewer_pieces_do():
+    """Too many vectors are within reach to be listed: one number of pieces after the other."""
+    holes = from_list(equal_holes(24, 0.1), [0.01, 0.02])
+    found = split(0.3, holes, within=1.2)
+    assert found.pieces < found.best.pieces
+    assert abs(found.error) <= 1.2 * abs(found.best.error)
+    assert abs(split(0.3, holes, most_pieces=found.pieces - 1).error) > 1.2 * abs(found.best.error)
+    nothing = split(2.0, from_list([0.0], [0.01, 0.02]), within=1.2)
+    assert (nothing.pieces, nothing.best.pieces) == (0, 1)
+    assert nothing.lines(GRAMS) == ["nothing is mounted"]
+    assert "0 pieces; 1 would leave an error of 99 % (--best)" in nothing.summary(GRAMS)
 
 
 def test_words_follow_the_angles_of_the_job():

@@ -25,7 +25,7 @@ def vector(rows):
 
 @pytest.mark.parametrize(("method", "gain"), [("least-squares", 2.0), ("minmax", 2.2), ("weighted", 1.05)])
 def test_all_planes_together_are_better_than_one_by_one(cli, method, gain):
-    found = cli("balance", HOLES, "--split", "--method", method, "--json")
+    found = cli("balance", HOLES, "--split", "--best", "--method", method, "--json")
     assert found.code == 0, found.err
     m = found.json["mounting"]
     assert m["proven"] is True
@@ -43,7 +43,7 @@ def test_prediction_of_what_is_mounted():
     job = read_job(HOLES)
     influence = estimate_influence(job.trials)
     found = correct(influence)
-    m = mount(found, influence, None, job.holes)
+    m = mount(found, influence, None, job.holes, within=1.0)
     np.testing.assert_allclose(m.after, found.before + influence.W @ m.weights, rtol=1e-12)
     assert m.after_covariance.shape == (*m.after.shape, 2, 2)
     assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
@@ -57,6 +57,34 @@ def test_prediction_of_what_is_mounted():
             lines = [line for line in text.splitlines() if said.search(line)]
             assert bool(lines) or not counts
     assert m.answer.tables[0].startswith("Hole by hole:")
+
+
+@pytest.mark.parametrize("method", ["least-squares", "weighted", "minmax"])
+def test_few_pieces_are_the_default(cli, method):
+    few = cli("balance", HOLES, "--split", "--method", method, "--json").json["mounting"]
+    best = cli("balance", HOLES, "--split", "--best", "--method", method, "--json").json["mounting"]
+    assert few["pieces"] == sum(round(row["mass"] / 150) for row in few["holes"]) < best["pieces"]
+    assert few["proven"]
+    assert best["best"] is None
+    told = few["best"]
+    assert [told[key] for key in ("pieces", "rms_after", "max_after")] == [
+        best["pieces"],
+        pytest.approx(best["rms_after"]),
+        pytest.approx(best["max_after"]),
+    ]
+    assert 1 < told["objective_ratio"] <= 1.2
+    if method != "weighted":
+        key = "max_after" if method == "minmax" else "rms_after"
+        assert few[key] / best[key] == pytest.approx(told["objective_ratio"])
+    words = " ".join(cli("balance", HOLES, "--split", "--method", method, "--table").out.split())
+    times = f"{told['objective_ratio']:.3g} times what {best['pieces']} would leave (--best)"
+    assert f"{few['pieces']} pieces: {times}" in words
+    assert "No fewer pieces do as well, and no other choice of so many is better (proven)." in words
+
+
+def test_best_without_split_is_refused(cli):
+    outcome = cli("balance", HOLES, "--best")
+    assert (outcome.code, "only with --split" in outcome.err) == (2, True)
 
 
 def job_with(tmp_path, text):

@@ -1,0 +1,81 @@
+"""The fewest pieces that leave little more than the least vibration.
+
+For one number of pieces after the other, the best choice of so many is searched: vectors of few pieces can be
+listed where all of them cannot. The first number of which a choice is good enough is the fewest.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from balancing.mounting.discrete_bounds import Form
+from balancing.mounting.discrete_search import Found, Squares, polish, rounded, search
+from balancing.mounting.mountable_vectors import MOST, Attainable
+
+__all__ = ["FEW", "Choice", "fewest"]
+
+FEW = 1.2
+"""So many times the least is good enough for fewer pieces."""
+Choice = tuple[Found, Sequence[Attainable]]
+"""What was found, in which sets."""
+
+
+def fewest(
+    form: Form,
+    sets: Sequence[Attainable],
+    squares: Squares,
+    enough: float,
+    pieces: int,
+    until: float,
+    chunk: int,
+) -> tuple[Choice | None, bool]:
+    """The best choice of the fewest pieces whose square is at most `enough`, and whether that is sure.
+
+    Parameters
+    ----------
+    form, sets, squares, until, chunk
+        As for `search`.
+    enough
+        Squared objective.
+    pieces
+        Of a choice that is known to be good enough; None is returned where no fewer do.
+    """
+    least, sure = _least(form, sets, enough, pieces), True
+    for number in range(sum(least), pieces):
+        spare = number - sum(least)
+        few = [one.few(own + spare) for one, own in zip(sets, least, strict=True)]
+        found = Found(enough, np.zeros(len(sets), dtype=complex), np.zeros((len(sets), 3), dtype=np.int64))
+        now = time.perf_counter()
+        if now > until:
+            return None, False
+        left = search(form, few, squares, found, now + (until - now) / 3, chunk, number)
+        sure &= left >= found.square and all(one.complete for one in few)
+        if not sure and found.square == enough:
+            few = [one.few(own + spare // len(sets)) for one, own in zip(sets, least, strict=True)]
+            with suppress(ValueError):  # where so few are too heavy for a plane
+                found = rounded(few, squares, form.D0[np.argsort(form.order)])
+                polish(few, squares, found, until)
+        if found.square < enough:
+            return (found, few), sure
+    return None, sure
+
+
+def _least(form: Form, sets: Sequence[Attainable], enough: float, most: int) -> list[int]:
+    """How many pieces each plane needs at least: its part of q ≤ enough is a disc."""
+    least = [0] * len(sets)
+    if np.linalg.matrix_rank(form.R) < len(form.R):
+        return least
+    room = np.sqrt(max(enough - form.const - float(form.m.sum()), 0.0))
+    radii = room * np.linalg.norm(np.linalg.inv(form.R), axis=1) * (1 + 1e-9)
+    for p, z, radius in zip(form.order, form.D0, radii, strict=True):
+        while least[p] < most:
+            few = sets[p].few(least[p])
+            hit = few.near(complex(z), -1.0, float(radius), MOST)
+            if hit is None or (few.pieces(hit[1]) <= least[p]).any():
+                break
+            least[p] += 1
+    return least

@@ -1,0 +1,127 @@
+"""Help: panels, the common options first, 100 columns, examples that run as typed; `rotorid` alone."""
+
+import shlex
+import sys
+from typing import Annotated
+
+import pytest
+import typer
+from typer.core import TyperOption
+
+from rotorid.base.answer import COLUMNS, LINES
+from rotorid.cli import app
+from rotorid.cli.common_options import INPUT, command
+from rotorid.samples import sample_data
+
+sys.path.insert(0, str(sample_data().parent / "docs" / "_ext"))
+
+from commands import all_commands, split_help
+
+COMMANDS = dict(all_commands())
+FIRST = "Input", "Input and conventions", "Output"
+EXAMPLES = [(name, line) for name, one in COMMANDS.items() for line in split_help(one.help)[1]]
+
+
+def options(command):
+    return [one for one in command.params if one.param_type_name == "option"]
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """An empty folder with the sample data, as in a checkout."""
+    (tmp_path / "sample_data").symlink_to(sample_data(), target_is_directory=True)
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_has_a_panel_and_the_first_two_are_short(name):
+    panels = {}
+    for one in options(COMMANDS[name]):
+        assert one.rich_help_panel, one.name
+        panels.setdefault(one.rich_help_panel, []).append(one.name)
+    sizes = [len(names) for names in panels.values()]
+    assert sum(sizes[:2]) <= 12, panels
+    assert next(iter(panels)) in FIRST
+    # panels follow each other in plain help, too, where their titles are not printed
+    in_order = [one.rich_help_panel for one in options(COMMANDS[name])]
+    assert in_order == sorted(in_order, key=list(panels).index) or in_order[-1] == "Output"
+
+
+def test_the_panels_of_balance():
+    titles = dict.fromkeys(one.rich_help_panel for one in options(COMMANDS["balance"]))
+    expected = "Input and conventions|Method|Limits|Mounting|Check run|Grade|Output|Expert"
+    assert list(titles) == expected.split("|")
+
+
+@pytest.mark.parametrize("plain", [False, True])
+@pytest.mark.parametrize("name", [*COMMANDS, ""])
+def test_help_fits_the_terminal_and_names_no_types(cli, monkeypatch, name, plain):
+    monkeypatch.setenv("COLUMNS", str(COLUMNS))
+    shown = COMMANDS.get(name, typer.main.get_command(app))
+    monkeypatch.setattr(shown, "rich_markup_mode", None if plain else "rich")
+    text = cli(*name.split(), "--help").out
+    assert max(map(len, text.splitlines())) <= COLUMNS
+    if name:
+        ranges = ["[x>="] if hasattr(TyperOption, "_get_number_range_help_str") else []  # typer 0.29
+        for hidden in ("<bool>", "<path>", "list[", "<str>", "<int", "[[", "🅱", *ranges):
+            assert hidden not in text, hidden
+        for one in options(COMMANDS[name]):
+            assert one.opts[0] in text
+        assert ("─ Output ─" in text) == (not plain)
+
+
+def test_an_option_that_no_panel_names_stands_in_the_first():
+    @command(panels={"Method": "second"}, to=("json",))
+    def one(
+        first: Annotated[int, typer.Option()] = 1, second: Annotated[int, typer.Option()] = 2, *, to: object
+    ):
+        """Nothing."""
+
+    parameters = one.__signature__.parameters
+    assert list(parameters) == ["first", "second", "json"]
+    panels = [p.annotation.__metadata__[0].rich_help_panel for p in parameters.values()]
+    assert panels == [INPUT, "Method", "Output"]
+
+
+@pytest.mark.parametrize(("name", "line"), EXAMPLES, ids=[f"{n}-{i}" for i, (n, _) in enumerate(EXAMPLES)])
+def test_every_example_runs_as_typed(cli, checkout, name, line):
+    words = shlex.split(line)
+    assert words[:2] == ["rotorid", name]
+    if name == "validate":
+        return  # its own tests run it
+    outcome = cli(*words[1:])
+    assert (outcome.code, outcome.err) == (0, outcome.err)
+
+
+def test_rotorid_alone_shows_four_jobs_with_examples_that_run(cli, checkout):
+    outcome = cli()
+    lines = outcome.out.splitlines()
+    assert outcome.code == 0
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= COLUMNS
+    assert [line.split()[0] for line in lines if line.startswith("  ") and "rotorid " not in line] == list(
+        COMMANDS
+    )
+    examples = [line[line.index("rotorid ") :] for line in lines[3:] if "rotorid " in line]
+    assert [example.split()[1] for example in examples] == [
+        "balance",
+        "critical",
+        "reduce",
+        "identify",
+        "demo",
+    ]
+    for example in examples:
+        found = cli(*shlex.split(example)[1:])
+        assert found.code == 0, example
+
+
+def test_commands_stand_in_the_panels_of_the_jobs(cli):
+    groups = {name: one.rich_help_panel for name, one in typer.main.get_command(app).commands.items()}
+    assert set(groups.values()) == {
+        "Balance rotors",
+        "Compute rotors",
+        "Make a small model",
+        "Identify coefficients",
+        "Samples, and checks",
+    }
+    assert groups["balance"] == groups["split"] == "Balance rotors"
