@@ -132,6 +132,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
         ax.text(
             1.01, first, f"{speed:.6g} rpm", transform=ax.get_yaxis_transform(), fontsize="small", va="center"
         )
+    ax.set_xlim(left=0)
     ax.set_ylim(y[-1] + 0.7, -0.7)
     ax.set_xlabel(f"amplitude, {plain(unit)}" if unit else "amplitude")
     ax.tick_params(axis="y", length=0)
