@@ -77,7 +77,7 @@ def _residual(ax: Axes, at: int, row: Judgement, v: Verdict, bottom: float) -> N
     text = f"{figures(size, 2)} at {angle:.0f}°"
     if row.low == 0 and row.high is not None:  # then the angle is not known either
         text = f"up to {figures(row.high * v.labels.weight_scale, 2)}"
-    note(ax, f"{text}\n{row.verdict}", (at - 0.3, max(size, bottom)), (8, 0), va="center")
+    note(ax, f"{text}\n{row.verdict}", (at - 0.3, max(size, bottom)), (8, -2), va="bottom")
 
 
 def _position(key: tuple[str, str], t: Tolerance | None) -> float:

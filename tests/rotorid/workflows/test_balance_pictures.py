@@ -233,6 +233,7 @@ def test_choices_of_planes_from_zero_on_a_linear_scale():
     assert [bar.get_width() for bar in ax.patches] == pytest.approx(found.subsets.expected * 2e6)
     assert named(ax, "rms predicted").get_xdata() == pytest.approx(found.subsets.rms * 2e6)
     assert ax.get_xlabel() == "vibration, µm pp; before: rms 28.4"
+    assert found.subsets.largest.max() * 2e6 < ax.get_xlim()[1] < 10, "what was before does not hide the rest"
 
 
 def test_all_trial_weights_stand_in_one_picture():
@@ -298,6 +299,18 @@ def test_holes_have_their_pieces_as_on_the_console():
     assert "2 × 20 g" in texts
     assert sum("20 g" in text or text == "10 g" for text in texts) == found.summary().count("in hole") - 6
     assert {str(k) for k in range(1, 25)} <= set(texts)
+
+
+def test_of_many_holes_those_that_are_used_have_their_numbers():
+    found = split("35g@120", SplitOptions(holes=48, pieces="10g,20g", first_hole=3.0))
+    figure = found.figure()
+    check_hygiene(figure)
+    texts = {text.get_text() for text in figure.axes[0].texts}
+    nearest = found.found.nearest
+    used = {nearest.holes.names[h] for h in np.flatnonzero(nearest.mounting.amounts)}
+    assert used <= texts
+    assert used & {str(k) for k in range(2, 49, 2)}, "some of them would not have one otherwise"
+    assert len(texts & {str(k) for k in range(1, 49)}) < 32
 
 
 def test_forbidden_arcs_are_hatched_where_the_job_counts_them(tmp_path):
