@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
     from balancing.unbalance_result import Unbalance
 
-_APART = 2.6
-"""Distance of the vectors of neighbouring stations, in lengths of the longest."""
+_TOLD = 16
+"""Stations that have room for their numbers."""
+_APART, _ROUND = 2.6, 8
+"""Distance of neighbouring stations in lengths of the longest vector; less where there are more stations."""
 
 
 def unbalance_vectors(found: Unbalance, ax: Axes | None = None) -> Axes:
@@ -29,7 +31,8 @@ def unbalance_vectors(found: Unbalance, ax: Axes | None = None) -> Axes:
     labels, sure, Q = found.labels, found.determined, len(found.stations)
     ax = ax or new_figure(min(2.0 + 7.0 / Q, 5.0)).add_subplot()
     longest = float(np.abs(found.unbalance).max()) * labels.weight_scale or 1.0
-    centres = np.arange(Q) * _APART * longest
+    apart = _APART * longest * min(1.0, _ROUND / Q)
+    centres = np.arange(Q) * apart
     ax.axhline(0, color="0.8", lw=4, zorder=0)
     circle = longest * np.exp(1j * np.linspace(0, 2 * np.pi, 91))
 
@@ -37,7 +40,8 @@ def unbalance_vectors(found: Unbalance, ax: Axes | None = None) -> Axes:
         return np.abs(z) * np.exp(1j * labels.drawn(np.angle(z))) * labels.weight_scale
 
     for q, (x, tip) in enumerate(zip(centres, on_paper(found.unbalance), strict=True)):
-        ax.plot(x + circle.real, circle.imag, color="0.8", lw=0.8)
+        if Q <= _ROUND:
+            ax.plot(x + circle.real, circle.imag, color="0.8", lw=0.8)
         name = "determined, with its 95 % region" if sure[q] else "open: not determined by the readings"
         look: dict[str, Any] = {"mfc": BLUE, "ls": "-"} if sure[q] else {"mfc": "white", "ls": ":"}
         ax.plot([x, x + tip.real], [0, tip.imag], "o", color=BLUE, markevery=[1], lw=2, label=name, **look)
@@ -46,9 +50,11 @@ def unbalance_vectors(found: Unbalance, ax: Axes | None = None) -> Axes:
             edge = on_paper(region_edge(found.unbalance[q : q + 1], block[None], None, 90)[0])
             ax.plot(x + edge.real, edge.imag, color="black", lw=1.0)
     ax.set_aspect("equal")
+    ax.set_ylim(-1.15 * longest, 1.15 * longest)
     ax.set_xlim(centres[0] - _APART / 2 * longest, centres[-1] + _APART / 2 * longest)
     told = zip(found.stations, *labels.weight(found.unbalance), strict=True)
-    ax.set_xticks(centres, [f"{name}\n{figures(size, 3)}\n{angle:.0f}°" for name, size, angle in told])
+    words = [f"{name}\n{figures(size, 3)}\n{angle:.0f}°" for name, size, angle in told]
+    ax.set_xticks(centres, words if Q <= _TOLD else found.stations, rotation=0 if Q <= _TOLD else 90)
     ax.set_xlabel(f"stations in their order, {labels.weight_in}; {turning(labels)}", fontsize=TEXT)
     ax.set_ylabel(f"unbalance, {labels.weight_in}")
     plain(ax)
