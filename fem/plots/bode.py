@@ -145,19 +145,24 @@ def draw_bode(
     below.yaxis.set_major_locator(_right_angles(below))
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
-    for speed, text in _together(peaks, factors):
-        across = {"xycoords": ("data", "axes fraction"), "rotation": 90, "va": "bottom", "bbox": BOX}
+    for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
+        across: dict[str, Any] = {
+            "xycoords": ("data", "axes fraction"),
+            "rotation": 90,
+            "va": "bottom",
+            "bbox": BOX,
+        }
         note(above, text, (speed * RPM, 0.0), (3, 5), **across)
         for ax in axes:
             ax.axvline(speed * RPM, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
     return axes
 
 
-def _together(peaks: Sequence[Peaks], factors: bool) -> list[tuple[float, str]]:
-    """Peaks of all readings, those within 3 % as one: its largest one's speed, rad/s, and its words."""
+def _together(peaks: Sequence[Peaks], factors: bool, width: float) -> list[tuple[float, str]]:
+    """Peaks of all readings, those within a width as one: the speed of its largest, rad/s, and its words."""
     groups: list[list[Peak]] = []
     for peak in sorted((peak for each in peaks for peak in each.peaks), key=lambda peak: peak.speed):
-        if groups and peak.speed < 1.03 * groups[-1][0].speed:
+        if groups and peak.speed < groups[-1][0].speed + width:
             groups[-1].append(peak)
         else:
             groups.append([peak])
@@ -223,7 +228,7 @@ def draw_polar(
     legend_above(ax, height=-0.08)
     rays = np.arange(22.5, 360.0, 45.0)
     near = np.abs(np.angle(Z[..., None] * np.exp(-1j * np.radians(rays)))) < np.radians(12)
-    ax.set_rlabel_position(rays[np.argmin(near.sum(axis=(0, 1)))])
+    ax.set(rlabel_position=rays[np.argmin(near.sum(axis=(0, 1)))])
     return ax
 
 
@@ -242,7 +247,7 @@ def _along(rpm: FloatArray, curve: ComplexArray, marks: int) -> list[float]:
     """Speeds about evenly spaced along a curve, so that a resonance gets its share, as round as may be."""
     steps = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve)))))
     if not steps[-1] > 0:
-        return rpm[:1].tolist()
+        return [float(rpm[0])] if rpm.size else []
     taken = []
     for place in np.linspace(0, steps[-1], marks + 1):
         speed = float(np.interp(place, steps, rpm))
@@ -288,7 +293,10 @@ def _over_speed(
     ax.margins(x=0.01)
     plain(ax)
     rad_s_above(ax)
-    title = {"title": "marks: peaks, with their speed and amplification factor AF", "title_fontsize": TEXT}
+    title: dict[str, Any] = {
+        "title": "marks: peaks, with their speed and amplification factor AF",
+        "title_fontsize": TEXT,
+    }
     columns = 2 if max(map(len, labels), default=0) > 25 else 3
     legend_above(ax, columns, borderaxespad=ABOVE_SCALE, **(title if peaks else {}))
     return ax
@@ -296,7 +304,7 @@ def _over_speed(
 
 def _look(k: int, of: int, speeds: FloatArray, peaks: Sequence[Peaks]) -> dict[str, Any]:
     """Colour and style of curve k over ascending speeds, with marks at its peaks, or where it needs them."""
-    drawn = {"linewidth": 1.6, "markersize": 7, "markeredgecolor": "white", **look(k, of)}
+    drawn: dict[str, Any] = {"linewidth": 1.6, "markersize": 7, "markeredgecolor": "white", **look(k)}
     if peaks and peaks[k].peaks:
         every: Any = [int(np.abs(speeds - peak.speed).argmin()) for peak in peaks[k].peaks]
     elif speeds.size < 12:

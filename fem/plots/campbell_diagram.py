@@ -136,8 +136,8 @@ def draw_log_decrements(campbell: Campbell, ax: Axes | None = None) -> Axes:
 
 def _range(campbell: Campbell) -> tuple[float, float]:
     first, last = RPM * float(campbell.speeds.min()), RPM * float(campbell.speeds.max())
-    room = 0.06 * (last - first) or 0.05 * last or 1.0
-    return (0.0 if first < 0.3 * last else first - room / 2), last + room
+    room = 0.12 * (last - first) or 0.05 * last or 1.0
+    return (0.0 if first < 0.3 * last else first - room / 4), last + room
 
 
 def _highest(campbell: Campbell) -> float:
@@ -208,7 +208,7 @@ def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None
         crowd = crowd + 1 if speed - last < room else 0
         last = speed
         text, at, down = f"{speed:.0f} rpm, δ = {delta:.2f}", (speed, speed), 5 + 13 * (crowd // 2)
-        if crowd % 2 == 0:
+        if crowd % 2 == 0 and speed < 0.75 * ax.get_xlim()[1]:
             note(ax, text, at, (9, -down), va="top", ha="left", bbox=BOX, zorder=7)
         else:
             note(ax, text, at, (-9, down), va="bottom", ha="right", bbox=BOX, zorder=7)
@@ -226,5 +226,5 @@ def _legend(ax: Axes, campbell: Campbell, marked: bool) -> None:
     ]
     if marked:
         handles.append(Line2D([], [], linestyle="", label="damped critical speed", **_CRITICAL))
-    handles += [shade for shade in ax.patches if not str(shade.get_label()).startswith("_")]
-    legend_above(ax, handles=handles, borderaxespad=ABOVE_SCALE)
+    shades = [shade for shade in ax.patches if not str(shade.get_label()).startswith("_")]
+    legend_above(ax, handles=[*handles, *shades], borderaxespad=ABOVE_SCALE)

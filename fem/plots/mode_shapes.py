@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
         speed = f"{omega * RPM:.5g} rpm = {omega:.5g} rad/s" if omega else "rigid body"
         if omega and modes.direction[k] != "forward":
             speed += f", {modes.direction[k]}"
-        drawn = {"linewidth": 2.2, "zorder": 5, **look(k)}
+        drawn: dict[str, Any] = {"linewidth": 2.2, "zorder": 5, **look(k)}
         if k >= len(STYLES):
             drawn |= {"marker": MARKERS[k % len(MARKERS)], "markevery": (k, 24), "markeredgecolor": "white"}
         ax.plot(x, curve / np.abs(curve).max(), label=f"{k + 1}: {speed}", **drawn)

@@ -67,7 +67,9 @@ def polar_figure(response: Response, sensors: Sequence[SensorLike]) -> Figure:
     fine = smooth_curves(response, sensors)
     Z, labels = fine.readings(sensors), _labels(sensors)
     return on_figure(
-        lambda ax: draw_polar(fine.speeds, Z, labels, ax, windows=fine.windows),
+        lambda ax: draw_polar(
+            fine.speeds, Z, labels, ax, marks=max(2, 14 // len(labels)), windows=fine.windows
+        ),
         height=7.2,
         projection="polar",
     )

@@ -13,6 +13,7 @@ from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axes._base import _AxesBase
 
 
 def draw_speed_map(
@@ -66,7 +67,7 @@ def draw_speed_map(
     return ax
 
 
-def _plain_numbers(ax: Axes) -> None:
+def _plain_numbers(ax: _AxesBase) -> None:
     """2000 instead of 2 × 10³ on the axis of speeds."""
     from matplotlib.ticker import FuncFormatter, LogLocator
 

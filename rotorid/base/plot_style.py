@@ -59,10 +59,9 @@ def on_figure(
     return figure
 
 
-def look(k: int, of: int = 1) -> dict[str, Any]:
-    """Colour and style of curve k of so many: a few differ by their style too, in black and white."""
-    style = k if of <= len(STYLES) else k // len(COLORS)
-    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[style % len(STYLES)]}
+def look(k: int) -> dict[str, Any]:
+    """Colour and style of curve k: neighbours differ by their style too, in black and white."""
+    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[k % len(STYLES)]}
 
 
 def note(
@@ -111,7 +110,13 @@ def shade_unstable(
     ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
 ) -> None:
     """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
-    look = {"facecolor": VERMILION, "alpha": 0.14, "hatch": "///", "edgecolor": VERMILION, "linewidth": 0.6}
+    look: dict[str, Any] = {
+        "facecolor": VERMILION,
+        "alpha": 0.14,
+        "hatch": "///",
+        "edgecolor": VERMILION,
+        "linewidth": 0.6,
+    }
     for k, (first, last) in enumerate(ranges):
         ax.axvspan(first * RPM, last * RPM, label="" if k else words, **look)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from rotorid.reduction.equivalent.changed_inputs import Shift
     from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff
+    from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty
     from rotorid.reduction.guyan_irs_serep_result import Methods
     from rotorid.reduction.result import Reduction
 
@@ -207,7 +208,7 @@ def _compared(
     below.set_ylabel("1 − MAC at the masses\n(written: MAC)")
     if np.nanmax(losses, initial=0.0) > 1 - ALIKE:
         below.axhline(1 - ALIKE, color=DARK, linewidth=1.0, linestyle="--", zorder=3)
-        at = {"xycoords": ("axes fraction", "data"), "color": DARK, "bbox": BOX}
+        at: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "color": DARK, "bbox": BOX}
         note(below, f"MAC {ALIKE:g}: above, another shape", (0.0, 1 - ALIKE), (4, 4), **at)
     ticks = [f"mode {k + 1}\n{rows.rotor_frequencies[k] * RPM:.0f} rpm" for k in range(n)]
     below.set_xticks(range(n), ticks)
@@ -228,11 +229,20 @@ def _bars(ax: Axes, tops: FloatArray, names: Sequence[str], texts: Sequence[Sequ
     ax.margins(y=0.3)
     for i, name in enumerate(names):
         x = np.arange(n) + (i - (count - 1) / 2) * width
-        look = {"color": COLORS[i % len(COLORS)], "hatch": HATCHES[i % len(HATCHES)], "edgecolor": "white"}
+        look: dict[str, Any] = {
+            "color": COLORS[i % len(COLORS)],
+            "hatch": HATCHES[i % len(HATCHES)],
+            "edgecolor": "white",
+        }
         ax.bar(x, np.nan_to_num(tops[i]), 0.92 * width, label=name, linewidth=0, **look)
         for place, end, text in zip(x, np.nan_to_num(tops[i]), texts[i], strict=True):
             down = text.startswith("−")
-            at = {"ha": "center", "va": "top" if down else "bottom", "rotation": 90, "color": DARK}
+            at: dict[str, Any] = {
+                "ha": "center",
+                "va": "top" if down else "bottom",
+                "rotation": 90,
+                "color": DARK,
+            }
             note(ax, text, (float(place), float(end)), (0, -3 if down else 3), **at)
 
 
@@ -259,30 +269,18 @@ def plot_changes(reduction: Reduction, shift: Shift | None, ax: Axes | None = No
         Where; default new axes.
     """
     axes = new_axes((WIDTH, 4.6)) if ax is None else ax
-    n, known = len(reduction.nodes), reduction.uncertainty
-    values = np.concatenate((reduction.masses.solution, reduction.frequencies * RPM))
+    n = len(reduction.nodes)
+    values = _both(reduction.masses.solution, reduction.frequencies)
+    percent = 100 / np.abs(np.where(values == 0, np.nan, values))
     places = -np.arange(2.0 * n) - np.repeat([0.0, 0.5], n)
     names = [f"node {node}" if isinstance(node, int) else node for node in reduction.nodes]
     names += [f"mode {k + 1}" for k in range(n)]
     rows = [f"{name}:  {_short(value)}" for name, value in zip(names, values, strict=True)]
-    percent = 100 / np.abs(values)
-    line = {"linestyle": "", "color": DARK, "markersize": 6, "capsize": 4}
-    if known is not None:
-        std = np.concatenate((known.masses_std, known.frequencies_std * RPM))
-        words = "± one standard deviation, first order"
-        axes.errorbar(0 * places, places, xerr=std * percent, marker="o", label=words, **line)
+    if reduction.uncertainty is not None:
+        std = _draw_errors(reduction.uncertainty, percent, places, axes)
         rows = [f"{row} ± {_short(spread, 2)}" for row, spread in zip(rows, std, strict=True)]
-        if known.drawn is not None:
-            half = np.concatenate((known.drawn[0], known.drawn[1] * RPM)) * percent
-            line |= {"color": BLUE, "marker": "s", "label": "68 % of inputs drawn, recomputed"}
-            axes.errorbar(np.where(np.isfinite(half), 0.0, np.nan), places - 0.25, xerr=half, **line)
     if shift is not None:
-        exact = np.concatenate((shift.exact_masses, shift.exact_frequencies * RPM))
-        first = np.concatenate((shift.masses, shift.frequencies * RPM))
-        line = {"linestyle": "", "color": VERMILION, "markersize": 9, "zorder": 4}
-        axes.plot(exact * percent, places, marker="D", label="after the change", **line)
-        line |= {"color": "black", "markerfacecolor": "none"}
-        axes.plot(first * percent, places, marker="o", label="after it, predicted by first order", **line)
+        exact = _draw_shift(shift, percent, places, axes)
         rows = [f"{row} → {_short(value)}" for row, value in zip(rows, values + exact, strict=True)]
     units = ["kg"] * n + ["rpm"] * n
     axes.set_yticks(places, [f"{row} {unit}" for row, unit in zip(rows, units, strict=True)])
@@ -290,10 +288,40 @@ def plot_changes(reduction: Reduction, shift: Shift | None, ax: Axes | None = No
     axes.set(xlabel="deviation from the value on the left, %")
     plain(axes)
     axes.grid(visible=False, axis="y")
-    legend_above(axes, 2)
+    legend_above(axes, 1)
     return axes
 
 
+def _draw_errors(known: MassUncertainty, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
+    """Intervals of one standard deviation, by first order and, where that is poor, drawn; the first."""
+    std = _both(known.masses_std, known.frequencies_std)
+    line: dict[str, Any] = {"linestyle": "", "markersize": 6, "capsize": 4}
+    words = "± one standard deviation, first order"
+    axes.errorbar(0 * places, places, xerr=std * percent, color=DARK, marker="o", label=words, **line)
+    if known.drawn is not None:
+        half = _both(*known.drawn) * percent
+        line |= {"color": BLUE, "marker": "s", "label": "68 % of inputs drawn, recomputed"}
+        axes.errorbar(np.where(np.isfinite(half), 0.0, np.nan), places - 0.25, xerr=half, **line)
+    return std
+
+
+def _draw_shift(shift: Shift, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
+    """Values after a change, recomputed and by first order; the change recomputed."""
+    exact = _both(shift.exact_masses, shift.exact_frequencies)
+    line: dict[str, Any] = {"linestyle": "", "markersize": 9, "zorder": 4}
+    axes.plot(exact * percent, places, "D", color=VERMILION, label="after the change", **line)
+    first, words = _both(shift.masses, shift.frequencies), "after it, predicted by first order"
+    axes.plot(first * percent, places, "o", color="black", fillstyle="none", label=words, **line)
+    return exact
+
+
+def _both(masses: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Masses, kg, and frequencies, rpm, one after the other."""
+    return np.concatenate((masses, frequencies * RPM))
+
+
 def _short(value: float, digits: int = 4) -> str:
-    """So many digits, or all before the point."""
+    """So many digits, or all before the point; none of what does not vibrate."""
+    if np.isnan(value):
+        return "none"
     return f"{value:.{digits}g}" if abs(value) < 10**digits - 0.5 else f"{value:.0f}"

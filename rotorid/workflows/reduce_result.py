@@ -108,11 +108,12 @@ class ReducedRotor(Parts):
             raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
         heights = {"methods": (1, 1), "trade-off": (1, 1), "response": (3, 2)}.get(name)
         figure = new_figure(6.2 if heights else 5.0)
-        axes = [*figure.subplots(2, sharex=True, height_ratios=heights)] if heights else figure.add_subplot()
         if name in ("what-if", "errors"):
-            plot_changes(self.result, self.shift, axes)
+            plot_changes(self.result, self.shift, figure.add_subplot())
+        elif heights:
+            plot(parts[name], [*figure.subplots(2, sharex=True, height_ratios=heights)])
         else:
-            plot(parts[name], axes)
+            plot(parts[name], figure.add_subplot())
         return figure
 
     def sheet(self) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -85,7 +85,7 @@ def plot_running(
         above.set_yscale("log")
         above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
     # 1 m per kg·m is 1 µm per g·mm.
-    above.set(ylabel=f"{words}, µm per g·mm (log)", xlabel="speed, rpm")
+    above.set(ylabel=f"{words},\nµm per g·mm (log)", xlabel="speed, rpm")
     panels = [above] if below is None else [above, below]
     for panel in panels:
         plain(panel)
@@ -105,7 +105,7 @@ def plot_running(
     below.set_ylim(0.0, 1.25 * max(CLOSE, float(shown.max(initial=0.0))))
     below.axhline(CLOSE, color=SMALL, linewidth=1.0, linestyle=":", zorder=1)
     note(below, f"{CLOSE:g} %", (0.0, CLOSE), (4, 2), xycoords=("axes fraction", "data"), color=SMALL)
-    below.set(xlabel="speed, rpm", ylabel="difference, % of the rotor's\nlargest entry at this speed")
+    below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
     return above
 
 
@@ -117,7 +117,7 @@ def _chosen(
     difference = np.abs(running.small - running.full)
     if sensor is None and plane is None:
         sizes = (values.max(axis=(1, 2)) for values in (full, small, difference))
-        return *sizes, "largest influence coefficient,\nof all readings and planes"
+        return *sizes, "largest influence coefficient\nof all readings and planes"
     if sensor is None or plane is None:
         raise ValueError("give both a sensor and a plane, or neither")
     if not 0 <= sensor < full.shape[1]:
@@ -184,7 +184,7 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
         )
         if threshold is not None:
             axes.axvline(threshold * RPM, color=color, linewidth=1.0, linestyle=(0, (2, 2)), zorder=1)
-            mark = {"color": color, "markeredgecolor": "white", "markersize": 9, "zorder": 6}
+            mark: dict[str, Any] = {"color": color, "markeredgecolor": "white", "markersize": 9, "zorder": 6}
             axes.plot([threshold * RPM], [0.0], "o" if style == "-" else "s", **mark)
     low, high = _limits(known)
     axes.set_ylim(low, high)
