@@ -85,7 +85,7 @@ def plot_running(
         above.set_yscale("log")
         above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
     # 1 m per kg·m is 1 µm per g·mm.
-    above.set(ylabel=f"{words},\nµm per g·mm (log)", xlabel="speed, rpm")
+    above.set(ylabel=f"{words}, µm per g·mm (log)", xlabel="speed, rpm")
     panels = [above] if below is None else [above, below]
     for panel in panels:
         plain(panel)
@@ -117,7 +117,7 @@ def _chosen(
     difference = np.abs(running.small - running.full)
     if sensor is None and plane is None:
         sizes = (values.max(axis=(1, 2)) for values in (full, small, difference))
-        return *sizes, "largest influence coefficient\nof all readings and planes"
+        return *sizes, "largest of all influence\ncoefficients"
     if sensor is None or plane is None:
         raise ValueError("give both a sensor and a plane, or neither")
     if not 0 <= sensor < full.shape[1]:
