@@ -205,7 +205,7 @@ def test_what_the_pictures_of_a_response_are_drawn_from(cli, files, model, tmp_p
         one = fem.unbalance_response(model, {4: 5e-4, 3: 1e-4j}, [speed])
         np.testing.assert_allclose([x, y], [one.x[0, [3, 1]], one.y[0, [3, 1]]], rtol=1e-6)
         assert names == ["wheel", "probe"]
-        assert options["title"] == f"{speed * 30 / np.pi:.0f} rpm = {speed:.5g} rad/s"
+        assert options["title"] == f"at {speed * 30 / np.pi:.0f} rpm = {speed:.5g} rad/s, a stable speed"
 
 
 def test_the_map_reaches_two_decades_beyond_what_the_bearings_have(cli, files):
