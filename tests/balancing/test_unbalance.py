@@ -273,8 +273,8 @@ def test_result_in_the_labels_units():
     assert list(frame["station"]) == ["DE", "NDE"]
     assert frame["determined"].all()
     lines = found.summary().splitlines()
-    assert lines[0] == "least-squares: the readings determine all 2 stations"
-    assert lines[2].split() == ["DE", "1000", "0.0°", "1", "yes"]
+    assert lines[0] == "The readings determine all 2 stations (least-squares)."
+    assert lines[3].split() == ["DE", "1000", "0.0°", "±", "1", "yes"]
     assert all(len(a) < 110 for a, _ in pairwise(lines))
 
 
@@ -290,7 +290,7 @@ def test_picture():
     [[(_, low), (_, high)]] = ax.collections[0].get_segments()
     assert (low, high) == pytest.approx((0.804e6, 1.196e6))
     assert [text.get_text() for text in ax.get_xticklabels()] == ["A", "B", "C"]
-    assert ax.get_ylabel() == "unbalance, g_mm"
+    assert ax.get_ylabel() == "unbalance, g·mm"
     assert plot(found, ax) is ax
 
 

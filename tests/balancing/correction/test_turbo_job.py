@@ -73,7 +73,7 @@ def test_the_default_says_that_there_is_unbalance_outside_the_planes(maker, corr
     found = correct(estimate_influence(read_job(JOB / "job.toml").trials))
     assert found.method == "weighted"
     [words] = found.warnings
-    assert "unbalance outside the planes" in words
+    assert "unbalance elsewhere" in words
     after = np.abs(maker.simulate(found.weights))
     assert np.abs(maker.simulate(np.zeros(3))).max() >= 50 * after.max()
     d = (found.weights - correction.weights).view(float)

@@ -121,3 +121,31 @@ def test_pieces_do_not_go_with_ridge_or_truncation(cli):
         outcome = cli("balance", TURBO / "holes.toml", "--split", *option)
         assert outcome.code == 2
         assert "would undo" in outcome.err
+
+
+def test_the_judgement_is_that_of_the_check_run_where_there_is_one(cli):
+    text = cli("balance", TURBO / "checked.toml").out
+    assert text.startswith("As predicted: with the weights rms 28.4 → 0.413 µm pp (0.382 predicted). ")
+    assert "Mount these weights" not in text
+    assert "Note: --refine adds the check run" in text
+    assert "left      423.0  168.9°" in text
+    first, second, *_ = cli("balance", TURBO / "checked.toml", "--limit", "0.7").out.splitlines()
+    assert first == "Fail (check run check): 3 of 20 limits not kept."
+    assert second.startswith("As predicted: ")
+    refined = cli("balance", TURBO / "checked.toml", "--refine").out
+    assert refined.startswith("Mount these weights: ")
+    assert "  add if 'check' stays\n" in refined
+    assert "--refine" not in refined
+
+
+def test_limits_lead_the_prediction(cli):
+    text = cli("balance", TURBO / "job.toml", "--limit", "2").out
+    first, second, *_ = text.splitlines()
+    assert first == "Pass (prediction): 20 of 20 limits kept."
+    assert second.startswith("Mount these weights: rms 28.4 → 0.314 µm pp; ")
+    assert text.count("limit 2: pass") == 3
+    assert cli("balance", TURBO / "job.toml", "--limit", "2", "--table").out.count("limit 2: pass") == 20
+    pieces = cli("balance", TURBO / "holes.toml", "--split").out
+    assert pieces.startswith("Mount these pieces: rms 28.4 → 0.666 µm pp (with any weights 0.314).\n")
+    assert "±" not in pieces.partition("Warning")[0]
+    assert "± 32 g·mm" in cli("balance", TURBO / "holes.toml", "--split", "--table").out
