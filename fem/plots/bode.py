@@ -146,13 +146,8 @@ def draw_bode(
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
-        across: dict[str, Any] = {
-            "xycoords": ("data", "axes fraction"),
-            "rotation": 90,
-            "va": "bottom",
-            "bbox": BOX,
-        }
-        note(above, text, (speed * RPM, 0.0), (3, 5), **across)
+        place, across = (speed * RPM, 0.0), ("data", "axes fraction")
+        note(above, text, place, (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
         for ax in axes:
             ax.axvline(speed * RPM, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
     return axes

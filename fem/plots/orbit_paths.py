@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,14 +45,8 @@ def draw_orbits(
         color, marker = COLORS[k % MOST_ORBITS], MARKERS[k % len(MARKERS)]
         path = 1e6 * np.real(np.stack((a, b))[:, None] * np.exp(1j * turn))
         style, word = STYLES[1] if way < 0 else STYLES[0], "straight" if way == 0 else DIRECTION_NAMES[way]
-        curve: dict[str, Any] = {
-            "color": color,
-            "marker": marker,
-            "markevery": [0],
-            "markersize": 9,
-            "linewidth": 1.7,
-        }
-        ax.plot(*path, style, label=f"{label}, {word}", markeredgecolor="white", **curve)
+        ax.plot(*path, style, color=color, linewidth=1.7, label=f"{label}, {word}",
+                marker=marker, markevery=[0], markersize=9, markeredgecolor="white")  # fmt: skip
         arrow = {"arrowstyle": "-|>", "color": color, "linewidth": 1.6, "mutation_scale": 16}
         ax.annotate("", xy=tuple(path[:, 40]), xytext=tuple(path[:, 34]), arrowprops=arrow)
     ax.set_aspect("equal", adjustable="datalim")

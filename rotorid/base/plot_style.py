@@ -94,11 +94,6 @@ def legend_above(
     )
 
 
-def legend_beside(ax: Axes) -> None:
-    """A legend that hides nothing, right of the axes."""
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=TEXT)
-
-
 def plain(ax: Axes) -> None:
     """A grid behind the curves, no box."""
     ax.grid(color=GRID, linewidth=0.8)
@@ -110,15 +105,9 @@ def shade_unstable(
     ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
 ) -> None:
     """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
-    look: dict[str, Any] = {
-        "facecolor": VERMILION,
-        "alpha": 0.14,
-        "hatch": "///",
-        "edgecolor": VERMILION,
-        "linewidth": 0.6,
-    }
     for k, (first, last) in enumerate(ranges):
-        ax.axvspan(first * RPM, last * RPM, label="" if k else words, **look)
+        band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
+        band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
 
 
 def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:

@@ -229,21 +229,13 @@ def _bars(ax: Axes, tops: FloatArray, names: Sequence[str], texts: Sequence[Sequ
     ax.margins(y=0.3)
     for i, name in enumerate(names):
         x = np.arange(n) + (i - (count - 1) / 2) * width
-        look: dict[str, Any] = {
-            "color": COLORS[i % len(COLORS)],
-            "hatch": HATCHES[i % len(HATCHES)],
-            "edgecolor": "white",
-        }
-        ax.bar(x, np.nan_to_num(tops[i]), 0.92 * width, label=name, linewidth=0, **look)
+        color, hatch = COLORS[i % len(COLORS)], HATCHES[i % len(HATCHES)]
+        for bar in ax.bar(x, np.nan_to_num(tops[i]), 0.92 * width, label=name, color=color, hatch=hatch):
+            bar.set(edgecolor="white", linewidth=0)
         for place, end, text in zip(x, np.nan_to_num(tops[i]), texts[i], strict=True):
             down = text.startswith("−")
-            at: dict[str, Any] = {
-                "ha": "center",
-                "va": "top" if down else "bottom",
-                "rotation": 90,
-                "color": DARK,
-            }
-            note(ax, text, (float(place), float(end)), (0, -3 if down else 3), **at)
+            shift, va = ((0, -3), "top") if down else ((0, 3), "bottom")
+            note(ax, text, (float(place), float(end)), shift, ha="center", va=va, rotation=90, color=DARK)
 
 
 def _percent(error: float) -> str:
