@@ -19,6 +19,7 @@ UNDAMPED = "practically undamped peaks: what is largest beside them depends on t
 _INSIDE = 2  # speeds within the half-power band on either side of a summit: five with the summit
 _FINEST = 2e-7  # relative step; finer ones would show rounding
 _ROUNDS = 14
+_BEND, _SHORT = np.radians(10), 0.005  # of a curve in the plane, and of its largest reading
 _MOST = 30_000  # speeds
 _AROUND = np.array([-1e-2, -1e-3, -1e-4, 1e-4, 1e-3, 1e-2])  # of a critical speed, relative
 _CRITICALS = 32  # around which speeds are added
@@ -60,6 +61,25 @@ def resolve_peaks(
     if any(peak.undamped for found in peaks for peak in found.peaks):
         finer = dataclasses.replace(finer, warnings=(*finer.warnings, UNDAMPED))
     return finer, peaks
+
+
+def smooth_curves(response: Response, sensors: Sequence[SensorLike]) -> Response:
+    """The response with speeds added where a reading, as a curve in the plane, bends by more than 10° a step.
+
+    Steps of less than 0.5 % of the largest reading may do so.
+    """
+    for _ in range(_ROUNDS):
+        omega, Z = response.speeds[response.steady], response.readings(sensors)[response.steady]
+        steps = np.diff(Z, axis=0)
+        bends = np.abs(np.angle(steps[1:] * steps[:-1].conj())) > _BEND
+        long = np.abs(steps) > _SHORT * np.abs(Z).max(initial=0.0)
+        long &= np.pad(bends, ((1, 0), (0, 0))) | np.pad(bends, ((0, 1), (0, 0)))
+        extra = ((omega[1:] + omega[:-1]) / 2)[long.any(axis=1)]
+        finer = _with(response, extra)
+        if finer is None or finer.speeds.size == response.speeds.size:
+            break
+        response = finer
+    return response
 
 
 def _refine(result: Response, places: Sequence[SensorLike]) -> Response:

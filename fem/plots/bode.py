@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,18 +11,22 @@ from numpy.typing import ArrayLike
 from fem.model.sensors import label
 from fem.plots.drawing import draw_rotor
 from fem.windows import Window, within
-from rotorid.base.arrays import BoolArray, FloatArray
+from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.plot_style import (
+    ABOVE_SCALE,
     BOX,
     DARK,
     MARKERS,
+    STYLES,
+    TEXT,
+    WIDTH,
     legend_above,
-    legend_beside,
     look,
     new_axes,
+    new_figure,
     note,
     plain,
-    rpm_above,
+    rad_s_above,
     shade_operating,
     shade_unstable,
 )
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
+    from fem.api684_peaks import Peak, Peaks
     from fem.model.rotor import Rotor
     from fem.response_result import InfluenceCoefficients, Response
 
@@ -66,9 +71,7 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
 
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
     """The size of each influence coefficient over speed, below the rotor with its planes and sensors."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 8.5), layout="constrained")
+    figure = new_figure(6.6)
     above, below = figure.subplots(2, height_ratios=(2, 3))
     draw_rotor(rotor, above, planes=influence.planes, sensors=influence.sensors)
     draw_influence(influence, below)
@@ -81,7 +84,8 @@ def draw_bode(
     labels: Sequence[str],
     axes: tuple[Axes, Axes] | None = None,
     *,
-    peaks: Sequence[tuple[float, str]] = (),
+    peaks: Sequence[Peaks] = (),
+    factors: bool = True,
     operating: tuple[float, float] | None = None,
     windows: Sequence[Window] = (),
 ) -> tuple[Axes, Axes]:
@@ -98,7 +102,9 @@ def draw_bode(
     axes
         For the amplitude and for the phase; new ones if None.
     peaks
-        Speeds to mark, rad/s, each with a text for the amplitude's axes.
+        Of each reading, to mark on its curves; none if empty.
+    factors
+        Whether amplification factors are written beside the speeds of the peaks.
     operating
         Range of operating speeds, rad/s, shaded.
     windows
@@ -113,13 +119,14 @@ def draw_bode(
         from matplotlib import pyplot as plt
 
         _, (above, below) = plt.subplots(
-            2, figsize=(10, 6.5), sharex=True, layout="constrained", height_ratios=(3, 2)
+            2, figsize=(WIDTH, 5.8), sharex=True, layout="constrained", height_ratios=(3, 2)
         )
         axes = above, below
     above, below = axes
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
-    _over_speed(above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak", windows)
-    shade_unstable(below, _ranges(windows), "")
+    _over_speed(
+        above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak", windows, operating=operating, peaks=peaks
+    )
     steady = ~within(tuple(windows), omega)
     for k, reading in enumerate(Z.T):
         seen = steady & (np.abs(reading) > 0)
@@ -128,25 +135,44 @@ def draw_bode(
             # The middle of the curve between -360 and 0: a lag, as engineers read it.
             phase -= 360 * np.ceil(np.median(phase) / 360)
         shown = seen | ~steady
-        below.plot(omega[shown], _with_gaps(phase, seen)[shown], linewidth=1.6, **look(k, len(labels)))
+        drawn = _look(k, len(labels), omega[shown], peaks)
+        below.plot(omega[shown] * RPM, _with_gaps(phase, seen)[shown], **drawn)
+    shade_operating(below, operating)
+    shade_unstable(below, _ranges(windows))
     plain(below)
     below.margins(x=0.01)
-    below.set(xlabel="speed, rad/s", ylabel="phase (lead), degrees")
+    below.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
     below.yaxis.set_major_locator(_right_angles(below))
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
-    rpm_above(above)
-    across = ("data", "axes fraction")
-    if operating is not None:
-        middle = (sum(operating) / 2, 1.0)
-        note(above, "operating range", middle, (0, -4), xycoords=across, ha="center", va="top", color=DARK)
-    for speed, text in peaks:
-        note(above, text, (speed, 0.0), (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
-    for ax in axes:
-        shade_operating(ax, operating)
-        for speed, _ in peaks:
-            ax.axvline(speed, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
+    for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
+        place, across = (speed * RPM, 0.0), ("data", "axes fraction")
+        note(above, text, place, (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
+        for ax in axes:
+            ax.axvline(speed * RPM, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
     return axes
+
+
+def _together(peaks: Sequence[Peaks], factors: bool, width: float) -> list[tuple[float, str]]:
+    """Peaks of all readings, those within a width as one: the speed of its largest, rad/s, and its words."""
+    groups: list[list[Peak]] = []
+    for peak in sorted((peak for each in peaks for peak in each.peaks), key=lambda peak: peak.speed):
+        if groups and peak.speed < groups[-1][0].speed + width:
+            groups[-1].append(peak)
+        else:
+            groups.append([peak])
+    words = []
+    for group in groups:
+        known = [peak.amplification for peak in group if peak.amplification is not None]
+        factor = f"\nAF {_span(known, '.1f')}" if factors and known else ""
+        loudest = max(group, key=lambda peak: peak.amplitude)
+        words.append((loudest.speed, f"{_span([peak.speed * RPM for peak in group], '.0f')} rpm{factor}"))
+    return words
+
+
+def _span(values: Sequence[float], form: str) -> str:
+    low, high = format(min(values), form), format(max(values), form)
+    return low if low == high else f"{low} to {high}"
 
 
 def draw_polar(
@@ -174,7 +200,7 @@ def draw_polar(
     if ax is None:
         from matplotlib import pyplot as plt
 
-        _, ax = plt.subplots(figsize=(7.5, 7), layout="constrained", subplot_kw={"projection": "polar"})
+        _, ax = plt.subplots(figsize=(WIDTH, 6.6), layout="constrained", subplot_kw={"projection": "polar"})
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     steady = ~within(tuple(windows), omega)
     omega, Z = omega[steady], Z[steady]
@@ -182,28 +208,22 @@ def draw_polar(
     for k, (reading, named) in enumerate(zip(Z.T, labels, strict=True)):
         curve, phase, size = look(k), np.unwrap(np.angle(reading)), 1e6 * np.abs(reading)
         ax.plot(_with_gaps(phase, steady), _with_gaps(size, steady), linewidth=1.6, label=named, **curve)
-        for i in _along(reading, marks):
-            if any(abs(reading[i] - other) < 0.05 * np.abs(Z).max() for other in marked):
+        for speed in _along(omega * RPM, reading, marks):
+            there = complex(np.interp(speed, omega * RPM, reading))
+            if any(abs(there - other) < 0.08 * np.abs(Z).max() for other in marked):
                 continue
-            marked.append(complex(reading[i]))
-            place, color = (phase[i], size[i]), curve["color"]
-            ax.plot(*place, MARKERS[k % len(MARKERS)], color=color, markersize=5, markeredgecolor="white")
-            outwards = (8 * np.cos(phase[i]), 8 * np.sin(phase[i]))
-            speed = f"{omega[i] * RPM:.0f}"
-            note(
-                ax,
-                speed,
-                place,
-                outwards,
-                ha="center",
-                va="center",
-                fontsize="x-small",
-                color=color,
-                bbox=BOX,
-            )
+            marked.append(there)
+            angle, color = float(np.angle(there)), curve["color"]
+            place, marker = (angle, 1e6 * abs(there)), MARKERS[k % len(MARKERS)]
+            ax.plot(*place, marker, color=color, markersize=6, zorder=4)
+            outwards = (20 * np.cos(angle), 11 * np.sin(angle))
+            note(ax, f"{speed:.0f}", place, outwards, ha="center", va="center", color=color, bbox=BOX)
     ax.grid(color="#d0d5dc", linewidth=0.8)
-    ax.set_xlabel("amplitude, µm peak, over phase lead in degrees; marks: speed in rpm", labelpad=10)
-    legend_above(ax, height=1.06)
+    ax.set_title("amplitude, µm peak, over phase lead, degrees; marks: speed, rpm", fontsize=TEXT)
+    legend_above(ax, height=-0.08)
+    rays = np.arange(22.5, 360.0, 45.0)
+    near = np.abs(np.angle(Z[..., None] * np.exp(-1j * np.radians(rays)))) < np.radians(12)
+    ax.set(rlabel_position=rays[np.argmin(near.sum(axis=(0, 1)))])
     return ax
 
 
@@ -218,15 +238,19 @@ def _with_gaps(values: FloatArray, there: BoolArray) -> FloatArray:
     return out
 
 
-def _along(curve: np.ndarray[tuple[int], np.dtype[np.complex128]], marks: int) -> list[int]:
-    """Indices about evenly spaced along a curve, so that a resonance gets its share."""
-    if curve.size < 2:
-        return list(range(curve.size))
+def _along(rpm: FloatArray, curve: ComplexArray, marks: int) -> list[float]:
+    """Speeds about evenly spaced along a curve, so that a resonance gets its share, as round as may be."""
     steps = np.concatenate(([0.0], np.cumsum(np.abs(np.diff(curve)))))
     if not steps[-1] > 0:
-        return [0]
-    wanted = np.linspace(0, steps[-1], marks + 1)
-    return sorted({int(np.argmin(np.abs(steps - place))) for place in wanted})
+        return [float(rpm[0])] if rpm.size else []
+    taken = []
+    for place in np.linspace(0, steps[-1], marks + 1):
+        speed = float(np.interp(place, steps, rpm))
+        near = [round(speed / unit) * unit for unit in (1000, 500, 100, 50, 10)]
+        off = np.abs(np.interp(near, rpm, steps) - place)
+        fits = (off < 0.25 * steps[-1] / marks) & (near >= rpm[0]) & (near <= rpm[-1])
+        taken.append(float(near[int(np.argmax(fits))]) if fits.any() else speed)
+    return list(dict.fromkeys(taken))
 
 
 def _right_angles(ax: Axes) -> MultipleLocator:
@@ -243,25 +267,45 @@ def _over_speed(
     labels: Sequence[str],
     ylabel: str,
     windows: Sequence[Window],
+    *,
+    operating: tuple[float, float] | None = None,
+    peaks: Sequence[Peaks] = (),
 ) -> Axes:
     ax = new_axes() if ax is None else ax
     curves = np.where(within(tuple(windows), speeds)[:, None], np.nan, curves)
-    shade_unstable(ax, _ranges(windows))
     order = np.argsort(speeds, kind="stable")
-    marker = "o" if speeds.size < 12 else None
     for k, (curve, named) in enumerate(zip(curves.T, labels, strict=True)):
-        ax.plot(
-            speeds[order], curve[order], marker=marker, linewidth=1.6, label=named, **look(k, len(labels))
-        )
+        drawn = _look(k, len(labels), speeds[order], peaks)
+        ax.plot(speeds[order] * RPM, curve[order], label=named, **drawn)
+    shade_operating(ax, operating)
+    shade_unstable(ax, _ranges(windows))
     positive = curves[curves > 0]
     if positive.size and positive.max() > 30 * positive.min():
         ax.set_yscale("log")
         ax.set_ylim(bottom=max(positive.min() / 2, positive.max() * 1e-6))
-    ax.set(xlabel="speed, rad/s", ylabel=ylabel)
+        ylabel += " (log)"
+    ax.set(xlabel="speed, rpm", ylabel=ylabel)
     ax.margins(x=0.01)
     plain(ax)
-    if max(map(len, labels), default=0) > 20:
-        legend_above(ax, columns=2)  # beside, long names would leave no room for the curves
-    else:
-        legend_beside(ax)
+    rad_s_above(ax)
+    title: dict[str, Any] = {
+        "title": "marks: peaks, with their speed and amplification factor AF",
+        "title_fontsize": TEXT,
+    }
+    columns = 2 if max(map(len, labels), default=0) > 25 else 3
+    legend_above(ax, columns, borderaxespad=ABOVE_SCALE, **(title if peaks else {}))
     return ax
+
+
+def _look(k: int, of: int, speeds: FloatArray, peaks: Sequence[Peaks]) -> dict[str, Any]:
+    """Colour and style of curve k over ascending speeds, with marks at its peaks, or where it needs them."""
+    drawn: dict[str, Any] = {"linewidth": 1.6, "markersize": 7, "markeredgecolor": "white", **look(k)}
+    if peaks and peaks[k].peaks:
+        every: Any = [int(np.abs(speeds - peak.speed).argmin()) for peak in peaks[k].peaks]
+    elif speeds.size < 12:
+        every = 1
+    elif of > len(STYLES):
+        every = (k * speeds.size // (8 * of), max(speeds.size // 8, 1))
+    else:
+        return drawn
+    return {"marker": MARKERS[k % len(MARKERS)], "markevery": every, **drawn}

@@ -11,15 +11,19 @@ import numpy as np
 from fem.orbits import DIRECTION_NAMES
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
+    ABOVE_SCALE,
     BOX,
     COLORS,
     QUIET,
     VERMILION,
     WARNING,
+    WIDTH,
+    legend_above,
     new_axes,
+    new_figure,
     note,
     plain,
-    rpm_above,
+    rad_s_above,
     scale_beside,
     shade_operating,
     shade_unstable,
@@ -33,7 +37,6 @@ if TYPE_CHECKING:
     from fem.campbell import Campbell
 
 HIGHEST = 3.0  # log decrements above count as "well damped" and are not drawn to scale
-_HEADROOM = 1.1  # above the highest curve, for the legend
 _LOOKS: dict[str, dict[str, Any]] = {
     "forward": {"linestyle": "-", "marker": "^", "fillstyle": "full"},
     "backward": {"linestyle": "--", "marker": "v", "fillstyle": "none"},
@@ -50,13 +53,12 @@ def campbell_figure(
     unstable: Sequence[tuple[float, float]] = (),
 ) -> Figure:
     """Make a figure of a Campbell diagram over its logarithmic decrements; unstable speeds are hatched."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 8.5), layout="constrained")
+    figure = new_figure(7.4)
     above, below = figure.subplots(2, sharex=True, height_ratios=(5, 3))
     draw_campbell(campbell, above, criticals=criticals, operating=operating, unstable=unstable)
     draw_log_decrements(campbell, below)
-    shade_unstable(below, unstable, "")
+    shade_unstable(below, unstable)
+    shade_operating(below, operating)
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     return figure
@@ -88,14 +90,13 @@ def draw_campbell(
     unstable
         Ranges of speed in which a mode grows, rad/s, hatched.
     """
-    ax = new_axes((10, 6)) if ax is None else ax
+    ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     top = _highest(campbell)
-    _curves(ax, campbell, campbell.frequencies)
-    last = float(campbell.speeds.max())
-    end = min(last, top)
+    _curves(ax, campbell, campbell.frequencies * RPM)
+    end = min(float(campbell.speeds.max()) * RPM, top)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
-    ax.set(xlim=_range(campbell), ylim=(0, _HEADROOM * top))
-    seen = [(speed, delta) for speed, delta in criticals if speed <= end]
+    ax.set(xlim=_range(campbell), ylim=(0, top))
+    seen = [(speed * RPM, delta) for speed, delta in criticals if speed * RPM <= end]
     middle = _free(ax.get_xlim()[0], end, [speed for speed, _ in seen])
     note(ax, "1×", (middle, middle), (-4, 5), ha="right", fontsize=11)
     if seen:
@@ -103,11 +104,11 @@ def draw_campbell(
         ax.plot(places, places, linestyle="", zorder=6, **_CRITICAL)
     _label_criticals(ax, seen)
     shade_operating(ax, operating)
-    shade_unstable(ax, unstable, "unstable", 0.98 / _HEADROOM)  # below the legend
+    shade_unstable(ax, unstable, "unstable")
     plain(ax)
-    ax.set(xlabel="speed, rad/s", ylabel="whirl frequency, rad/s")
-    rpm_above(ax)
-    scale_beside(ax, 2 * np.pi, "frequency, Hz")
+    ax.set(xlabel="speed, rpm", ylabel="whirl frequency, rpm")
+    rad_s_above(ax)
+    scale_beside(ax, 60.0, "whirl frequency, Hz")
     _legend(ax, campbell, bool(seen))
     return ax
 
@@ -117,7 +118,7 @@ def draw_log_decrements(campbell: Campbell, ax: Axes | None = None) -> Axes:
 
     Values above 3 are cut off.
     """
-    ax = new_axes((10, 4)) if ax is None else ax
+    ax = new_axes((WIDTH, 3)) if ax is None else ax
     shown = _shown(campbell)
     delta = campbell.log_decrements[:, shown]
     _curves(ax, campbell, campbell.log_decrements)
@@ -127,20 +128,20 @@ def draw_log_decrements(campbell: Campbell, ax: Axes | None = None) -> Axes:
     ax.set(xlim=_range(campbell), ylim=(max(low, -HIGHEST), high))
     ax.axhline(0.0, color="black", linewidth=1.1)
     ax.axhspan(-1e3, 0.0, facecolor=VERMILION, alpha=0.10, hatch="///", edgecolor=VERMILION, linewidth=0)
-    ax.annotate("unstable", (0.01, 0.02), xycoords="axes fraction", fontsize="small", color=WARNING)
+    note(ax, "unstable", (0.01, 0.02), xycoords="axes fraction", color=WARNING)
     plain(ax)
-    ax.set(xlabel="speed, rad/s", ylabel="logarithmic decrement")
+    ax.set(xlabel="speed, rpm", ylabel="logarithmic decrement")
     return ax
 
 
 def _range(campbell: Campbell) -> tuple[float, float]:
-    first, last = float(campbell.speeds.min()), float(campbell.speeds.max())
-    room = 0.06 * (last - first) or 0.05 * last or 1.0
-    return (0.0 if first < 0.3 * last else first - room / 2), last + room
+    first, last = RPM * float(campbell.speeds.min()), RPM * float(campbell.speeds.max())
+    room = 0.12 * (last - first) or 0.05 * last or 1.0
+    return (0.0 if first < 0.3 * last else first - room / 4), last + room
 
 
 def _highest(campbell: Campbell) -> float:
-    w = campbell.frequencies
+    w = campbell.frequencies * RPM
     return 1.06 * float(max(w[np.isfinite(w)].max(initial=0.0), 1e-9))
 
 
@@ -168,7 +169,7 @@ def _curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
             # Each stretch reaches to the next one, so that the curve has no gaps.
             part = slice(start, min(stop + 1, S))
             ax.plot(
-                campbell.speeds[part],
+                campbell.speeds[part] * RPM,
                 values[part, k],
                 color=color,
                 linewidth=1.8,
@@ -178,7 +179,7 @@ def _curves(ax: Axes, campbell: Campbell, values: FloatArray) -> None:
             )
         if np.isfinite(values[-1, k]):
             ends.append((float(values[-1, k]), str(k + 1), color))
-    _label_ends(ax, float(campbell.speeds.max()), ends)
+    _label_ends(ax, float(campbell.speeds.max()) * RPM, ends)
 
 
 def _runs(way: FloatArray) -> list[tuple[int, int]]:
@@ -200,14 +201,14 @@ def _label_ends(ax: Axes, x: float, ends: list[tuple[float, str, str]]) -> None:
 
 
 def _label_criticals(ax: Axes, criticals: Sequence[tuple[float, float]]) -> None:
-    """Speed and log decrement beside each mark, on the other side of the 1× line for close neighbours."""
+    """Speed, rpm, and log decrement beside each mark; of close ones on the other side of the 1× line."""
     room = 0.06 * (ax.get_ylim()[1] - ax.get_ylim()[0])
     last, crowd = -np.inf, 0
     for speed, delta in sorted(criticals):
         crowd = crowd + 1 if speed - last < room else 0
         last = speed
-        text, at, down = f"{speed * RPM:.0f} rpm, δ = {delta:.2f}", (speed, speed), 5 + 13 * (crowd // 2)
-        if crowd % 2 == 0:
+        text, at, down = f"{speed:.0f} rpm, δ = {delta:.2f}", (speed, speed), 5 + 13 * (crowd // 2)
+        if crowd % 2 == 0 and speed < 0.75 * ax.get_xlim()[1]:
             note(ax, text, at, (9, -down), va="top", ha="left", bbox=BOX, zorder=7)
         else:
             note(ax, text, at, (-9, down), va="bottom", ha="right", bbox=BOX, zorder=7)
@@ -225,14 +226,5 @@ def _legend(ax: Axes, campbell: Campbell, marked: bool) -> None:
     ]
     if marked:
         handles.append(Line2D([], [], linestyle="", label="damped critical speed", **_CRITICAL))
-    # One row in the room above the curves.
-    ax.legend(
-        handles=handles,
-        loc="upper left",
-        ncols=len(handles),
-        frameon=True,
-        framealpha=0.85,
-        edgecolor="none",
-        fontsize="small",
-        borderaxespad=0.2,
-    )
+    shades = [shade for shade in ax.patches if not str(shade.get_label()).startswith("_")]
+    legend_above(ax, handles=[*handles, *shades], borderaxespad=ABOVE_SCALE)

@@ -12,7 +12,7 @@ from fem.model.rotor import Disc, Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.model.supports import KINDS
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import COLORS, DARK, QUIET, legend_above, new_axes, note
+from rotorid.base.plot_style import COLORS, DARK, QUIET, WIDTH, legend_above, new_axes, note
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def draw_rotor(
             [rotor.node(as_sensor(s, rotor).node) for s in sensors],
         ),
     ]
-    ax = new_axes((10, 3.6)) if ax is None else ax
+    ax = new_axes((WIDTH, 2.8)) if ax is None else ax
     discs = [disc for disc in rotor.discs if disc.mass > 0 and disc.polar_inertia > 0]
     largest = float(max([rotor.outer_diameter.max() / 2, *(_solid(disc)[0] for disc in discs)]))
     scale = 1e3 if height is None else height / largest

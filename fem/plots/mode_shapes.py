@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fem.plots.drawing import EDGE, draw_rotor
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import legend_above, look, new_axes
+from rotorid.base.plot_style import MARKERS, STYLES, legend_above, look, new_axes
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -24,20 +24,16 @@ def draw_modes(modes: Modes, ax: Axes | None = None) -> Axes:
     draw_rotor(rotor, ax, height=0.22)
     x, curves = smooth_shapes(modes)
     for k, (omega, curve) in enumerate(zip(modes.frequencies, curves.T, strict=True)):
-        speed = f"{omega:.5g} rad/s = {omega * RPM:.5g} rpm" if omega else "rigid body"
+        speed = f"{omega * RPM:.5g} rpm = {omega:.5g} rad/s" if omega else "rigid body"
         if omega and modes.direction[k] != "forward":
             speed += f", {modes.direction[k]}"
-        ax.plot(
-            x,
-            curve / np.abs(curve).max(),
-            linewidth=2.2,
-            zorder=5,
-            label=f"{k + 1}: {speed}",
-            **look(k),
-        )
+        drawn: dict[str, Any] = {"linewidth": 2.2, "zorder": 5, **look(k)}
+        if k >= len(STYLES):
+            drawn |= {"marker": MARKERS[k % len(MARKERS)], "markevery": (k, 24), "markeredgecolor": "white"}
+        ax.plot(x, curve / np.abs(curve).max(), label=f"{k + 1}: {speed}", **drawn)
     ax.axhline(0.0, color=EDGE, linewidth=0.8, zorder=3)
     ax.set(xlabel="position, m", ylabel="deflection, largest = 1", ylim=(-1.12, 1.12))
-    legend_above(ax, marker_scale=0.6)
+    legend_above(ax, 2, marker_scale=0.6)
     return ax
 
 

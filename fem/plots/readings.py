@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fem.model.sensors import SensorLike, as_sensor, label
+from fem.peak_refinement import smooth_curves
 from fem.plots.bode import draw_bode, draw_polar
-from fem.plots.orbit_paths import draw_orbits
-from rotorid.base.plot_style import on_figure
+from fem.plots.drawing import draw_rotor
+from fem.plots.orbit_paths import MOST_ORBITS, draw_orbits
+from rotorid.base.plot_style import COLORS, MARKERS, QUIET, new_figure, on_figure
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -29,9 +31,7 @@ def bode_figure(
     operating: tuple[float, float] | None = None,
 ) -> Figure:
     """Make a figure as `draw_readings` draws it."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 7), layout="constrained")
+    figure = new_figure(6.0)
     axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     draw_readings(response, sensors, peaks, axes, operating=operating)
     return figure
@@ -46,47 +46,62 @@ def draw_readings(
     operating: tuple[float, float] | None = None,
     factors: bool = True,
 ) -> None:
-    """Draw amplitude and phase of sensors, marked where that with the largest reading has its peaks.
+    """Draw amplitude and phase of sensors, each marked at its peaks.
 
     `factors`: amplification factors are written at the marks.
     """
-    Z = response.readings(sensors)
-    marks = []
-    if peaks:
-        loudest = int(np.argmax(np.abs(Z[response.steady]).max(axis=0, initial=0.0)))
-        for peak in peaks[loudest].peaks:
-            known = factors and peak.amplification is not None
-            factor = f", AF {peak.amplification:.1f}" if known else ""
-            marks.append((peak.speed, f"{peak.speed * RPM:.0f} rpm{factor}"))
     draw_bode(
         response.speeds,
-        Z,
+        response.readings(sensors),
         _labels(sensors),
         (axes[0], axes[1]),
-        peaks=marks,
+        peaks=peaks,
+        factors=factors,
         operating=operating,
         windows=response.windows,
     )
 
 
 def polar_figure(response: Response, sensors: Sequence[SensorLike]) -> Figure:
-    """Make a figure of the readings as curves in the plane, as `draw_polar`."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 7.5), layout="constrained")
-    ax = figure.add_subplot(projection="polar")
-    draw_polar(response.speeds, response.readings(sensors), _labels(sensors), ax, windows=response.windows)
-    return figure
+    """Make a figure of the readings as smooth curves in the plane, as `draw_polar`."""
+    fine = smooth_curves(response, sensors)
+    Z, labels = fine.readings(sensors), _labels(sensors)
+    return on_figure(
+        lambda ax: draw_polar(
+            fine.speeds, Z, labels, ax, marks=max(2, 14 // len(labels)), windows=fine.windows
+        ),
+        height=7.2,
+        projection="polar",
+    )
 
 
 def orbits_figure(response: Response, sensors: Sequence[SensorLike], k: int) -> Figure:
-    """Make a figure of the orbits of the sensors' nodes at speed k, from 0, of the response."""
-    names = list(dict.fromkeys(as_sensor(place, response.rotor).node for place in sensors))
+    """Make a figure of the orbits of the sensors' nodes at speed k, from 0, of the response.
+
+    Above them is the rotor with their places. Of more than four, the four largest are drawn.
+    """
+    rotor = response.rotor
+    places = list(dict.fromkeys(as_sensor(place, rotor).node for place in sensors))
+    order = np.argsort([-response.major[k, response.column(name)] for name in places], kind="stable")
+    names = [places[i] for i in sorted(order[:MOST_ORBITS])]
     index = [response.column(name) for name in names]
+    some = "" if len(names) == len(places) else f", the {MOST_ORBITS} largest orbits of {len(places)}"
+    omega = response.speeds[k]
+    title = f"at {omega * RPM:.0f} rpm = {omega:.5g} rad/s, a stable speed{some}"
+    figure = new_figure(7.4)
+    above, below = figure.subplots(2, height_ratios=(1, 3))
+    draw_rotor(rotor, above, height=1.0)
+    for part in above.collections:
+        part.set_color(QUIET)
+    for i, name in enumerate(names):
+        place = rotor.positions[rotor.node(name) - 1]
+        color, marker = COLORS[i], MARKERS[i]
+        above.plot([place, place], [-1.3, 1.3], color=color, marker=marker, markersize=8, zorder=6)
+    above.set(xlabel="position, m", yticks=[], ylim=(-1.5, 1.5))
+    above.spines["left"].set_visible(False)
     labels = [f"node {name}" if isinstance(name, int) else name for name in names]
-    title = f"{response.speeds[k] * RPM:.0f} rpm = {response.speeds[k]:.5g} rad/s"
-    x, y = response.x[k, index], response.y[k, index]
-    return on_figure(lambda ax: draw_orbits(x, y, labels, ax, title=title), 7.5, 7.0)
+    draw_orbits(response.x[k, index], response.y[k, index], labels, below, title=title)
+    return figure
 
 
 def _labels(sensors: Sequence[SensorLike]) -> list[str]:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.plot_style import DARK, MARKERS, legend_above, look, new_axes, plain, scale_beside
+from rotorid.base.plot_style import DARK, MARKERS, WIDTH, legend_above, look, new_axes, plain, scale_beside
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axes._base import _AxesBase
 
 
 def draw_speed_map(
@@ -39,7 +40,7 @@ def draw_speed_map(
     operating
         Range of operating speeds, rad/s, shaded.
     """
-    ax = new_axes((9, 6)) if ax is None else ax
+    ax = new_axes((WIDTH, 5)) if ax is None else ax
     k, omega = np.asarray(stiffness, float), np.asarray(speeds, float)
     for mode, curve in enumerate(omega.T):
         seen = curve > 0
@@ -56,16 +57,17 @@ def draw_speed_map(
     if operating is not None:
         ax.axhspan(operating[0] * RPM, operating[1] * RPM, color="#000000", alpha=0.07, linewidth=0,
                    label="operating range")  # fmt: skip
-    ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm")
+    ax.set(xlabel="stiffness of each support, N/m", ylabel="critical speed, rpm (both log)")
     plain(ax)
     ax.grid(which="minor", color="#f0f2f5", linewidth=0.5)
-    scale_beside(ax, RPM, "rad/s")
-    _plain_numbers(ax)
+    scale_beside(ax, RPM, "critical speed, rad/s")
+    for scale in (ax, *ax.child_axes):
+        _plain_numbers(scale)
     legend_above(ax)
     return ax
 
 
-def _plain_numbers(ax: Axes) -> None:
+def _plain_numbers(ax: _AxesBase) -> None:
     """2000 instead of 2 × 10³ on the axis of speeds."""
     from matplotlib.ticker import FuncFormatter, LogLocator
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.plot_style import new_axes
+from rotorid.base.plot_style import MARKERS, WIDTH, legend_above, look, new_axes, plain
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
 def draw_deflection(found: StaticDeflection, ax: Axes | None = None) -> Axes:
     """Draw the deflection in x and y along the rotor; return the axes."""
-    ax = new_axes((10, 4)) if ax is None else ax
-    for name, values in (("x", found.x), ("y", found.y)):
+    ax = new_axes((WIDTH, 3.2)) if ax is None else ax
+    for k, (name, values) in enumerate((("x", found.x), ("y", found.y))):
         if np.abs(values).max() > 1e-9 * found.deflection.max():
-            ax.plot(found.rotor.positions, 1e6 * values, marker=".", label=name)
+            ax.plot(
+                found.rotor.positions, 1e6 * values, marker=MARKERS[k], markersize=4, label=name, **look(k)
+            )
     ax.set(xlabel="position, m", ylabel="static deflection, µm")
-    ax.grid(alpha=0.3)
-    ax.legend(frameon=False)
+    plain(ax)
+    legend_above(ax)
     return ax

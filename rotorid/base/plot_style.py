@@ -28,7 +28,8 @@ GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 """Behind words that stand on curves."""
 WARNING = "#8a3d00"
-_ACROSS = ("data", "axes fraction")
+ABOVE_SCALE = 4.2
+"""Room, in letters, between axes and a legend above their second scale."""
 
 
 def new_axes(size: tuple[float, float] = (WIDTH, 4.2)) -> Axes:
@@ -58,10 +59,9 @@ def on_figure(
     return figure
 
 
-def look(k: int, of: int = 1) -> dict[str, Any]:
-    """Colour and style of curve k of so many: a few differ by their style too, in black and white."""
-    style = k if of <= len(STYLES) else k // len(COLORS)
-    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[style % len(STYLES)]}
+def look(k: int) -> dict[str, Any]:
+    """Colour and style of curve k: neighbours differ by their style too, in black and white."""
+    return {"color": COLORS[k % len(COLORS)], "linestyle": STYLES[k % len(STYLES)]}
 
 
 def note(
@@ -102,11 +102,6 @@ def legend_below(figure: Figure, axes: Iterable[Axes], columns: int = 2, **optio
     figure.legend(list(shown.values()), list(shown), fontsize=TEXT, title_fontsize=TEXT, **look, **options)
 
 
-def legend_beside(ax: Axes) -> None:
-    """A legend that hides nothing, right of the axes."""
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=TEXT)
-
-
 def plain(ax: Axes) -> None:
     """A grid behind the curves, no box."""
     ax.grid(color=GRID, linewidth=0.8)
@@ -115,27 +110,25 @@ def plain(ax: Axes) -> None:
 
 
 def shade_unstable(
-    ax: Axes, ranges: Iterable[tuple[float, float]], word: str = "no steady state", top: float = 0.98
+    ax: Axes, ranges: Iterable[tuple[float, float]], words: str = "unstable: no steady state"
 ) -> None:
-    """Hatch ranges of speed in which the rotor is unstable; the word ends at this part of the axes."""
-    for first, last in ranges:
-        ax.axvspan(
-            first, last, facecolor=VERMILION, alpha=0.12, hatch="///", edgecolor=VERMILION, linewidth=0.6
-        )
-        middle = ((first + last) / 2, top)
-        note(ax, word, middle, xycoords=_ACROSS, rotation=90, ha="center", va="top", color=WARNING)
+    """Hatch ranges of speed, rad/s, in which the rotor is unstable, on axes in rpm; words for the legend."""
+    for k, (first, last) in enumerate(ranges):
+        band = ax.axvspan(first * RPM, last * RPM, label="" if k else words, alpha=0.14)
+        band.set(facecolor=VERMILION, hatch="///", edgecolor=VERMILION, linewidth=0.6)
 
 
 def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
-    """Shade the range of operating speeds, if there is one."""
+    """Shade the range of operating speeds, rad/s, if there is one, on axes in rpm."""
     if operating is not None:
-        ax.axvspan(*operating, color="#000000", alpha=0.07, linewidth=0)
+        first, last = operating
+        ax.axvspan(first * RPM, last * RPM, color="#000000", alpha=0.1, linewidth=0, label="operating range")
 
 
-def rpm_above(ax: Axes) -> None:
-    """A second scale, revolutions per minute, above one in rad/s."""
-    top = ax.secondary_xaxis("top", functions=(times(RPM), times(1 / RPM)))
-    top.set_xlabel("speed, rpm", fontsize=TEXT)
+def rad_s_above(ax: Axes) -> None:
+    """A second scale, rad/s, above one in revolutions per minute."""
+    top = ax.secondary_xaxis("top", functions=(times(1 / RPM), times(RPM)))
+    top.set_xlabel("speed, rad/s", fontsize=TEXT)
     top.tick_params(labelsize=TEXT)
 
 

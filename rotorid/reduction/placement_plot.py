@@ -29,15 +29,15 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.colors import LogNorm
 
-    from rotorid.base.plot_style import new_axes, plain
+    from rotorid.base.plot_style import TEXT, WIDTH, new_axes, plain
 
-    axes = new_axes((9.5, 6.4)) if ax is None else ax
+    axes = new_axes((WIDTH, 5.6)) if ax is None else ax
     plain(axes)
     axes.set(xscale="log", yscale="log")
     ranked = np.isfinite(placement.error) & np.isfinite(placement.mac) & (placement.masses > 0).all(axis=1)
     axes.set(
-        xlabel=f"1 − smallest MAC (at least {SAME_SHAPE:g}): the shape of the worst mode, better to the left",
-        ylabel=f"largest frequency error of {counted(placement.check, 'mode')}, %, better below",
+        xlabel=f"loss of the worst shape, 1 − MAC (at least {SAME_SHAPE:g}, log)",
+        ylabel=f"largest frequency error\nof {counted(placement.check, 'mode')}, % (log)",
     )
     n, all_of_them = placement.nodes.shape[1], placement.considered
     left_out = all_of_them - int(np.count_nonzero(ranked))
@@ -79,7 +79,7 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     axes.plot(x[front], y[front], "o", color=COLORS[1], markersize=5, markerfacecolor="none", zorder=3.5)
     _named(placement, x, y, axes)
     axes.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1, frameon=False, fontsize="small",
+        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1, frameon=False, fontsize=TEXT, markerscale=0.8,
         title=title, title_fontproperties={"size": "medium"},
     )  # fmt: skip
     return axes
@@ -91,7 +91,7 @@ def _named(placement: Placement, x: FloatArray, y: FloatArray, axes: Axes) -> No
         ("best by frequency", placement.best_by_frequency, "s", COLORS[0]),
         ("best by MAC", placement.best_by_mac, "^", COLORS[3]),
         ("compromise", placement.compromise, "D", COLORS[4]),
-        ("the book's rule", placement.book, "*", "#d01c1c"),
+        ("the book's rule", placement.book, "*", COLORS[5]),
     )
     marked: dict[int, tuple[list[str], str, str]] = {}
     for name, row, marker, color in names:

@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import fem
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import COLORS, VERMILION
+from rotorid.base.plot_style import (
+    BLUE,
+    BOX,
+    COLORS,
+    MARKERS,
+    STYLES,
+    TEXT,
+    VERMILION,
+    WIDTH,
+    legend_above,
+    new_axes,
+    note,
+    plain,
+)
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from rotorid.reduction.equivalent.changed_inputs import Shift
+    from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff
+    from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty
     from rotorid.reduction.guyan_irs_serep_result import Methods
     from rotorid.reduction.result import Reduction
 
@@ -27,8 +43,8 @@ SAME_SHAPE = 1e-6
 """Values of 1 − MAC below this are drawn as this."""
 ALIKE = 0.9
 """Below this MAC two shapes are not those of one mode."""
-WRITTEN = 16
-"""Bars that still have room for a number at their ends."""
+HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
+"""Bars that differ without colour."""
 DARK, LINE = "#2f3640", "#6b7480"
 
 
@@ -44,11 +60,10 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     ax
         Where; default new axes.
     """
-    from fem.plots import draw_rotor, new_axes
+    from fem.plots import draw_rotor
     from fem.plots.mode_shapes import smooth_shapes
-    from rotorid.base.plot_style import MARKERS, STYLES
 
-    axes = new_axes((10, 5.6)) if ax is None else ax
+    axes = new_axes((WIDTH, 5.0)) if ax is None else ax
     rotor, full, n = reduction.rotor, reduction.rotor_modes, len(reduction.frequencies)
     if rotor is None or full is None:
         return _measured(reduction, axes)
@@ -79,10 +94,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     axes.axhline(0.0, color=LINE, linewidth=0.8, zorder=3)
     lines = _masses_above(reduction, rotor, axes)
     axes.set(xlabel="position, m", ylabel="mode shape, rotor's largest = 1", ylim=(-lowest, lowest))
-    axes.legend(
-        loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=1 if shown == 1 else 2, frameon=False,
-        fontsize="small", markerscale=0.75,
-    )  # fmt: skip
+    legend_above(axes, 1, 0.75, -0.15)
     some = "" if shown == n else f", first {shown} of {n} modes"
     axes.set_title(f"{n}-mass model (points) and rotor (lines){some}", pad=10 + 12 * lines)
     return axes
@@ -91,7 +103,7 @@ def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
 def _words(reduction: Reduction, k: int) -> str:
     """Frequency, error and MAC of a mode, where the rotor's is known."""
     f, error = reduction.frequencies[k], reduction.relative_error[k]
-    text = f"mode {k + 1}: {f:.5g} rad/s ({f * RPM:.0f} rpm"
+    text = f"mode {k + 1}: {f * RPM:.0f} rpm ({f:.5g} rad/s"
     if not np.isfinite(error):
         return f"{text})"
     return f"{text}, {_percent(100 * error)} %), MAC {reduction.mac[k]:.4f}"
@@ -105,8 +117,6 @@ def _along(shape: FloatArray, reference: FloatArray) -> FloatArray:
 
 def _measured(reduction: Reduction, axes: Axes) -> Axes:
     """Measured shapes (hollow) and those of the model (full) at the masses."""
-    from rotorid.base.plot_style import COLORS, MARKERS, legend_above, plain
-
     n, k = reduction.rotor_shapes.shape
     x = np.arange(n)
     for mode in range(min(k, MOST_MODES)):
@@ -140,7 +150,7 @@ def _masses_above(reduction: Reduction, rotor: fem.Rotor, axes: Axes) -> int:
         place = float(rotor.positions[node - 1])
         text = f"{mass:.3g} kg" if abs(mass) < 999.5 else f"{mass:.0f} kg"
         text = text.replace("-", "−")
-        half = 0.0075 * span * len(text)
+        half = 0.0095 * span * len(text)
         line = next((i for i, end in enumerate(ends) if place - half > end), len(ends))
         ends[line : line + 1] = [place + half]
         axes.axvline(place, color=LINE, linewidth=0.8, linestyle=":", zorder=2)
@@ -151,7 +161,7 @@ def _masses_above(reduction: Reduction, rotor: fem.Rotor, axes: Axes) -> int:
             xytext=(0, 3 + 12 * line),
             textcoords="offset points",
             ha="center",
-            fontsize="small",
+            fontsize=TEXT,
             color=DARK if mass > 0 else VERMILION,
         )
     return len(ends)
@@ -170,75 +180,62 @@ def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[
     if axes is None:
         from matplotlib import pyplot as plt
 
-        _, (above, below) = plt.subplots(2, figsize=(10, 7), sharex=True, layout="constrained")
-    else:
-        above, below = axes
-    n = min(len(methods.nodes), MOST_MODES)
-    errors = 100 * np.array([row.relative_error[:n] for row in methods.rows])
-    losses = 1 - np.array([row.mac[:n] for row in methods.rows])
+        _, axes = plt.subplots(2, figsize=(WIDTH, 6), sharex=True, layout="constrained")
     names = [row.name for row in methods.rows]
-    above.set_yscale("symlog", linthresh=SMALLEST_ERROR, linscale=0.6)
-    below.set_yscale("log")
-    drawn = np.where(np.abs(errors) < SMALLEST_ERROR, 0.0, errors)
-    _bars(above, drawn, np.zeros_like(drawn), names, [[_percent(e) for e in row] for row in errors])
-    texts = [["none" if np.isnan(x) else f"{1 - x:.5f}" for x in row] for row in losses]
-    _bars(below, np.maximum(losses, SAME_SHAPE), np.full_like(losses, SAME_SHAPE), names, texts)
-    largest = np.nanmax(np.abs(errors), initial=SMALLEST_ERROR)
-    smallest = np.nanmin(errors, initial=0.0)
-    above.set_ylim(smallest * 12 if smallest < -SMALLEST_ERROR else -SMALLEST_ERROR, largest * 12)
-    above.axhline(0.0, color=DARK, linewidth=0.8)
-    _percent_axis(above)
-    below.set_ylim(SAME_SHAPE, 8.0)
-    below.axhline(1 - ALIKE, color=LINE, linewidth=1.0, linestyle="--", zorder=0.5)
-    below.annotate(
-        f"MAC {ALIKE:g}: below, another shape",
-        (0.0, 1 - ALIKE),
-        xycoords=("axes fraction", "data"),
-        xytext=(4, 3),
-        textcoords="offset points",
-        fontsize="x-small",
-        color=LINE,
-    )
-    above.set_ylabel("frequency error, %\n(0: below 0.0001 %)")
-    below.set_ylabel("1 − MAC at the masters (bars: MAC)")
-    ticks = [f"mode {k + 1}\n{methods.rotor_frequencies[k]:.5g} rad/s" for k in range(n)]
+    errors, mac = ([getattr(row, what) for row in methods.rows] for what in ("relative_error", "mac"))
+    return _compared(methods, names, np.array(errors), np.array(mac), (axes[0], axes[1]))
+
+
+def plot_trade_off(choices: TradeOff, axes: Sequence[Axes]) -> tuple[Axes, Axes]:
+    """Draw what other masses at the same nodes lose, as `plot_methods` draws methods."""
+    return _compared(choices, choices.names, choices.relative_error, choices.mac, (axes[0], axes[1]))
+
+
+def _compared(
+    rows: Methods | TradeOff,
+    names: Sequence[str],
+    errors: FloatArray,
+    mac: FloatArray,
+    axes: tuple[Axes, Axes],
+) -> tuple[Axes, Axes]:
+    """Bars of frequency errors and of 1 − MAC, shapes (rows, n) each, both on linear scales with their 0."""
+    above, below = axes
+    n = min(len(rows.nodes), MOST_MODES)
+    errors, losses = 100 * errors[:, :n], np.maximum(1 - mac[:, :n], 0.0)
+    _bars(above, errors, names, [[_percent(e) for e in row] for row in errors])
+    _bars(below, losses, names, [["none" if np.isnan(x) else f"{1 - x:.4f}" for x in row] for row in losses])
+    above.set_ylabel("frequency error, %")
+    below.set_ylabel("1 − MAC at the masses\n(written: MAC)")
+    if np.nanmax(losses, initial=0.0) > 1 - ALIKE:
+        below.axhline(1 - ALIKE, color=DARK, linewidth=1.0, linestyle="--", zorder=3)
+        at: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "color": DARK, "bbox": BOX}
+        note(below, f"MAC {ALIKE:g}: above, another shape", (0.0, 1 - ALIKE), (4, 4), **at)
+    ticks = [f"mode {k + 1}\n{rows.rotor_frequencies[k] * RPM:.0f} rpm" for k in range(n)]
     below.set_xticks(range(n), ticks)
-    where = ", ".join(map(str, methods.nodes))
-    some = "" if n == len(methods.nodes) else f", first {n} of {len(methods.nodes)} modes"
-    above.set_title(f"reduced to nodes {where}{some}", fontsize="medium", pad=26)
-    above.legend(
-        loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(names), frameon=False, fontsize="small"
-    )
+    where = ", ".join(map(str, rows.nodes))
+    some = "" if n == len(rows.nodes) else f", first {n} of {len(rows.nodes)} modes"
+    title = f"reduced to nodes {where}{some}"
+    legend_above(above, 4 if max(map(len, names)) < 25 else 2, title=title, title_fontsize="medium")
     return above, below
 
 
-def _bars(
-    ax: Axes, tops: FloatArray, bottoms: FloatArray, names: Sequence[str], texts: Sequence[Sequence[str]]
-) -> None:
-    """Groups of bars by mode, a colour per method, a text at the end of each."""
-    from rotorid.base.plot_style import COLORS, plain
-
+def _bars(ax: Axes, tops: FloatArray, names: Sequence[str], texts: Sequence[Sequence[str]]) -> None:
+    """Groups of bars by mode from 0, a colour and a hatch per row, a text at the end of each."""
     count, n = tops.shape
     width = 0.84 / count
     plain(ax)
     ax.grid(visible=False, axis="x")
+    ax.axhline(0.0, color=DARK, linewidth=0.8)
+    ax.margins(y=0.3)
     for i, name in enumerate(names):
         x = np.arange(n) + (i - (count - 1) / 2) * width
-        top, bottom = np.where(np.isnan(tops[i]), bottoms[i], tops[i]), bottoms[i]
-        ax.bar(x, top - bottom, 0.92 * width, bottom, color=COLORS[i % len(COLORS)], label=name)
-        for place, end, start, text in zip(x, top, bottom, texts[i], strict=True):
-            down = end < start
-            ax.annotate(
-                text,
-                (float(place), float(end)),
-                xytext=(0, -2 if down else 2),
-                textcoords="offset points",
-                ha="center",
-                va="top" if down else "bottom",
-                rotation=0 if tops.size <= WRITTEN else 90,
-                fontsize="x-small",
-                color=DARK,
-            )
+        color, hatch = COLORS[i % len(COLORS)], HATCHES[i % len(HATCHES)]
+        for bar in ax.bar(x, np.nan_to_num(tops[i]), 0.92 * width, label=name, color=color, hatch=hatch):
+            bar.set(edgecolor="white", linewidth=0)
+        for place, end, text in zip(x, np.nan_to_num(tops[i]), texts[i], strict=True):
+            down = text.startswith("−")
+            shift, va = ((0, -3), "top") if down else ((0, 3), "bottom")
+            note(ax, text, (float(place), float(end)), shift, ha="center", va=va, rotation=90, color=DARK)
 
 
 def _percent(error: float) -> str:
@@ -251,19 +248,72 @@ def _percent(error: float) -> str:
     return text.replace("-", "−")
 
 
-def _percent_axis(ax: Axes) -> None:
-    """Powers of ten of both signs, every second where there are many, and 0."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+def plot_changes(reduction: Reduction, shift: Shift | None, ax: Axes | None = None) -> Axes:
+    """Draw what errors and changes of the inputs do to each mass and frequency, all on one scale in percent.
 
-    low, high = ax.get_ylim()
-    powers = 10.0 ** np.arange(np.log10(SMALLEST_ERROR), 6)
-    ticks = np.concatenate((-powers[::-1], [0.0], powers))
-    inside = ticks[(ticks >= low) & (ticks <= high)]
-    if inside.size > 9:
-        even = np.round(np.log10(np.maximum(np.abs(inside), SMALLEST_ERROR))) % 2 == 0
-        inside = inside[(even & (np.abs(inside) > SMALLEST_ERROR)) | (inside == 0)]
-    ax.yaxis.set_major_locator(FixedLocator(inside.tolist()))
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_formatter(
-        FuncFormatter(lambda value, _: f"{value:+g}".replace("-", "−") if value else "0")
-    )
+    Parameters
+    ----------
+    reduction
+        Masses and frequencies, with what stated errors do to them, if errors were stated.
+    shift
+        What given changes do; None: were none asked for.
+    ax
+        Where; default new axes.
+    """
+    axes = new_axes((WIDTH, 4.6)) if ax is None else ax
+    n = len(reduction.nodes)
+    values = _both(reduction.masses.solution, reduction.frequencies)
+    percent = 100 / np.abs(np.where(values == 0, np.nan, values))
+    places = -np.arange(2.0 * n) - np.repeat([0.0, 0.5], n)
+    names = [f"node {node}" if isinstance(node, int) else node for node in reduction.nodes]
+    names += [f"mode {k + 1}" for k in range(n)]
+    rows = [f"{name}:  {_short(value)}" for name, value in zip(names, values, strict=True)]
+    if reduction.uncertainty is not None:
+        std = _draw_errors(reduction.uncertainty, percent, places, axes)
+        rows = [f"{row} ± {_short(spread, 2)}" for row, spread in zip(rows, std, strict=True)]
+    if shift is not None:
+        exact = _draw_shift(shift, percent, places, axes)
+        rows = [f"{row} → {_short(value)}" for row, value in zip(rows, values + exact, strict=True)]
+    units = ["kg"] * n + ["rpm"] * n
+    axes.set_yticks(places, [f"{row} {unit}" for row, unit in zip(rows, units, strict=True)])
+    axes.axvline(0.0, color=DARK, linewidth=0.9, zorder=1)
+    axes.set(xlabel="deviation from the value on the left, %")
+    plain(axes)
+    axes.grid(visible=False, axis="y")
+    legend_above(axes, 1)
+    return axes
+
+
+def _draw_errors(known: MassUncertainty, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
+    """Intervals of one standard deviation, by first order and, where that is poor, drawn; the first."""
+    std = _both(known.masses_std, known.frequencies_std)
+    line: dict[str, Any] = {"linestyle": "", "markersize": 6, "capsize": 4}
+    words = "± one standard deviation, first order"
+    axes.errorbar(0 * places, places, xerr=std * percent, color=DARK, marker="o", label=words, **line)
+    if known.drawn is not None:
+        half = _both(*known.drawn) * percent
+        line |= {"color": BLUE, "marker": "s", "label": "68 % of inputs drawn, recomputed"}
+        axes.errorbar(np.where(np.isfinite(half), 0.0, np.nan), places - 0.25, xerr=half, **line)
+    return std
+
+
+def _draw_shift(shift: Shift, percent: FloatArray, places: FloatArray, axes: Axes) -> FloatArray:
+    """Values after a change, recomputed and by first order; the change recomputed."""
+    exact = _both(shift.exact_masses, shift.exact_frequencies)
+    line: dict[str, Any] = {"linestyle": "", "markersize": 9, "zorder": 4}
+    axes.plot(exact * percent, places, "D", color=VERMILION, label="after the change", **line)
+    first, words = _both(shift.masses, shift.frequencies), "after it, predicted by first order"
+    axes.plot(first * percent, places, "o", color="black", fillstyle="none", label=words, **line)
+    return exact
+
+
+def _both(masses: FloatArray, frequencies: FloatArray) -> FloatArray:
+    """Masses, kg, and frequencies, rpm, one after the other."""
+    return np.concatenate((masses, frequencies * RPM))
+
+
+def _short(value: float, digits: int = 4) -> str:
+    """So many digits, or all before the point; none of what does not vibrate."""
+    if np.isnan(value):
+        return "none"
+    return f"{value:.{digits}g}" if abs(value) < 10**digits - 0.5 else f"{value:.0f}"

@@ -23,8 +23,6 @@ WIDTH, LETTERS = 6.0, 9.0
 """Inches and points."""
 MARKED = 4
 """Sensors whose names have room below a rotor."""
-HATCHES = ("", "////", "....", "xxxx", "\\\\\\\\", "++++")
-"""Bars that differ without colour."""
 
 
 @dataclass(frozen=True)
@@ -97,16 +95,15 @@ def bode_picture(
     peaks: Sequence[Peaks],
     operating: tuple[float, float] | None,
 ) -> Drawing:
-    """Amplitude and phase over speed, marked where the sensor with the largest reading has its peaks."""
+    """Amplitude and phase over speed, marked where each sensor has its peaks."""
 
     def draw(figure: Figure) -> None:
         from fem.plots.readings import draw_readings
 
-        above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        draw_readings(response, places, peaks, (above, below), operating=operating, factors=False)
-        legend_above(above, 3 if len(places) > 4 else 2, 0.75, 1.16)
+        axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
+        draw_readings(response, places, peaks, axes, operating=operating, factors=False)
 
-    caption = "Amplitude and phase over speed; a positive phase leads. Dotted: peaks of the largest reading."
+    caption = "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading."
     return sketch(5.0, draw, caption)
 
 
@@ -127,15 +124,7 @@ def methods_picture(methods: Methods) -> Drawing:
     def draw(figure: Figure) -> None:
         from rotorid.reduction.plots import plot_methods
 
-        above, below = plot_methods(methods, list(figure.subplots(2, sharex=True)))
-        for axes in (above, below):
-            for container, hatch in zip(axes.containers, HATCHES, strict=False):
-                for bar in container:
-                    bar.set(hatch=hatch, edgecolor="white", linewidth=0)
-            for text in axes.texts:
-                if not text.get_text().startswith("MAC"):  # numbers at the ends of narrow bars
-                    text.set_rotation(90)
-        legend_above(above, 4, 0.75)
+        plot_methods(methods, list(figure.subplots(2, sharex=True)))
 
     return sketch(5.2, draw, "What each method loses: errors of the frequencies, and 1 − MAC of the shapes.")
 

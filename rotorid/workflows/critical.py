@@ -88,14 +88,13 @@ class CriticalSpeeds(Parts):
         from rotorid.base.plot_style import on_figure
 
         if self.chart is None:
-            return on_figure(lambda ax: draw_modes(self.modes, ax), 10.0, 5.0)
+            return on_figure(lambda ax: draw_modes(self.modes, ax))
         chart = self.chart
         return on_figure(
             lambda ax: draw_speed_map(
                 chart.stiffness, chart.speeds, ax, supports=chart.own, operating=self.operating
             ),
-            10.0,
-            6.0,
+            height=5.0,
         )
 
     def sheet(self) -> bytes:

@@ -37,7 +37,7 @@ Normalise = Literal["first", "largest", "length"]
 """How shapes are scaled."""
 Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
-View = Literal["shapes", "methods", "placement", "response", "stability"]
+View = Literal["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"]
 """What a picture shows."""
 
 

@@ -89,32 +89,39 @@ class ReducedRotor(Parts):
         return self.result.to_frame() if self.placement is None else self.placement.to_frame()
 
     def figure(self, view: str | None = None) -> Figure:
-        """Shapes, methods, placement, response or stability; by default what was asked for last.
+        """Shapes, or what was asked for beside them; by default the first of it in the order of the parts.
 
         Raises
         ------
         ValueError
             For a view of what was not computed.
         """
-        from matplotlib.figure import Figure
-
+        from rotorid.base.plot_style import new_figure
         from rotorid.plots import plot
+        from rotorid.reduction.plots import plot_changes
 
         parts = {
             "stability": self.stability,
             "response": self.response,
             "methods": self.methods,
+            "trade-off": self.trade_off,
             "placement": self.placement,
+            "what-if": self.shift,
+            "errors": self.result.uncertainty,
             "shapes": self.result,
         }
         name = view or next(name for name, part in parts.items() if part is not None)
         if parts[one_of(name, "view", [*parts])] is None:
             option = {"placement": "--rank"}.get(name, f"--{name}")
             raise ValueError(f"--view {name} draws what {option} computes: give {option}, too")
-        heights = {"methods": (1, 1), "response": (3, 2)}.get(name)
-        figure = Figure(figsize=(9.5, 6.5 if heights else 5.5), layout="constrained")
-        axes = [*figure.subplots(2, sharex=True, height_ratios=heights)] if heights else figure.add_subplot()
-        plot(parts[name], axes)
+        heights = {"methods": (1, 1), "trade-off": (1, 1), "response": (3, 2)}.get(name)
+        figure = new_figure(6.2 if heights else 5.0)
+        if name in ("what-if", "errors"):
+            plot_changes(self.result, self.shift, figure.add_subplot())
+        elif heights:
+            plot(parts[name], [*figure.subplots(2, sharex=True, height_ratios=heights)])
+        else:
+            plot(parts[name], figure.add_subplot())
         return figure
 
     def sheet(self) -> bytes:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.plot_style import BLUE, VERMILION
+from rotorid.base.plot_style import BLUE, VERMILION, note
+from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 CLOSE = 8.0
 """Difference, %, up to which the small model follows the rotor well."""
-LEAST = 1e-4
-"""Smallest difference, %, that the picture shows."""
 DARK, LINE = "#2f3640", "#6b7480"
 FULL, SMALL = BLUE, VERMILION
 DASHED = (0, (4, 2))
@@ -54,7 +53,7 @@ def plot_running(
     ValueError
         For a sensor or plane that does not exist, or one without the other.
     """
-    from rotorid.base.plot_style import plain, rpm_above
+    from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, plain, rad_s_above
 
     full, small, difference, words = _chosen(running, sensor, plane)
     above: Axes
@@ -63,14 +62,14 @@ def plot_running(
         from matplotlib import pyplot as plt
 
         _, (above, below) = plt.subplots(
-            2, figsize=(10, 6.8), sharex=True, layout="constrained", height_ratios=(3, 2)
+            2, figsize=(WIDTH, 5.6), sharex=True, layout="constrained", height_ratios=(3, 2)
         )
     elif isinstance(ax, Sequence):
         above, below = ax
     else:
         above = ax
     moving = running.speeds > 0
-    speeds = running.speeds[moving]
+    speeds = running.speeds[moving] * RPM
     above.plot(speeds, full[moving], color=FULL, linewidth=2.4, label="full rotor")
     above.plot(
         speeds,
@@ -86,37 +85,27 @@ def plot_running(
         above.set_yscale("log")
         above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
     # 1 m per kg·m is 1 µm per g·mm.
-    above.set(ylabel=f"{words}, µm per g·mm", xlabel="speed, rad/s")
+    above.set(ylabel=f"{words}, µm per g·mm (log)", xlabel="speed, rpm")
     panels = [above] if below is None else [above, below]
     for panel in panels:
         plain(panel)
         panel.margins(x=0.01)
         _bands(running, panel)
-    rpm_above(above)
-    above.legend(loc="lower center", bbox_to_anchor=(0.5, 1.14), ncols=3, frameon=False, fontsize="small")
+    rad_s_above(above)
+    legend_above(above, borderaxespad=ABOVE_SCALE)
     if below is None:
         return above
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
     with np.errstate(divide="ignore", invalid="ignore"):
         percent = 100 * difference / np.abs(running.full).max(axis=(1, 2))
-    percent = np.maximum(percent, LEAST)
-    below.plot(running.speeds[moving], percent[moving], color=DARK, linewidth=1.6)
-    below.set_yscale("log")
+    below.plot(speeds, percent[moving], color=DARK, linewidth=1.6)
+    # On a scale of what counts: where the small model is left out, the difference may leave the picture.
     shown = percent[moving & ~running.excluded & np.isfinite(percent)]
-    top = float(np.nanmax(percent[moving], initial=CLOSE))
-    below.set_ylim(max(LEAST, float(shown.min(initial=CLOSE)) / 2), 2 * top)
+    below.set_ylim(0.0, 1.25 * max(CLOSE, float(shown.max(initial=0.0))))
     below.axhline(CLOSE, color=SMALL, linewidth=1.0, linestyle=":", zorder=1)
-    below.annotate(
-        f"{CLOSE:g} %",
-        (0.0, CLOSE),
-        xycoords=("axes fraction", "data"),
-        xytext=(4, 2),
-        textcoords="offset points",
-        fontsize="small",
-        color=SMALL,
-    )
-    below.set(xlabel="speed, rad/s", ylabel="difference, % of the rotor's\nlargest entry at this speed")
+    note(below, f"{CLOSE:g} %", (0.0, CLOSE), (4, 2), xycoords=("axes fraction", "data"), color=SMALL)
+    below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
     return above
 
 
@@ -128,7 +117,7 @@ def _chosen(
     difference = np.abs(running.small - running.full)
     if sensor is None and plane is None:
         sizes = (values.max(axis=(1, 2)) for values in (full, small, difference))
-        return *sizes, "largest influence coefficient,\nof all readings and planes"
+        return *sizes, "largest of all influence\ncoefficients"
     if sensor is None or plane is None:
         raise ValueError("give both a sensor and a plane, or neither")
     if not 0 <= sensor < full.shape[1]:
@@ -155,10 +144,10 @@ def _bands(running: ResponseCost, ax: Axes) -> None:
     inside = [(max(a, low), min(b, high)) for a, b in bands if b > low and a < high]
     for k, (a, b) in enumerate(inside):
         words = None if k else f"left out, ±{100 * running.bands:.3g} % of a critical speed"
-        ax.axvspan(a, b, color="#000000", alpha=0.08, linewidth=0, label=words)
+        ax.axvspan(a * RPM, b * RPM, color="#000000", alpha=0.1, linewidth=0, label=words)
     for critical in running.criticals.tolist():
         if low <= critical <= high:
-            ax.axvline(critical, color=LINE, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
+            ax.axvline(critical * RPM, color=LINE, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
 
 
 def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
@@ -171,9 +160,9 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     ax
         Where; default new axes.
     """
-    from rotorid.base.plot_style import new_axes, plain, rpm_above
+    from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, new_axes, plain, rad_s_above
 
-    axes = new_axes((10, 5.2)) if ax is None else ax
+    axes = new_axes((WIDTH, 4.2)) if ax is None else ax
     plain(axes)
     models = (
         ("full rotor", cost.full_decrement, cost.full_threshold, FULL, "-", 2.4),
@@ -183,9 +172,9 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
     if known.size == 0:
         axes.text(0.5, 0.5, "nothing oscillates", transform=axes.transAxes, ha="center", color=LINE)
     for name, decrement, threshold, color, style, width in models:
-        text = f"{name}, unstable from {threshold:.6g} rad/s" if threshold is not None else name
+        text = f"{name}, unstable from {threshold * RPM:.0f} rpm" if threshold is not None else name
         axes.plot(
-            cost.speeds,
+            cost.speeds * RPM,
             np.where(np.isfinite(decrement), decrement, np.nan),
             color=color,
             linestyle=style,
@@ -194,15 +183,16 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
             label=text,
         )
         if threshold is not None:
-            axes.axvline(threshold, color=color, linewidth=1.0, linestyle=(0, (2, 2)), zorder=1)
-            axes.plot([threshold], [0.0], "o", color=color, markeredgecolor="white", markersize=9, zorder=6)
+            axes.axvline(threshold * RPM, color=color, linewidth=1.0, linestyle=(0, (2, 2)), zorder=1)
+            mark: dict[str, Any] = {"color": color, "markeredgecolor": "white", "markersize": 9, "zorder": 6}
+            axes.plot([threshold * RPM], [0.0], "o" if style == "-" else "s", **mark)
     low, high = _limits(known)
     axes.set_ylim(low, high)
     for name, decrement, _, color, *_ in models:
         gone = np.isneginf(decrement)
         if gone.any():
             axes.plot(
-                cost.speeds[gone],
+                cost.speeds[gone] * RPM,
                 np.full(np.count_nonzero(gone), low),
                 "v",
                 color=color,
@@ -212,19 +202,11 @@ def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
             )
     axes.axhspan(low, 0.0, color=SMALL, alpha=0.07, linewidth=0, zorder=0)
     axes.axhline(0.0, color=DARK, linewidth=0.9)
-    axes.annotate(
-        "below 0: a motion grows",
-        (0.0, 0.0),
-        xycoords="axes fraction",
-        xytext=(6, 6),
-        textcoords="offset points",
-        fontsize="small",
-        color=DARK,
-    )
-    axes.set(xlabel="speed, rad/s", ylabel="smallest logarithmic decrement")
+    note(axes, "below 0: a motion grows", (0.0, 0.0), (6, 6), xycoords="axes fraction", color=DARK)
+    axes.set(xlabel="speed, rpm", ylabel="smallest logarithmic decrement")
     axes.margins(x=0.01)
-    rpm_above(axes)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.14), ncols=2, frameon=False, fontsize="small")
+    rad_s_above(axes)
+    legend_above(axes, 2, borderaxespad=ABOVE_SCALE)
     return axes
 
 

@@ -6,12 +6,25 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from documents import check_hygiene
 from fem_rotors import rotor23, uniform
 
 import fem
-from fem.plots import campbell_figure, draw_bode, draw_orbits, draw_polar, draw_speed_map, new_axes
+from fem.api684_peaks import Peak, Peaks
+from fem.peak_refinement import smooth_curves
+from fem.plots import (
+    campbell_figure,
+    draw_bode,
+    draw_orbits,
+    draw_polar,
+    draw_speed_map,
+    new_axes,
+    orbits_figure,
+    polar_figure,
+)
 from fem.plots.drawing import radii, surface
 from fem.windows import Window
+from rotorid.base.rpm import RPM
 from rotorid.plots import plot
 
 mpl.use("Agg")
@@ -102,7 +115,8 @@ def test_the_largest_node_is_one_of_a_steady_response():
     window = Window(150.0, 200.0, begins=True, ends=False)
     for windows, node in (((), 9), ((window,), 5)):
         drawn = plot(dataclasses.replace(response, amplitudes=size, backward=0 * size, windows=windows))
-        assert labels(drawn) == ["node 2", "node 22", f"node {node}"]
+        assert labels(drawn)[:3] == ["node 2", "node 22", f"node {node}"]
+        assert labels(drawn)[3:] == ["unstable: no steady state"] * len(windows)
 
 
 def turbine():
@@ -163,30 +177,35 @@ def test_a_campbell_diagram_tells_directions_apart_without_colour():
     assert looks == [
         ("--", "v", "none"), ("-", "^", "full"), (":", "D", "none"), ("-", "^", "full"),
     ]  # fmt: skip
-    np.testing.assert_allclose(lines[0].get_ydata(), whirl().frequencies[:, 0])
+    np.testing.assert_allclose(lines[0].get_ydata(), RPM * whirl().frequencies[:, 0])
     np.testing.assert_allclose(np.diff(lines[4].get_data(), axis=0), 0.0)
-    assert labels(above) == ["forward whirl", "backward whirl", "mixed whirl", "damped critical speed"]
+    assert labels(above) == [
+        "forward whirl", "backward whirl", "mixed whirl", "damped critical speed", "operating range",
+    ]  # fmt: skip
     assert {"1×", "3638 rpm, δ = 0.30", "4021 rpm, δ = 0.19", "1", "2", "3"} <= {
         t.get_text() for t in above.texts
     }
     marks = next(line for line in lines if line.get_linestyle() == "None")
-    np.testing.assert_allclose(marks.get_xdata(), [380.95, 421.05])
-    assert above.get_ylabel() == "whirl frequency, rad/s"
-    assert below.get_xlabel() == "speed, rad/s"
+    np.testing.assert_allclose(marks.get_xdata(), RPM * np.array([380.95, 421.05]))
+    assert above.get_ylabel() == "whirl frequency, rpm"
+    assert below.get_xlabel() == "speed, rpm"
     assert below.get_ylabel() == "logarithmic decrement"
     np.testing.assert_allclose(below.get_lines()[1].get_ydata(), whirl().log_decrements[:, 1])
     assert below.get_ylim()[0] < -0.1
     assert "unstable" in {text.get_text() for text in below.texts}
-    figure.canvas.draw()
+    for ax in (above, below):
+        band = next(patch for patch in ax.patches if patch.get_label() == "operating range")
+        assert (band.get_x(), band.get_width()) == pytest.approx((600 * RPM, 100 * RPM))
+    check_hygiene(figure, unitless=["logarithmic decrement"])
 
 
 def test_a_campbell_diagram_holds_all_frequencies_speeds_and_decrements():
     above, below = campbell_figure(whirl()).axes[:2]
     assert above.get_ylim()[0] == 0
-    assert 900 < above.get_ylim()[1] < 1.5 * 900
+    assert 900 * RPM < above.get_ylim()[1] < 1.5 * 900 * RPM
     for axes in (above, below):
         assert axes.get_xlim()[0] == 0
-        assert 1000 < axes.get_xlim()[1] < 1.2 * 1000
+        assert 1000 * RPM < axes.get_xlim()[1] < 1.2 * 1000 * RPM
     # decrements from 2 down to −0.1, those above 3 cut off
     assert -0.5 < below.get_ylim()[0] < -0.1
     assert 2 < below.get_ylim()[1] < 2.5
@@ -194,10 +213,10 @@ def test_a_campbell_diagram_holds_all_frequencies_speeds_and_decrements():
     heavy.log_decrements[:, 2] = 20.0
     assert campbell_figure(heavy).axes[1].get_ylim()[1] == pytest.approx(3.0)
     # the 1× line ends where the speeds or the frequencies end, whichever is first
-    assert above.get_lines()[4].get_xdata()[-1] == pytest.approx(1.06 * 900)
+    assert above.get_lines()[4].get_xdata()[-1] == pytest.approx(1.06 * 900 * RPM)
     slow = whirl()
     slow.speeds = slow.speeds / 2
-    assert campbell_figure(slow).axes[0].get_lines()[4].get_xdata()[-1] == pytest.approx(500.0)
+    assert campbell_figure(slow).axes[0].get_lines()[4].get_xdata()[-1] == pytest.approx(500.0 * RPM)
 
 
 def test_a_campbell_diagram_of_a_rotor(tmp_path):
@@ -212,17 +231,37 @@ def test_bode_shows_amplitude_phase_peaks_and_the_operating_range():
     speeds = np.linspace(10, 300, 200)
     Z = 1e-5 * speeds**2 / (150.0**2 - speeds**2 + 2j * 0.05 * 150 * speeds)
     above, below = draw_bode(
-        speeds, np.stack([Z, -Z], axis=1), ["A", "B"], peaks=[(150.4, "1436 rpm")], operating=(200, 250)
+        speeds,
+        np.stack([Z, -Z], axis=1),
+        ["A", "B"],
+        peaks=[peaks_at(150.4, 270.0), peaks_at(152.0)],
+        operating=(200, 250),
+        windows=[Window(290.0, 300.0, begins=True, ends=False)],
     )
-    np.testing.assert_allclose(above.get_lines()[0].get_ydata(), 1e6 * np.abs(Z))
+    steady = speeds < 290
+    np.testing.assert_allclose(above.get_lines()[0].get_ydata()[steady], 1e6 * np.abs(Z[steady]))
+    assert np.isnan(above.get_lines()[0].get_ydata()[~steady]).all()
+    # every sensor's own peaks are marked, on both of its curves, where they are
+    for ax in (above, below):
+        for line, expected in zip(ax.get_lines(), ([150.4, 270.0], [152.0]), strict=False):
+            marked = line.get_xdata()[line.get_markevery()] / RPM
+            np.testing.assert_allclose(marked, expected, atol=0.8)
+        assert len({line.get_marker() for line in ax.get_lines()[:2]}) == 2
+        hatched = [patch for patch in ax.patches if patch.get_hatch()]
+        assert [(p.get_x(), p.get_width()) for p in hatched] == [pytest.approx((290 * RPM, 10 * RPM))]
+    assert {"operating range", "unstable: no steady state"} < set(labels(above))
     phase = below.get_lines()[0].get_ydata()
     assert phase[0] == pytest.approx(-0.38, abs=0.05)  # undamped below, half a turn behind above
-    assert phase[-1] == pytest.approx(-176.2, abs=0.5)
+    assert phase[steady][-1] == pytest.approx(-176.0, abs=0.5)
     assert above.get_lines()[0].get_linestyle() != above.get_lines()[1].get_linestyle()
-    assert {"operating range", "1436 rpm"} == {text.get_text() for text in above.texts}
-    assert (above.get_ylabel(), below.get_ylabel()) == ("amplitude, µm peak", "phase (lead), degrees")
-    assert below.get_xlabel() == "speed, rad/s"
-    above.figure.canvas.draw()
+    assert {text.get_text() for text in above.texts} == {"1436 to 1451 rpm\nAF 10.0", "2578 rpm\nAF 10.0"}
+    assert (above.get_ylabel(), below.get_ylabel()) == ("amplitude, µm peak (log)", "phase (lead), degrees")
+    assert below.get_xlabel() == "speed, rpm"
+    check_hygiene(above.figure)
+
+
+def peaks_at(*speeds):
+    return Peaks(tuple(Peak(speed, 1e-5, None, None, 10.0, None, None) for speed in speeds), None)
 
 
 def test_polar_goes_round_at_resonance():
@@ -235,21 +274,79 @@ def test_polar_goes_round_at_resonance():
     written = [float(text.get_text()) for text in ax.texts]
     assert written == sorted(written)
     assert any(1300 < speed < 1560 for speed in written)
-    assert "µm" in ax.get_xlabel()
-    ax.figure.canvas.draw()
+    assert all(speed % 10 == 0 for speed in written[1:-1])
+    assert "µm" in ax.get_title()
+    # each mark stands where the curve is at the speed written beside it
+    for text in ax.texts:
+        z = 1e6 * np.interp(float(text.get_text()), speeds * RPM, Z)
+        assert text.xy[1] * np.exp(1j * text.xy[0]) == pytest.approx(z, rel=0.01)
+    check_hygiene(ax.figure)
 
 
 def test_orbits_have_a_start_and_a_direction():
     ax = draw_orbits([2e-6, 1e-6, 1e-6], [-1e-6j, 1e-6j, 1e-6], ["a", "b", "c"], title="3000 rpm")
     assert labels(ax) == ["a, forward", "b, backward", "c, straight"]
-    curves = ax.get_lines()[::2][:3]
+    curves = ax.get_lines()[:3]
+    assert len({curve.get_marker() for curve in curves}) == 3
+    assert {tuple(curve.get_markevery()) for curve in curves} == {(0,)}
     assert [curve.get_linestyle() for curve in curves] == ["-", "--", "-"]
     x, y = curves[0].get_data()
     np.testing.assert_allclose((x[0], y[0], x[60], y[60]), (2, 0, 0, 1), atol=1e-12)
     assert ax.get_legend().get_title().get_text().startswith("3000 rpm")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x, µm", "y, µm")
     assert ax.get_aspect() == 1.0
-    ax.figure.canvas.draw()
+    check_hygiene(ax.figure)
+
+
+@pytest.mark.parametrize("places", [("wheel", 1), (1, 2, 3, 4, 5)])
+def test_orbits_stand_below_the_shaft_with_their_places_in_at_most_four_colours(places):
+    response = fem.unbalance_response(turbine(), {3: 1e-4}, [100.0, 200.0])
+    figure = orbits_figure(response, places, 1)
+    shaft, below = figure.axes
+    curves = [line for line in below.get_lines() if "," in str(line.get_label())]
+    assert len(curves) == min(len(places), 4)
+    sizes = {place: response.major[1, response.column(place)] for place in places}
+    drawn = sorted(places, key=sizes.get)[-4:]
+    for curve, place in zip(curves, [place for place in places if place in drawn], strict=True):
+        x = response.x[1, response.column(place)]
+        assert curve.get_xdata()[0] == pytest.approx(1e6 * x.real)
+        at = response.rotor.positions[response.rotor.node(place) - 1]
+        same = [line for line in shaft.get_lines() if line.get_color() == curve.get_color()]
+        assert [(line.get_xdata()[0], line.get_marker()) for line in same] == [(at, curve.get_marker())]
+    assert len({curve.get_color() for curve in curves}) == len(curves)
+    title = below.get_legend().get_title().get_text()
+    assert title.startswith("at 1910 rpm = 200 rad/s, a stable speed")
+    assert ("the 4 largest orbits of 5" in title) is (len(places) == 5)
+    check_hygiene(figure)
+
+
+def test_a_polar_curve_turns_little_from_step_to_step():
+    rotor = rotor23(2e4)
+    response = fem.unbalance_response(rotor, {12: 1e-3}, np.linspace(60.0, 700.0, 33))
+
+    def bend(speeds, Z):
+        steps = np.diff(Z)
+        turn = np.abs(np.degrees(np.angle(steps[1:] / steps[:-1])))
+        return turn[np.minimum(abs(steps[1:]), abs(steps[:-1])) > 0.01 * np.abs(Z).max()].max()
+
+    assert bend(response.speeds, response.at(12)) > 60
+    angle, size = polar_figure(response, [12]).axes[0].get_lines()[0].get_data()
+    assert bend(None, size * np.exp(1j * np.asarray(angle))) < 12
+    fine = smooth_curves(response, [12])
+    assert set(response.speeds) <= set(fine.speeds)
+    assert fine.speeds.size < 400
+    np.testing.assert_allclose(fine.at(12), fem.unbalance_response(rotor, {12: 1e-3}, fine.speeds).at(12))
+
+
+def test_the_static_line_and_many_modes_are_told_apart_without_colour():
+    sag = plot(fem.static_deflection(turbine()))
+    assert (sag.get_xlabel(), sag.get_ylabel()) == ("position, m", "static deflection, µm")
+    check_hygiene(sag.figure)
+    shapes = plot(fem.critical_speeds(rotor23(), n=6))
+    looks = [(line.get_linestyle(), line.get_marker()) for line in shapes.get_lines()[:6]]
+    assert len(set(looks)) == 6
+    check_hygiene(shapes.figure)
+    check_hygiene(plot(fem.speed_map(rotor23(1e4), n=3)).figure)
 
 
 def test_a_speed_map_is_logarithmic_and_holds_the_supports():
@@ -262,7 +359,8 @@ def test_a_speed_map_is_logarithmic_and_holds_the_supports():
     np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), speeds[:, 0] * 30 / np.pi)
     assert labels(ax) == ["critical speed 1", "critical speed 2", "DE", "fixed", "operating range"]
     assert ax.get_lines()[3].get_xdata().tolist() == [1e8, 1e8]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("stiffness of each support, N/m", "critical speed, rpm")
+    assert ax.get_xlabel() == "stiffness of each support, N/m"
+    assert ax.get_ylabel() == "critical speed, rpm (both log)"
     ax.figure.canvas.draw()
 
 
@@ -327,7 +425,7 @@ def test_mode_shapes_between_nodes_are_those_of_a_beam():
         assert np.abs(y * np.sign(y[6] * expected[6]) - expected).max() < 0.01 * k
     words = [text for text in labels(ax) if "rpm" in text]
     for k, omega in enumerate(modes.frequencies):
-        assert f"{k + 1}: {omega:.5g} rad/s = {omega * 30 / np.pi:.5g} rpm" in words[k]
+        assert f"{k + 1}: {omega * 30 / np.pi:.5g} rpm = {omega:.5g} rad/s" in words[k]
     low, high = ax.get_ylim()
     assert low < -1
     assert high > 1
@@ -353,14 +451,16 @@ def test_amplitudes_that_differ_much_are_drawn_on_a_logarithmic_scale():
     still[0] = 0.0
     still[1] = 1e-15  # six powers of ten are enough
     assert draw_bode(speeds, still, ["A"])[0].get_ylim()[0] == pytest.approx(29e-6)
-    assert draw_bode(speeds, still, ["A"])[1].get_lines()[0].get_xdata().tolist() == speeds[1:].tolist()
+    assert (
+        draw_bode(speeds, still, ["A"])[1].get_lines()[0].get_xdata().tolist() == (speeds[1:] * RPM).tolist()
+    )
 
 
 def test_few_speeds_are_marked_and_drawn_in_order():
     speeds = np.array([30.0, 10.0, 20.0])
     line = draw_bode(speeds, 1e-6 * speeds[:, None], ["A"])[0].get_lines()[0]
     assert line.get_marker() == "o"
-    assert line.get_xdata().tolist() == [10.0, 20.0, 30.0]
+    np.testing.assert_allclose(line.get_xdata() / RPM, [10.0, 20.0, 30.0])
     np.testing.assert_allclose(line.get_ydata(), [10.0, 20.0, 30.0])
     many = np.linspace(1.0, 12.0, 12)
     assert draw_bode(many, 1e-6 * many[:, None], ["A"])[0].get_lines()[0].get_marker() == "None"
@@ -376,13 +476,13 @@ def test_the_phase_is_a_lag_within_a_turn(turns):
 
 def test_peaks_and_the_operating_range_stand_in_both_axes():
     speeds = np.linspace(10.0, 300.0, 100)
-    axes = draw_bode(speeds, speeds[:, None] * 1e-6, ["A"], peaks=[(150.0, "p")], operating=(200.0, 250.0))
+    marks = {"peaks": [peaks_at(150.0)], "factors": False, "operating": (200.0, 250.0)}
+    axes = draw_bode(speeds, speeds[:, None] * 1e-6, ["A"], **marks)
     for ax in axes:
-        assert [line.get_xdata() for line in ax.get_lines()[1:]] == [[150.0, 150.0]]
+        assert [line.get_xdata() for line in ax.get_lines()[1:]] == [[150.0 * RPM, 150.0 * RPM]]
         (band,) = ax.patches
-        assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((200.0, 250.0))
-    places = {text.get_text(): text.xy for text in axes[0].texts}
-    assert places == {"operating range": (225.0, 1.0), "p": (150.0, 0.0)}
+        assert (band.get_x(), band.get_x() + band.get_width()) == pytest.approx((200 * RPM, 250 * RPM))
+    assert {text.get_text(): text.xy for text in axes[0].texts} == {"1432 rpm": (150.0 * RPM, 0.0)}
     # ticks of the phase at whole parts of a right angle, not too many
     ticks = axes[1].yaxis.get_major_locator().tick_values(-180.0, 0.0)
     assert set(np.diff(ticks)) <= {15.0, 30.0, 45.0, 90.0}
@@ -393,8 +493,8 @@ def test_marks_of_a_polar_curve_are_evenly_spaced_along_it():
     Z = 1e-6 * (1 + speeds[:, None] / 10) * np.exp(0j)
     ax = draw_polar(speeds, Z, ["A"], marks=4)
     written = {float(text.get_text()): text.xy for text in ax.texts}
-    assert list(written) == [round(speed * 30 / np.pi) for speed in (0, 25, 50, 75, 100)]
-    assert [radius for _, radius in written.values()] == pytest.approx([1.0, 3.5, 6.0, 8.5, 11.0])
+    assert list(written) == [0, 200, 500, 700, 950]  # round speeds near quarters of the way
+    assert [radius for _, radius in written.values()] == pytest.approx([1 + v / 10 / RPM for v in written])
     one = draw_polar([50.0], [[1e-6j]], ["A"])
     assert [text.get_text() for text in one.texts] == ["477"]
     standing = draw_polar([50.0, 60.0], [[1e-6j], [1e-6j]], ["A"])
@@ -445,10 +545,11 @@ def test_curves_of_a_campbell_diagram_go_on_where_the_direction_changes():
     above = campbell_figure(whirl()).axes[0]
     mixed, forward = above.get_lines()[2:4]
     # neither direction up to 500 rad/s, forward from 600 on: the first stretch reaches to the second
-    assert mixed.get_xdata()[-1] == forward.get_xdata()[0] == 600.0
-    assert forward.get_xdata()[-1] == 1000.0
+    assert mixed.get_xdata()[-1] == forward.get_xdata()[0] == 600.0 * RPM
+    assert forward.get_xdata()[-1] == 1000.0 * RPM
     numbers = {text.get_text(): text.xy for text in above.texts if text.get_text() in ("1", "2", "3")}
-    assert numbers == {"1": (1000.0, 350.0), "2": (1000.0, 450.0), "3": (1000.0, 900.0)}
+    for name, frequency in (("1", 350.0), ("2", 450.0), ("3", 900.0)):
+        assert numbers[name] == pytest.approx((1000 * RPM, frequency * RPM))
     apart = whirl()
     apart.frequencies[:, 1] = apart.frequencies[:, 0] + 1.0
     texts = {text.get_text(): text.get_position() for text in campbell_figure(apart).axes[0].texts}
@@ -462,13 +563,13 @@ def test_critical_speeds_beyond_the_diagram_are_left_out_and_close_ones_stand_on
     above = campbell_figure(whirl(), [(400.0, 0.3), (420.0, 0.2), (700.0, 0.1), (990.0, 0.1)]).axes[0]
     said = {t.get_text(): t for t in above.texts if "δ" in t.get_text()}
     assert len(said) == 3  # the 1× line ends at 954 rad/s
-    assert [t.xy for t in said.values()] == [(400.0, 400.0), (420.0, 420.0), (700.0, 700.0)]
+    assert [t.xy[0] / RPM for t in said.values()] == pytest.approx([400.0, 420.0, 700.0])
     assert [t.get_ha() for t in said.values()] == ["left", "right", "left"]
     (once,) = (t for t in above.texts if t.get_text() == "1×")
     assert once.xy[0] == once.xy[1]
     taken = np.array([400.0, 420.0, 700.0])
-    assert np.abs(once.xy[0] - taken).min() > 60
-    assert once.xy[0] > 800
+    assert np.abs(once.xy[0] / RPM - taken).min() > 60
+    assert once.xy[0] / RPM > 800
 
 
 @pytest.mark.parametrize(("span", "step"), [(60, 15), (115, 30), (200, 30), (300, 45), (500, 90), (900, 180)])

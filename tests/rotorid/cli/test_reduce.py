@@ -156,10 +156,21 @@ def test_the_small_compressor_has_both_planes_and_damped_supports(cli, tmp_path)
     assert outcome.json["stability"]["full"]["status"] == outcome.json["stability"]["small"]["status"]
 
 
-@pytest.mark.parametrize("view", ["shapes", "methods", "placement", "response", "stability"])
+@pytest.mark.parametrize(
+    "view",
+    ["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"],
+)
 def test_every_view_is_drawn(cli, tmp_path, view):
-    ask = {"placement": ["--rank"], "methods": ["--methods"], "response": ["--response", "auto"],
-           "stability": ["--stability", "0:9000rpm"]}.get(view, [])  # fmt: skip
+    options = {
+        "placement": ["--rank"],
+        "methods": ["--methods"],
+        "response": ["--response", "auto"],
+        "stability": ["--stability", "0:9000rpm"],
+        "trade-off": ["--trade-off"],
+        "errors": ["--errors", "shapes=1"],
+        "what-if": ["--what-if", "alpha12=1.3"],
+    }
+    ask = options.get(view, [])
     place = [] if view == "placement" else ["--nodes", "7,12,18"]
     path = tmp_path / "picture.png"
     assert cli("reduce", ROTOR, *place, *ask, "--view", view, "--plot", path).code == 0

@@ -7,15 +7,19 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from documents import check_hygiene
 from fem_rotors import rotor23, uniform
+from matplotlib.figure import Figure
 
 import fem
+from rotorid.base.rpm import RPM
 from rotorid.plots import plot
-from rotorid.reduction import reduce
+from rotorid.reduction import reduce, trade_off
 from rotorid.reduction.dynamics.comparison_plots import plot_running, plot_stability
+from rotorid.reduction.equivalent.mass_uncertainty import InputErrors
 from rotorid.reduction.guyan_irs_serep import compare_methods
 from rotorid.reduction.placement_plot import plot_placement
-from rotorid.reduction.plots import plot_methods, plot_reduction
+from rotorid.reduction.plots import HATCHES, plot_changes, plot_methods, plot_reduction, plot_trade_off
 
 mpl.use("Agg")
 
@@ -69,8 +73,8 @@ def test_shapes_of_the_model_stand_on_those_of_the_rotor():
         np.testing.assert_allclose(points[k].get_xdata(), reduction.positions)
         np.testing.assert_allclose(points[k].get_ydata(), reduction.shapes[:, k] / scale[k])
     labels = " ".join(legend_of(ax))
-    assert "135.24 rad/s (1291 rpm, −0.0034 %), MAC 1.0000" in labels
-    assert "mode 3: 1069.3 rad/s" in labels
+    assert "1291 rpm (135.24 rad/s, −0.0034 %), MAC 1.0000" in labels
+    assert "mode 3: 10211 rpm" in labels
     assert [text.get_text() for text in texts_of(ax)] == ["134 kg", "197 kg", "157 kg"]
     assert ax.get_xlabel() == "position, m"
 
@@ -98,15 +102,17 @@ def test_bars_of_the_methods_hold_errors_and_mac():
     above, below = plot_methods(methods)
     for i, row in enumerate(methods.rows):
         errors = np.array([bar.get_height() for bar in above.containers[i]])
-        expected = np.where(np.abs(row.relative_error) < 1e-6, 0.0, 100 * row.relative_error)
-        np.testing.assert_allclose(errors, expected, rtol=1e-9)
+        np.testing.assert_allclose(errors, 100 * row.relative_error, rtol=1e-9)
         losses = np.array([bar.get_y() + bar.get_height() for bar in below.containers[i]])
-        np.testing.assert_allclose(losses, np.maximum(1 - row.mac, 1e-6), rtol=1e-6)
+        np.testing.assert_allclose(losses, np.maximum(1 - row.mac, 0.0), rtol=1e-6)
+        assert {bar.get_hatch() for bar in above.containers[i]} == {HATCHES[i]}
+    assert {ax.get_yscale() for ax in (above, below)} == {"linear"}
+    assert all(ax.get_ylim()[0] <= 0 < ax.get_ylim()[1] for ax in (above, below))
     assert legend_of(above) == [row.name for row in methods.rows]
     written = [text.get_text() for text in texts_of(above)]
     assert written.count("0") == 4  # SEREP three times, and the first mode of IRS
     assert {"+7.5", "−8.1", "+0.00058"} <= set(written)
-    assert "0.98795" in [text.get_text() for text in texts_of(below)]
+    assert "0.9879" in [text.get_text() for text in texts_of(below)]
     low, high = above.get_ylim()
     assert low < -8.2
     assert high > 7.5
@@ -121,7 +127,7 @@ def test_bars_of_the_methods_hold_errors_and_mac():
 
 def test_many_modes_and_failed_methods_are_drawn():
     above, below = plot_methods(compare_methods(rotor23(), (2, 4, 7, 11, 12, 18, 22), modes=4))
-    assert "first 6 of 7 modes" in above.get_title()
+    assert "first 6 of 7 modes" in above.get_legend().get_title().get_text()
     assert apart(texts_of(above))
     assert apart(texts_of(below))
     stiff = uniform(8, supports=[fem.Support(1, 1e16), fem.Support(9, 1e16)])
@@ -129,6 +135,50 @@ def test_many_modes_and_failed_methods_are_drawn():
     assert failed.row("SEREP").M is None
     above, below = plot_methods(failed)
     assert [text.get_text() for text in texts_of(above)].count("none") == 2
+
+
+def test_errors_and_changes_are_drawn_in_percent_of_the_masses_and_frequencies():
+    errors = InputErrors(compliance=0.013, shapes=0.01, frequencies=0.001)
+    reduction = reduce(rotor23(), (7, 12, 18), 2, errors=errors)
+    shift, known = reduction.what_if({"alpha12": 0.013, "U31": -0.003}), reduction.uncertainty
+    ax = plot_changes(reduction, shift)
+    values = np.concatenate((reduction.masses.solution, reduction.frequencies))
+    std = np.concatenate((known.masses_std, known.frequencies_std))
+    first, drawn = (bars[2][0].get_segments() for bars in ax.containers)
+    np.testing.assert_allclose([segment[1][0] for segment in first], 100 * std / values)
+    np.testing.assert_allclose([segment[0][0] for segment in first], -100 * std / values)
+    half = np.concatenate(known.drawn) / values
+    ends = [segment[1][0] for segment in drawn if len(segment) == 2 and np.isfinite(segment).all()]
+    np.testing.assert_allclose(ends, 100 * half[np.isfinite(half)])
+    points = {line.get_label(): line.get_xdata() for line in ax.get_lines()}
+    exact = np.concatenate((shift.exact_masses, shift.exact_frequencies))
+    np.testing.assert_allclose(points["after the change"], 100 * exact / values)
+    linear = np.concatenate((shift.masses, shift.frequencies))
+    np.testing.assert_allclose(points["after it, predicted by first order"], 100 * linear / values)
+    rows = [tick.get_text() for tick in ax.get_yticklabels()]
+    assert rows[0] == "node 7:  134.2 ± 11 → 131.3 kg"
+    assert rows[3].startswith("mode 1:  1291 ± 1.4 → ")
+    assert rows[5].endswith(" rpm")
+    check_hygiene(ax.figure)
+    alone = plot_changes(dataclasses.replace(reduction, uncertainty=None), shift)
+    assert legend_of(alone) == ["after the change", "after it, predicted by first order"]
+    assert alone.get_yticklabels()[0].get_text() == "node 7:  134.2 → 131.3 kg"
+
+
+def test_other_masses_are_drawn_as_methods_are():
+    choices = trade_off(rotor23(), (7, 12, 18))
+    above, below = plot_trade_off(
+        choices, Figure(figsize=(7.0, 6.0), layout="constrained").subplots(2, sharex=True)
+    )
+    for r in range(len(choices.names)):
+        errors = [bar.get_height() for bar in above.containers[r]]
+        np.testing.assert_allclose(errors, 100 * choices.relative_error[r], atol=1e-9)
+        losses = [bar.get_height() for bar in below.containers[r]]
+        np.testing.assert_allclose(losses, np.maximum(1 - choices.mac[r], 0.0), atol=1e-12)
+    assert legend_of(above) == list(choices.names)
+    assert choices.traps.size  # their bars cross the line below which shapes are others
+    assert "MAC 0.9: above, another shape" in {text.get_text() for text in below.texts}
+    check_hygiene(above.figure, unitless=["1 − MAC at the masses\n(written: MAC)"])
 
 
 def placement(**changes):
@@ -167,7 +217,7 @@ def test_the_map_holds_every_physical_choice_and_its_names():
         "the book's rule: nodes 7, 12 (134, 197 kg), 8 %, MAC 0.9700",
     ]
     assert ax.figure.axes[1].get_ylabel() == "condition number of the regression"
-    ax.figure.canvas.draw()
+    check_hygiene(ax.figure, unitless=["condition number of the regression"])
 
 
 @pytest.mark.parametrize(
@@ -223,10 +273,13 @@ def test_both_responses_and_their_difference_over_speed():
     below = ax.figure.axes[1]
     difference = curves_of(below)[0]
     np.testing.assert_allclose(difference.get_ydata(), 3.0 * cost.speeds[1:] / 300.0, rtol=1e-9)
-    assert below.get_xlabel() == "speed, rad/s"
+    np.testing.assert_allclose(difference.get_xdata(), RPM * cost.speeds[1:])
+    assert below.get_xlabel() == "speed, rpm"
+    assert (below.get_yscale(), below.get_ylim()) == ("linear", (0.0, 10.0))
+    check_hygiene(ax.figure)
     for panel in (ax, below):
         band = panel.patches[0].get_path().get_extents(panel.patches[0].get_patch_transform())
-        assert (band.x0, band.x1) == (90.0, 110.0)
+        assert (band.x0, band.x1) == pytest.approx((90.0 * RPM, 110.0 * RPM))
     low, high = ax.get_ylim()
     assert low > 0
     assert high > np.abs(cost.small).max()
@@ -237,8 +290,8 @@ def test_overlapping_bands_are_shaded_once_and_those_outside_not_at_all():
     cost.criticals, cost.left_out = np.array([100.0, 104.0, 400.0]), [(90, 110), (93.6, 114.4), (360, 440)]
     ax = plot_running(cost)
     spans = [patch.get_path().get_extents(patch.get_patch_transform()) for patch in ax.patches]
-    assert [(span.x0, span.x1) for span in spans] == [(90.0, 114.4)]
-    assert ax.get_xlim()[1] < 360
+    assert [(span.x0, span.x1) for span in spans] == [pytest.approx((90.0 * RPM, 114.4 * RPM))]
+    assert ax.get_xlim()[1] < 360 * RPM
 
 
 def test_one_sensor_and_plane_can_be_chosen():
@@ -276,13 +329,14 @@ def stability(**changes):
 def test_decrements_and_thresholds_of_both_models():
     cost = stability()
     ax = plot_stability(cost)
-    labels = ["full rotor, unstable from 200 rad/s", "3-mass model, unstable from 210 rad/s"]
+    labels = ["full rotor, unstable from 1910 rpm", "3-mass model, unstable from 2005 rpm"]
     assert legend_of(ax) == labels
     lines = {line.get_label(): line for line in ax.get_lines()}
     np.testing.assert_array_equal(lines[labels[0]].get_ydata(), cost.full_decrement)
     np.testing.assert_array_equal(lines[labels[1]].get_ydata(), cost.small_decrement)
     marks = [line.get_xdata()[0] for line in ax.get_lines() if list(line.get_ydata()) == [0.0]]
-    assert marks == [200.0, 210.0]
+    assert marks == pytest.approx([200.0 * RPM, 210.0 * RPM])
+    check_hygiene(ax.figure, unitless=["smallest logarithmic decrement"])
     assert ax.get_ylim()[0] < cost.full_decrement.min()
 
 
@@ -302,7 +356,7 @@ def test_what_runs_away_or_does_not_oscillate_is_drawn():
     ax = plot_stability(stability(full_decrement=gone))
     assert "full rotor runs away without oscillating" in legend_of(ax)
     away = next(line for line in ax.get_lines() if "runs away" in str(line.get_label()))
-    np.testing.assert_array_equal(away.get_xdata(), stability().speeds[30:])
+    np.testing.assert_allclose(away.get_xdata(), RPM * stability().speeds[30:])
     nothing = np.full(41, np.nan)
     ax = plot_stability(
         stability(full_decrement=nothing, small_decrement=nothing, full_threshold=None, small_threshold=None)

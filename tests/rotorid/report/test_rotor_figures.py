@@ -36,8 +36,6 @@ def test_bars_of_the_methods_differ_without_colour_and_their_numbers_stand_uprig
         numbers = [text for text in axes.texts if not text.get_text().startswith("MAC")]
         assert len(numbers) == 3 * len(methods.rows)
         assert {text.get_rotation() for text in numbers} == {90.0}
-    (line,) = [text for text in figure.axes[1].texts if text.get_text().startswith("MAC")]
-    assert line.get_rotation() == 0.0
     assert legend(figure.axes[0]) == [row.name for row in methods.rows]
 
 
@@ -55,18 +53,19 @@ def test_shapes_have_a_legend_of_the_curves_alone(drawn):
     assert reduction.get_ylabel() == "mode shape, largest = 1"
 
 
-def test_the_response_is_marked_at_the_peaks_of_the_largest_reading(drawn):
+def test_the_response_is_marked_at_the_peaks_of_every_reading(drawn):
     rotor, speeds = rotor23(2e4), np.linspace(50.0, 700.0, 400)
     response = fem.unbalance_response(rotor, {12: 1e-3}, speeds)
     places = [2, 12]
-    assert np.abs(response.at(12)).max() > np.abs(response.at(2)).max()
     peaks = [fem.response_peaks(response, place) for place in places]
     rotor_figures.bode_picture(response, places, peaks, (200.0, 250.0))
     above, below = drawn[0].axes[:2]
     for line, place in zip(above.get_lines(), places, strict=False):
         np.testing.assert_allclose(line.get_ydata(), 1e6 * np.abs(response.at(place)))
-    said = {text.get_text() for text in above.texts}
-    assert {f"{peak.speed * 30 / np.pi:.0f} rpm" for peak in peaks[1].peaks} == said - {"operating range"}
+    for line, found in zip(above.get_lines(), peaks, strict=False):
+        marked = line.get_xdata()[line.get_markevery()] * np.pi / 30
+        np.testing.assert_allclose(marked, [peak.speed for peak in found.peaks], atol=1.7)
+    assert {text.get_text() for text in above.texts} == {"1291 rpm", "3614 rpm", "5171 to 5188 rpm"}
     assert {"2", "12"} <= set(legend(above))
     assert below.get_legend() is None
 
