@@ -220,6 +220,7 @@ class Balance(Parts):
             self.provenance,
             mounted=self.mounted,
             verdict=self.verdict,
+            curve=self.curve,
         )
 
     def workbook(self, path: Path | str) -> bytes:

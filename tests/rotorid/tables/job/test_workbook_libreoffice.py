@@ -28,7 +28,11 @@ def saved(folder, *paths):
     own = f"-env:UserInstallation={(folder / 'profile').as_uri()}"
     command = [OFFICE, own, "--headless", "--norestore", "--convert-to", "xlsx:Calc MS Excel 2007 XML"]
     done = subprocess.run(  # noqa: S603
-        [*command, "--outdir", folder / "out", *paths], capture_output=True, text=True, timeout=300, check=True
+        [*command, "--outdir", folder / "out", *paths],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=True,
     )
     found = [folder / "out" / path.name for path in paths]
     assert all(path.exists() for path in found), done.stdout + done.stderr
