@@ -58,15 +58,15 @@ def _rotors() -> Pictures:
 def _balancing() -> Pictures:
     import balancing
     from balancing.plots import correction_polar, tolerances, trade_off_curve
-    from balancing.plots.unbalance_bars import unbalance_bars
+    from balancing.plots.unbalance_along_shaft import unbalance_vectors
     from balancing.trial_weight_result import TrialWeight
 
     return {
         balancing.Correction: correction_polar.draw_correction,
         balancing.TradeOff: trade_off_curve.draw_trade_off,
         balancing.Verdict: tolerances.residuals,
-        balancing.Tolerance: tolerances.tolerance_circles,
-        balancing.Unbalance: unbalance_bars,
+        balancing.Tolerance: tolerances.tolerance_line,
+        balancing.Unbalance: unbalance_vectors,
         TrialWeight: tolerances.trial_arrow,
     }
 

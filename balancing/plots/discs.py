@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from balancing.data.conventions import Labels
 from balancing.mounting.holes import Holes, Mounting
+from rotorid.base.plot_style import TEXT, new_figure
 from rotorid.base.text import figures
 
 if TYPE_CHECKING:
@@ -24,11 +25,13 @@ if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
     from balancing.mounting.mount_result import Mounted
 
-_HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.66, 1.11, 1.25, 1.8, 1.6
+_HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.61, 1.06, 1.1, 1.85, 1.55
 _LARGEST = 0.13
 """Radius of the largest weight's circle, of the disc's."""
 _CLOSE = 0.3
 """Angle, rad, between weights whose texts would touch."""
+_CROWD = 32
+"""Holes of which each has its number."""
 _NOTHING = 1e-9
 _ARROW = 0.52
 """Length of the longest arrow, of the disc's radius."""
@@ -45,6 +48,8 @@ def disc(  # noqa: PLR0913
     weight: complex | None = None,
     tolerance: float | None = None,
     loose: Sequence[complex] = (),
+    words: Sequence[str] = (),
+    forbidden: Sequence[tuple[float, float]] = (),
     clockwise: bool = False,
 ) -> Axes:
     """Draw one plane: rotation, mark, numbered holes, weights (area by mass), and what they are to make.
@@ -69,40 +74,67 @@ def disc(  # noqa: PLR0913
         Permissible residual in the same unit: a circle around the tip of the wanted weight.
     loose
         Further weights at any angles, in one place each.
+    words
+        What they are; default: how heavy, and at which angle.
+    forbidden
+        First angle and width, rad with the rotation, of arcs where no weight can stand (hatched).
     clockwise
         Whether the disc is seen from the end from which the rotor turns clockwise.
     """
     from matplotlib.patches import Circle
 
     turn = -1.0 if remove else 1.0
-    amounts = np.zeros(0) if mounting is None else mounting.amounts
-    put = (
-        []
-        if holes is None
-        else [(complex(a * np.exp(1j * holes.angles[h]))) for h, a in enumerate(amounts) if a]
-    )
+    put, said = [], []
+    if holes is not None and mounting is not None:
+        for h in np.flatnonzero(mounting.amounts):
+            put.append(complex(mounting.amounts[h] * np.exp(1j * holes.angles[h])))
+            said.append(_pieces(holes, mounting, int(h), labels))
     put += [complex(w) for w in loose]
+    said += words or [labels.weight_words(abs(w)) for w in loose]
     largest = max([abs(w) for w in put] + ([] if holes is None else list(holes.taken)), default=0.0) or 1.0
     _prepare(ax, clockwise)
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     ax.plot(0, 0, "+", color="black", ms=7, mew=0.9)
-    _dial(ax, labels, clockwise)
     where = [turn * w for w in put]
+    _dial(ax, labels, clockwise, where)
     reach = _room(where)
     if holes is not None:
         _draw_holes(ax, holes, turn, reach / np.sqrt(largest), clockwise)
     for w in where:
         _draw_weight(ax, w, reach * np.sqrt(abs(w) / largest), clockwise, remove)
-    _write_weights(ax, where, labels, clockwise, remove=remove, angles=bool(len(loose)))
+    _draw_forbidden(ax, forbidden, turn, clockwise)
+    said = [f"{'−' * remove}{text}" for text in said]
+    _write_weights(ax, where, said, labels if len(loose) > len(words) else None, clockwise)
     made = sum(put, 0j) if put else None
     if weight is not None and made is not None and abs(weight - made) <= _NOTHING * abs(weight):
         made = None  # one arrow says it all
     _vectors(ax, weight, made, tolerance, clockwise)
-    words = textwrap.fill(f"{plane}: {'take away' if remove else 'add'}", 34)
-    ax.set_title(words, fontsize="medium", fontweight="bold")
+    title = textwrap.fill(f"{plane}: {'take away' if remove else 'add'}", 34)
+    ax.set_title(title, fontsize="medium", fontweight="bold")
     lines = _words(weight, made, tolerance, labels, remove)
-    ax.text(0, -_EDGE + 0.02, "\n".join(lines), ha="center", va="top", fontsize="small")
+    lines += ["hatched arcs: nothing goes there"] if forbidden else []
+    ax.text(0, -_EDGE + 0.02, "\n".join(lines), ha="center", va="top", fontsize=TEXT)
     return ax
+
+
+def _pieces(holes: Holes, mounting: Mounting, h: int, labels: Labels) -> str:
+    """What goes into a hole: "2 × 150 g·mm"; the unit of an unbalance has a line of its own."""
+    sizes = np.asarray(holes.pieces) * labels.weight_scale
+    several = zip(mounting.counts[h], sizes, strict=True) if len(sizes) else ()
+    parts = [f"{n} × {size:.4g}" if n > 1 else f"{size:.4g}" for n, size in several if n]
+    parts = parts or [f"{mounting.amounts[h] * labels.weight_scale:.4g}"]
+    return f"{' + '.join(parts)}{chr(10) if labels.unbalances else ' '}{labels.weight_in}"
+
+
+def _draw_forbidden(ax: Axes, arcs: Sequence[tuple[float, float]], turn: float, clockwise: bool) -> None:
+    """Hatched parts of the rim."""
+    from matplotlib.patches import Wedge
+
+    for start, width in arcs:
+        ends = np.degrees([start, start + width]) + (180.0 if turn < 0 else 0.0)
+        ends = -ends[::-1] if clockwise else ends
+        look: dict[str, Any] = {"fc": "white", "ec": "0.35", "hatch": "xxxx", "lw": 0.8}
+        ax.add_patch(Wedge((0, 0), 1.0, *ends, width=0.32, zorder=1, **look))
 
 
 def discs(
@@ -126,13 +158,12 @@ def discs(
     clockwise
         See `disc`.
     """
-    from matplotlib.figure import Figure
-
     holes, mountings, tolerances = holes or {}, mountings or {}, tolerances or {}
     planes = correction.planes
-    columns = min(len(planes), 3)
+    columns = min(len(planes), 2)
     rows = -(-len(planes) // columns)
-    fig = Figure(figsize=(4.4 * columns, 4.9 * rows + 0.7), layout="constrained")
+    fig = new_figure(3.75 * rows + 0.5, 3.5 * max(columns, 1.3))
+    forbidden = [()] * len(planes) if correction.limits is None else correction.limits.forbidden
     for p, plane in enumerate(planes):
         wanted = complex(correction.weights[p])
         disc(
@@ -145,9 +176,10 @@ def discs(
             weight=wanted,
             tolerance=tolerances.get(plane),
             loose=() if plane in mountings or wanted == 0 else (wanted,),
+            forbidden=forbidden[p],
             clockwise=clockwise,
         )
-    fig.suptitle(seen_from(correction.labels, clockwise), fontsize="medium")
+    fig.suptitle(seen_from(correction.labels, clockwise), fontsize=TEXT)
     return fig
 
 
@@ -158,17 +190,17 @@ def placed(
     holes: Holes | None = None,
     mounting: Mounting | None = None,
     remove: bool = False,
+    words: Sequence[str] = (),
 ) -> Figure:
     """A new figure with a disc for each of several ways to place one weight; see `disc`."""
-    from matplotlib.figure import Figure
-
     several = ways or ((),)
-    fig = Figure(figsize=(4.6 * len(several) + 0.4, 5.6), layout="constrained")
+    wide = 3.5 * max(len(several), 1.3)
+    fig = new_figure(0.82 * wide / len(several) + 1.3, wide)
     for k, loose in enumerate(several, start=1):
         ax = fig.add_subplot(1, len(several), k)
         title = "weight" if len(several) == 1 else f"solution {k}"
-        disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose)
-    fig.suptitle(seen_from(labels).replace("; ", "\n"), fontsize="small")
+        disc(ax, title, holes, mounting, labels, remove=remove, weight=weight, loose=loose, words=words)
+    fig.suptitle(seen_from(labels), fontsize=TEXT)
     return fig
 
 
@@ -187,7 +219,7 @@ def seen_from(labels: Labels, clockwise: bool = False) -> str:
     """From which end the discs are seen and how angles count, in words."""
     way = "clockwise" if clockwise else "counter-clockwise"
     return (
-        f"Seen from the end from which the rotor turns {way}; "
+        f"Seen from the end from which the rotor turns {way};\n"
         f"angles from the mark (triangle) {labels.side} the rotation"
     )
 
@@ -208,7 +240,7 @@ def _prepare(ax: Axes, clockwise: bool) -> None:
         (across[-8], up[-8]),
         arrowprops={"arrowstyle": "-|>,head_length=0.5,head_width=0.25", "color": "black", "lw": 1.5},
     )
-    ax.text(x, y + 0.27, "rotation", ha="center", va="center", fontsize="x-small")
+    ax.text(x, y + 0.27, "rotation", ha="center", va="center", fontsize=TEXT)
 
 
 def _at(z: complex, clockwise: bool) -> tuple[float, float]:
@@ -216,14 +248,21 @@ def _at(z: complex, clockwise: bool) -> tuple[float, float]:
     return z.real, -z.imag if clockwise else z.imag
 
 
-def _dial(ax: Axes, labels: Labels, clockwise: bool) -> None:
-    """Degrees around the disc as the job counts them, and the mark at 0°."""
+def _beside(x: float, y: float) -> dict[str, Any]:
+    """How a text at a place around the disc is aligned: away from the disc."""
+    across = "center" if abs(x) < 0.4 else "left" if x > 0 else "right"
+    return {"ha": across, "va": "center" if abs(y) < 0.4 else "bottom" if y > 0 else "top"}
+
+
+def _dial(ax: Axes, labels: Labels, clockwise: bool, places: Sequence[complex]) -> None:
+    """Degrees around the disc as the job counts them, where no weight has its text, and the mark at 0°."""
     for degrees in range(0, 360, 30):
         way = complex(np.exp(1j * np.radians(labels.with_rotation(degrees))))
         (x0, y0), (x1, y1) = _at(way, clockwise), _at(1.03 * way, clockwise)
         ax.plot([x0, x1], [y0, y1], color="black", lw=0.8)
-        x, y = _at((_TICKS + 0.02) * way, clockwise)
-        ax.text(x, y, f"{degrees}°", ha="center", va="center", fontsize="x-small", color="0.25")
+        if all(abs(np.angle(place / way)) > _CLOSE for place in places):
+            x, y = _at(_TICKS * way, clockwise)
+            ax.text(x, y, f"{degrees}°", **_beside(x, y), fontsize=TEXT, color="0.25")
     ax.plot(0.965, 0, marker=(3, 0, 90), color="black", ms=9, zorder=5)
 
 
@@ -240,9 +279,9 @@ def _draw_holes(ax: Axes, holes: Holes, turn: float, scale: float, clockwise: bo
         if holes.taken[h] > 0:
             reach = max(scale * np.sqrt(holes.taken[h]), 0.035)
             ax.add_patch(Circle(centre, reach, fc="0.85", ec="0.3", hatch="////", lw=0.9, zorder=3))
-        x, y = _at(_NUMBERS * way, clockwise)
-        font = "x-small" if count <= 24 else "xx-small"
-        ax.text(x, y, holes.names[h], ha="center", va="center", fontsize=font, color="black")
+        if count <= _CROWD or h % (count // _CROWD + 1) == 0 or holes.taken[h] > 0:
+            x, y = _at((_NUMBERS - 0.14 * (h % 2) * (count > _CROWD // 2)) * way, clockwise)
+            ax.text(x, y, holes.names[h], ha="center", va="center", fontsize=TEXT)
 
 
 def _room(places: Sequence[complex]) -> float:
@@ -255,38 +294,31 @@ def _room(places: Sequence[complex]) -> float:
 
 
 def _write_weights(
-    ax: Axes, places: Sequence[complex], labels: Labels, clockwise: bool, *, remove: bool, angles: bool
+    ax: Axes, places: Sequence[complex], words: Sequence[str], angled: Labels | None, clockwise: bool
 ) -> None:
-    """What weighs how much: neighbours nearer and farther out in turn, three or more alike in one text."""
+    """What stands where: neighbours nearer and farther out in turn, three or more alike in one text."""
     order = sorted(range(len(places)), key=lambda k: float(np.mod(np.angle(places[k]), 2 * np.pi)))
-    runs: list[list[complex]] = []
+    runs: list[list[int]] = []
     for k in order:
-        one = places[k]
-        last = runs[-1][-1] if runs else 0j
-        alike = last != 0 and abs(np.angle(one / last)) < _CLOSE and abs(abs(one / last) - 1) < 1e-9
+        last = places[runs[-1][-1]] if runs else 0j
+        alike = (
+            last != 0 and abs(np.angle(places[k] / last)) < _CLOSE and abs(abs(places[k] / last) - 1) < 1e-9
+        )
         if alike:
-            runs[-1].append(one)
+            runs[-1].append(k)
         else:
-            runs.append([one])
-    single = [run for long in runs for run in ([long] if len(long) > 2 else [[w] for w in long])]
+            runs.append([k])
+    single = [run for long in runs for run in ([long] if len(long) > 2 else [[k] for k in long])]
     before, far = 0j, False
     for run in single:
-        way = complex(np.exp(1j * np.angle(sum(run))))
+        way = complex(np.exp(1j * np.angle(sum(places[k] for k in run))))
         far = bool(before != 0 and not far and abs(np.angle(way / before)) < _CLOSE)
         before = way
-        size, angle = (float(v) for v in labels.weight(abs(run[0]) * way))
-        text = f"{'−' if remove else ''}{size:.4g} {labels.weight_in}"
-        text = f"{len(run)} × {text}" if len(run) > 1 else text
+        text = words[run[len(run) // 2]]
         x, y = _at((_TEXTS + 0.2 * far) * way, clockwise)
-        ax.text(
-            x,
-            y,
-            f"{text}\n{angle:.1f}°" if angles else text,
-            ha="center" if abs(x) < 0.4 else "left" if x > 0 else "right",
-            va="center" if abs(x) >= 0.4 else "bottom" if y > 0 else "top",
-            fontsize="small",
-            fontweight="bold",
-        )
+        text = f"{len(run)} × {text}" if len(run) > 1 else text
+        text += "" if angled is None else f"\n{angled.weight(way)[1]:.1f}°"
+        ax.text(x, y, text, **_beside(x, y), fontsize=TEXT, fontweight="bold")
 
 
 def _draw_weight(ax: Axes, place: complex, reach: float, clockwise: bool, remove: bool) -> None:
@@ -297,15 +329,8 @@ def _draw_weight(ax: Axes, place: complex, reach: float, clockwise: bool, remove
     centre = _at(_HOLES * way, clockwise)
     ax.add_patch(Circle(centre, reach, fc="white" if remove else "0.2", ec="black", lw=1.3, zorder=4))
     if remove:
-        arm = reach / np.sqrt(2)
-        for sign in (1, -1):
-            ax.plot(
-                [centre[0] - arm, centre[0] + arm],
-                [centre[1] - sign * arm, centre[1] + sign * arm],
-                color="black",
-                lw=1.0,
-                zorder=5,
-            )
+        arm = reach / np.sqrt(2) * np.array([-1, 1, np.nan, -1, 1])
+        ax.plot(centre[0] + arm, centre[1] + arm * [1, 1, 1, -1, -1], color="black", lw=1.0, zorder=5)
 
 
 def _vectors(
@@ -318,24 +343,17 @@ def _vectors(
     longest = max(sizes, default=0.0)
     if longest == 0:
         return
-    for value, style, width, face in ((weight, "-|>", 1.2, "white"), (made, "-|>", 2.4, "black")):
-        if value is None or abs(value) == 0:
-            continue
-        tip = _at(_ARROW * value / longest, clockwise)
-        ax.add_patch(
-            FancyArrowPatch(
-                (0, 0),
-                tip,
-                arrowstyle=f"{style},head_length=7,head_width=4",
-                shrinkA=0,
-                shrinkB=0,
-                fc=face,
-                ec="black",
-                lw=width,
-                ls="-" if face == "black" else "--",
-                zorder=6 if face == "black" else 7,
+    looks: tuple[dict[str, Any], ...] = (
+        {"fc": "white", "lw": 1.2, "ls": "--", "zorder": 7},
+        {"fc": "black", "lw": 2.4, "zorder": 6},
+    )
+    for value, look in zip((weight, made), looks, strict=True):
+        if value:
+            tip = _at(_ARROW * value / longest, clockwise)
+            head = "-|>,head_length=7,head_width=4"
+            ax.add_patch(
+                FancyArrowPatch((0, 0), tip, arrowstyle=head, shrinkA=0, shrinkB=0, ec="black", **look)
             )
-        )
     if tolerance is not None and weight is not None:
         tip = _at(_ARROW * weight / longest, clockwise)
         ax.add_patch(

@@ -1,26 +1,25 @@
-"""Polar pictures of tolerances, of residual unbalances in them, and of a trial weight.
+"""Pictures of tolerances, of residual unbalances within them, and of trial weights.
 
-Nothing is ever shown or saved here. The rotor turns counter-clockwise, or as the
-job says; angles are written as the job counts them.
+Nothing is ever shown or saved here. Planes and bearings stand in their order along the shaft. In polar
+pictures the rotor turns counter-clockwise, or as the job says; angles are written as the job counts them.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.plots.correction_polar import MARKERS, corrections, polar_axes
-from rotorid.base.plot_style import COLORS
+from balancing.plots.correction_polar import of_plane, polar_axes, turning
+from rotorid.base.plot_style import COLORS, MARKERS, TEXT, legend_below, new_figure, note, plain
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.projections.polar import PolarAxes
 
-    from balancing.correction.correction_result import Correction
+    from balancing.correction.limit_check import Judgement
     from balancing.correction.verdict import Verdict
     from balancing.iso21940 import Tolerance
     from balancing.trial_weight_result import TrialWeight
@@ -28,77 +27,107 @@ if TYPE_CHECKING:
 _GRAM_MM = 1e6
 
 
-def polar_figure(draw: Callable[[Axes], object]) -> Figure:
-    """A new figure with one polar picture."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5, 6), layout="constrained")
-    draw(figure.add_subplot(projection="polar"))
-    return figure
-
-
-def overview(c: Correction, v: Verdict) -> Figure:
-    """A new figure: corrections, and residual unbalance inside or outside its tolerance circles."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 7.5), layout="constrained")
-    corrections(c, figure.add_subplot(1, 2, 1, projection="polar"))
-    residuals(v, figure.add_subplot(1, 2, 2, projection="polar"))
-    return figure
+def tolerance_line(t: Tolerance, ax: Axes | None = None) -> Axes:
+    """The rotor with the permissible unbalance of its planes and bearings, or of the whole, g·mm."""
+    ends: Sequence[float] = () if t.bearing_limits is None else t.bearing_limits.tolist()
+    limits = {("plane", name): float(u) for name, u in zip(t.planes, t.limits, strict=True)}
+    limits |= {("bearing", name): u for name, u in zip("AB", ends, strict=False)}
+    limits = limits or {("whole", "rotor"): t.total}
+    ax = _rotor(ax, {key: u * _GRAM_MM for key, u in limits.items()}, t)
+    ax.set_ylabel("permissible residual unbalance, g·mm")
+    ax.set_title(f"G{t.grade:g}, whole rotor: {figures(t.total * _GRAM_MM)} g·mm", fontsize="medium")
+    return ax
 
 
-def tolerance_circles(t: Tolerance, ax: Axes | None = None) -> Axes:
-    """Circles of the permissible residual unbalance of each plane (without planes: of the rotor), g·mm."""
-    polar = polar_axes(ax, 1, "tolerance circles", 6)
-    circles = dict(zip(t.planes, t.limits * _GRAM_MM, strict=True)) or {"whole rotor": t.total * _GRAM_MM}
-    for k, (name, limit) in enumerate(circles.items()):
-        _circle(polar, float(limit), k, f"{name}: {limit:.4g} g·mm")
-    polar.set_rlim(0, 1.15 * max(circles.values()))
-    polar.set_title(f"Permissible residual unbalance, G{t.grade:g}", fontsize="medium", pad=14)
-    _legend(polar)
-    return polar
-
-
-def residuals(v: Verdict, ax: Axes | None = None) -> Axes:
-    """Residual unbalance of each plane with its 95 % region, inside or outside its tolerance circle.
+def residuals(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None) -> Axes:
+    """The rotor with the residual unbalance of each plane, its 95 % and its limit, on a logarithmic scale.
 
     Raises
     ------
     ValueError
         For a verdict without planes.
     """
-    rows = [row for row in v.rows if row.kind == "plane"]
-    if not rows:
+    scale, kinds = v.labels.weight_scale, ("plane", "bearing") if v.labels.unbalances else ("plane",)
+    rows = {(str(row.kind), row.name): row for row in v.rows if row.kind in kinds}
+    if not any(kind == "plane" for kind, _ in rows):
         raise ValueError("this verdict has no planes to draw: give a tolerance")
-    polar = polar_axes(ax, v.labels.angles_on_paper, "tolerance circles", 6)
-    scale = v.labels.weight_scale
-    largest = max(max(row.limit, row.size) for row in rows) * scale
-    for k, row in enumerate(rows):
-        colour = COLORS[k % len(COLORS)]
-        size, angle = v.labels.weight(row.value)
-        _circle(polar, row.limit * scale, k, f"{row.name}: {row.verdict}")
-        polar.plot([np.deg2rad(float(angle))], [float(size)], MARKERS[k % len(MARKERS)], color=colour)
-        if row.region is not None:
-            reach, around = v.labels.weight(row.region)
-            polar.plot(np.unwrap(np.deg2rad(around)), reach, color=colour, lw=1.0)
-    polar.set_rlim(0, 1.4 * largest)
-    polar.set_title(f"Residual unbalance and tolerance, {v.labels.weight_in}", fontsize="medium", pad=14)
-    _legend(polar)
-    return polar
+    ax = _rotor(ax, {key: row.limit * scale for key, row in rows.items()}, t)
+    sizes = [size * scale for row in rows.values() for size in (row.low or row.size, row.limit) if size > 0]
+    bottom = float(10 ** np.floor(np.log10(0.7 * min(sizes, default=1.0))))
+    for at, key in enumerate(sorted(rows, key=lambda key: _position(key, t))):
+        _residual(ax, at, rows[key], v, bottom)
+    ax.set_yscale("log")
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.set_ylim(bottom, 4 * max(sizes))
+    ax.set_ylabel(f"residual unbalance, {v.labels.weight_in} (log scale)")
+    ax.set_title(f"Residual unbalance and tolerance ({v.source}): {v.overall}", fontsize="medium")
+    return ax
+
+
+def _residual(ax: Axes, at: int, row: Judgement, v: Verdict, bottom: float) -> None:
+    """One residual with its 95 % and its verdict: hollow where not decidable, square where it fails."""
+    size, angle = (float(value) for value in v.labels.weight(row.value))
+    if row.low is not None and row.high is not None:
+        ends = np.maximum(np.array([row.low, row.high]) * v.labels.weight_scale, bottom)
+        ax.vlines(at - 0.3, *ends, color="black", lw=1.4, label="95 %")
+    failed = int(row.verdict == "fail")
+    face = "white" if row.verdict == "not decidable" else COLORS[failed]
+    look: dict[str, Any] = {"color": COLORS[failed], "mfc": face, "ms": 6, "label": "residual unbalance"}
+    ax.plot(at - 0.3, max(size, bottom), MARKERS[failed], **look)
+    text = f"{figures(size, 2)} at {angle:.0f}°"
+    if row.low == 0 and row.high is not None:  # then the angle is not known either
+        text = f"up to {figures(row.high * v.labels.weight_scale, 2)}"
+    note(ax, f"{text}\n{row.verdict}", (at - 0.3, max(size, bottom)), (8, 0), va="center")
+
+
+def _position(key: tuple[str, str], t: Tolerance | None) -> float:
+    """Of a plane or bearing along the shaft, m; 0: not known."""
+    kind, name = key
+    if t is None or t.positions is None or t.bearings is None:
+        return 0.0
+    return float(t.bearings["AB".index(name)] if kind == "bearing" else t.positions[t.planes.index(name)])
+
+
+def _rotor(ax: Axes | None, limits: Mapping[tuple[str, str], float], t: Tolerance | None) -> Axes:
+    """The shaft with its planes and bearings (kind and name) in their order, and a bar for each limit."""
+    ax = ax or new_figure(4.2).add_subplot()
+    order = sorted(limits, key=lambda key: _position(key, t))
+    x, shaft = np.arange(len(order)), ax.get_xaxis_transform()
+    ax.bar(x, [limits[key] for key in order], 0.84, color="0.93", edgecolor="black", label="permissible")
+    ax.plot([-0.6, len(order) - 0.4], [-0.08] * 2, color="0.6", lw=5, transform=shaft, clip_on=False)
+    symbols: dict[str, dict[str, Any]] = {
+        "bearing": {"marker": "^", "ms": 12, "y": -0.125},
+        "plane": {"marker": "s", "ms": 15, "y": -0.08},
+    }
+    names = []
+    for at, key in enumerate(order):
+        note(ax, figures(limits[key]), (at, limits[key]), (0, 3), ha="center")
+        look = dict(symbols.get(key[0], symbols["plane"]))
+        y = look.pop("y")
+        ax.plot(at, y, **look, mfc="0.9", mec="black", transform=shaft, clip_on=False)
+        known = t is not None and t.positions is not None and t.bearings is not None
+        names.append(f"{' '.join(key)}\n{_position(key, t) * 1e3:.6g} mm" if known else " ".join(key))
+    ax.set_xticks(x, names, fontsize=TEXT)
+    ax.tick_params(axis="x", length=0, pad=36)
+    ax.set_xlabel("along the shaft, not to scale", fontsize=TEXT)
+    ax.set_xlim(-0.6, len(order) - 0.4)
+    plain(ax)
+    ax.grid(visible=False, axis="x")
+    return ax
 
 
 def trial_figure(found: Sequence[TrialWeight]) -> Figure:
-    """A new figure with `trial_arrow` of each."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.5 * len(found), 5.5), layout="constrained")
-    for k, one in enumerate(found, start=1):
-        trial_arrow(one, figure.add_subplot(1, len(found), k, projection="polar"))
+    """A new figure with every trial weight."""
+    figure = new_figure(4.8, 5.2)
+    polar = figure.add_subplot(projection="polar")
+    for k, one in enumerate(found):
+        trial_arrow(one, polar, k)
+    legend_below(figure, [polar], title=turning(found[0].labels))
     return figure
 
 
-def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
-    """The trial weight as an arrow, and an arc of the angles among which the best one is.
+def trial_arrow(t: TrialWeight, ax: Axes | None = None, k: int = 0) -> Axes:
+    """The trial weight as arrow k, and an arc of the angles among which the best one is.
 
     Raises
     ------
@@ -109,28 +138,17 @@ def trial_arrow(t: TrialWeight, ax: Axes | None = None) -> Axes:
         raise ValueError(
             "this trial weight has no angle to draw: give the phase of the initial reading and the lag"
         )
-    polar = polar_axes(ax, t.labels.angles_on_paper, "tolerance circles", 6)
+    polar = polar_axes(ax, t.labels.angles_on_paper, "trial weights", 6)
     size, angle = t.labels.weight(t.amount * np.exp(1j * t.angle))
     theta, radius = np.deg2rad(float(angle)), float(size)
-    polar.plot([theta, theta], [0, radius], color=COLORS[0], lw=2.2)
     label = f"{t.plane}: {radius:.4g} {t.labels.weight_in} at {float(angle):.0f}°"
-    polar.plot([theta], [radius], MARKERS[0], color=COLORS[0], label=label)
+    polar.plot([theta, theta], [0, radius], **of_plane(k), lw=2.2, markevery=[1], ms=7, label=label)
     if t.angle_reach:
         arc = theta + np.linspace(-t.angle_reach, t.angle_reach, 91)
-        polar.plot(arc, np.full_like(arc, radius), color=COLORS[0], lw=4.0, alpha=0.4)
-    polar.set_rlim(0, 1.2 * radius)
-    polar.set_title(
-        f"Trial weight, {t.labels.weight_in}, angles {t.labels.angle_words}", fontsize="medium", pad=14
-    )
-    _legend(polar)
+        reach = f"the best angle is within ± {np.degrees(t.angle_reach):.0f}°"
+        polar.plot(
+            arc, np.full_like(arc, radius), color=COLORS[k % len(COLORS)], lw=4.0, alpha=0.4, label=reach
+        )
+    polar.set_rlim(0, max(polar.get_rmax() if k else 0.0, 1.2 * radius))
+    polar.set_title(f"Trial weight, {t.labels.weight_in}", fontsize="medium", pad=10)
     return polar
-
-
-def _circle(polar: PolarAxes, limit: float, k: int, label: str) -> None:
-    turn = np.linspace(0.0, 2 * np.pi, 361)
-    style = ("-", "--", ":")[k % 3]
-    polar.plot(turn, np.full_like(turn, limit), ls=style, lw=1.4, color=COLORS[k % len(COLORS)], label=label)
-
-
-def _legend(polar: PolarAxes) -> None:
-    polar.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), fontsize="small", ncols=2)

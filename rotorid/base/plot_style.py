@@ -94,6 +94,14 @@ def legend_above(
     )
 
 
+def legend_below(figure: Figure, axes: Iterable[Axes], columns: int = 2, **options: Any) -> None:  # noqa: ANN401
+    """One legend for several axes, below all of them; what two of them name alike stands there once."""
+    pairs = [pair for ax in axes for pair in zip(*reversed(ax.get_legend_handles_labels()), strict=True)]
+    look: dict[str, Any] = {"loc": "outside lower center", "ncols": columns, "frameon": False}
+    shown = dict(pairs)
+    figure.legend(list(shown.values()), list(shown), fontsize=TEXT, title_fontsize=TEXT, **look, **options)
+
+
 def legend_beside(ax: Axes) -> None:
     """A legend that hides nothing, right of the axes."""
     ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=TEXT)

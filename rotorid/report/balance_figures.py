@@ -118,7 +118,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str =
     """
     from matplotlib.figure import Figure
 
-    from balancing.plots.correction_polar import before_and_after
+    from balancing.plots.amplitude_bars import before_and_after
 
     if len(rows) > ROWS_SHOWN:
         largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
@@ -140,7 +140,6 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str =
         limit=np.array([row["limit"] for row in rows], dtype=float),
         after=label,
         lying=True,
-        colors=("black", "black"),
     )
     ax.set_yticks(y, [_short(row["sensor"]) for row in rows], fontsize="small")
     for speed in dict.fromkeys(speeds):

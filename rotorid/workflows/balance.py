@@ -154,9 +154,9 @@ class Balance(Parts):
         The correction and the coefficients that it is made of.
     job, source
         As it was read, and from what; None: it was given as it is.
-    mounted, check, verdict, subsets, curve, history
-        Pieces in holes, check runs beside their prediction, what limits and tolerances say, choices of
-        planes, residual against total weight, all runs; None where there is nothing.
+    mounted, check, verdict, tolerance, subsets, curve, history
+        Pieces in holes, check runs beside their prediction, what limits and tolerances say, the tolerance
+        itself, choices of planes, residual against total weight, all runs; None where there is nothing.
     """
 
     result: Correction
@@ -166,6 +166,7 @@ class Balance(Parts):
     mounted: Mounted | None
     check: CheckComparison | None
     verdict: Verdict | None
+    tolerance: Tolerance | None
     subsets: Subsets | None
     curve: TradeOff | None
     history: History | None
@@ -200,13 +201,14 @@ class Balance(Parts):
 
         if self.mounted is not None:
             return discs.mounted_discs(self.mounted)
-        if self.verdict is not None and any(row.kind == "plane" for row in self.verdict.rows):
-            return tolerances.overview(self.result, self.verdict)
-        return (
-            correction_polar.overview(self.result)
-            if self.curve is None
-            else trade_off_curve.overview(self.curve)
-        )
+        below, verdict = None, self.verdict
+        if verdict is not None and any(row.kind == "plane" for row in verdict.rows):
+            below = partial(tolerances.residuals, verdict, t=self.tolerance)
+        elif self.curve is not None:
+            return trade_off_curve.overview(self.curve)
+        elif self.subsets is not None:
+            below = partial(trade_off_curve.choices, self.subsets)
+        return correction_polar.overview(self.result, self.job.trials, self.check, below)
 
     def sheet(self) -> bytes:
         """The balancing sheet: one HTML file."""
@@ -277,7 +279,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
     result = with_other_readings(result, read, again, refined=options.refine)
     mounted = _mount(result, read, known, options) if options.split else None
     checked = None if options.refine else read.check
-    verdict = judge(result, influence, read, _tolerance(result.planes, options), mounted)
+    tolerance = _tolerance(result.planes, options)
     return Balance(
         result=result,
         influence=influence,
@@ -285,7 +287,8 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
         check=None if checked is None else compare_check(result, checked, *known),
-        verdict=verdict,
+        verdict=judge(result, influence, read, tolerance, mounted),
+        tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
         history=_history(result, influence, read) if options.history else None,

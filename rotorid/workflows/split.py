@@ -151,8 +151,11 @@ class SplitWeight(Outcome):
             return placed(labels, target, *map(tuple, found.weights()))
         if isinstance(found, Rounded):
             return placed(labels, target, (found.weight,) if found.weight else ())
-        holes = tuple(found.added(labels)) if isinstance(found, Drilling) else (target,)
-        return placed(labels, target, holes, remove=True)
+        if not isinstance(found, Drilling):
+            return placed(labels, target, (target,), remove=True)
+        holes = tuple(found.added(labels))
+        words = [f"{1e3 * found.mass:.4g} g\n{1e3 * found.depth:.2f} mm deep"] * len(holes)
+        return placed(labels, target, holes, remove=True, words=words)
 
 
 @workflow

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 from rotorid.workflows.result_provenance import Found, provenance, workflow
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from balancing.iso21940 import Tolerance
     from rotorid.workflows.option_quantities import Amount, Positions
 
@@ -47,12 +45,6 @@ class PermissibleUnbalance(Found):
     """The tolerance of a rotor and of its planes."""
 
     found: Tolerance
-
-    def figure(self) -> Figure:
-        """Tolerance circles."""
-        from balancing.plots.tolerances import polar_figure, tolerance_circles
-
-        return polar_figure(lambda ax: tolerance_circles(self.found, ax))
 
 
 @workflow

@@ -185,8 +185,11 @@ def test_table_and_picture():
     assert frame.limit_g_mm.to_numpy()[3:] == pytest.approx(found.limits * 1e6)
     assert frame.position_mm.to_numpy()[1:] == pytest.approx([0, 1000, 100, 700])
     ax = plot(found)
-    circles = [line.get_ydata()[0] for line in ax.lines]
-    assert circles == pytest.approx(found.limits * 1e6)
-    whole = plot(rotor())
-    assert whole.lines[0].get_ydata() == pytest.approx(np.full(361, TOTAL))
+    names = [label.get_text() for label in ax.get_xticklabels()]
+    bars = {name: bar.get_height() for name, bar in zip(names, ax.patches, strict=True)}
+    assert bars["plane left\n100 mm"] == pytest.approx(found.limits[0] * 1e6)
+    assert bars["bearing B\n1000 mm"] == pytest.approx(found.bearing_limits[1] * 1e6)
+    assert [int(name.split()[-2]) for name in names] == [0, 100, 700, 1000], "as along the shaft"
+    [whole] = plot(rotor()).patches
+    assert whole.get_height() == pytest.approx(TOTAL)
     assert max(len(line) for line in found.summary().splitlines()) <= 80

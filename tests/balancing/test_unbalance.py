@@ -285,12 +285,15 @@ def test_picture():
         [[2.0, 0, 0], [0, 3.0, 3.0]], [2.0, 6j], names=["A", "B", "C"], covariance=covariance, labels=labels
     )
     ax = plot(found)
-    assert [bar.get_height() for bar in ax.patches] == pytest.approx([1e6, 1e6, 1e6])
-    assert [bar.get_facecolor()[3] for bar in ax.patches] == [1.0, 0.0, 0.0]
-    [[(_, low), (_, high)]] = ax.collections[0].get_segments()
-    assert (low, high) == pytest.approx((0.804e6, 1.196e6))
-    assert [text.get_text() for text in ax.get_xticklabels()] == ["A", "B", "C"]
-    assert ax.get_ylabel() == "unbalance, g_mm"
+    tips = [line for line in ax.lines if line.get_marker() == "o"]
+    drawn = [complex(np.diff(line.get_xdata())[0], line.get_ydata()[1]) for line in tips]
+    assert drawn == pytest.approx([1e6, 1e6j, 1e6j])
+    assert [line.get_mfc() != "white" for line in tips] == [True, False, False]
+    [region] = [line for line in ax.lines if line.get_color() == "black"]
+    reach = np.hypot(*(region.get_xydata() - tips[0].get_xydata()[1]).T)
+    assert reach == pytest.approx(np.full(91, 2.4477 * 0.1e6), rel=1e-4)
+    assert [text.get_text().split()[0] for text in ax.get_xticklabels()] == ["A", "B", "C"]
+    assert ax.get_ylabel() == "unbalance, g·mm"
     assert plot(found, ax) is ax
 
 

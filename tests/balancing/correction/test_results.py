@@ -151,9 +151,9 @@ def test_angles_of_the_picture_run_as_the_job_counts_them(angles, direction):
     assert ax.get_theta_direction() == direction
     tip = next(line for line in ax.lines if line.get_marker() == "o" and len(line.get_xdata()))
     assert np.degrees(tip.get_xdata()[0]) == pytest.approx(direction * 50.19 % 360, abs=0.01)
-    assert plots.vibration(c).get_theta_direction() == -1
-    assert "g" in ax.get_title()
-    assert plots.amplitudes(c).get_ylabel() == "amplitude, um_pp"
+    assert plots.vectors(c).get_theta_direction() == -1
+    assert ax.get_title() == "Weights on the bare rotor, g"
+    assert plot(c, Figure().add_subplot()).get_ylabel() == "vibration, µm pp"
 
 
 def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
@@ -161,8 +161,8 @@ def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
     c = correct(estimate_influence(trials))
     plot(c).savefig(tmp_path / "many.png", dpi=40)
     # of 14 speeds every other has its name, the first among them, from left to right
-    ax = plots.amplitudes(c)
+    ax = plot(c, Figure().add_subplot())
     [upper] = ax.child_axes
     texts = [text.get_text() for text in upper.get_xticklabels()]
-    assert texts == [f"{v * 30 / np.pi:.5g}" for v in c.speeds[::2]]
+    assert texts == [f"{v * 30 / np.pi:.6g}" for v in c.speeds[::2]]
     assert upper.get_xticks()[0] < upper.get_xticks()[1]

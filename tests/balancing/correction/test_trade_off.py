@@ -170,17 +170,17 @@ def test_a_rotor_without_vibration_has_one_point():
 def test_the_picture_holds_the_curve_the_knee_and_the_weights():
     W, Y, _ = case()
     found = trade_off(W * 1e-3, Y * 1e-6, "ABC", labels=LABELS)
-    upper, lower = plot(found).axes
+    upper, _, lower = plot(found).axes
     curve = next(line for line in upper.lines if line.get_label() == "rms (made as small as possible)")
     np.testing.assert_allclose(curve.get_xdata(), found.totals * 1e3)
     np.testing.assert_allclose(curve.get_ydata(), found.rms * 2e6)
     mark = next(line for line in upper.lines if str(line.get_label()).startswith("knee: "))
     np.testing.assert_allclose(mark.get_xdata(), [found.totals[found.knee] * 1e3])
     np.testing.assert_allclose(mark.get_ydata(), [found.rms[found.knee] * 2e6])
-    assert upper.get_ylabel() == "amplitude after correction, um_pp"
+    assert upper.get_ylabel() == "vibration after, µm pp"
     assert lower.get_xlabel() == "total weight of all planes, g"
     for p, plane in enumerate("ABC"):
-        line = next(line for line in lower.lines if line.get_label() == plane)
+        line = next(line for line in lower.lines if line.get_label() == f"weight in {plane}")
         np.testing.assert_allclose(line.get_ydata(), np.abs(found.weights[:, p]) * 1e3)
         np.testing.assert_allclose(line.get_xdata(), found.totals * 1e3)
 
@@ -194,7 +194,7 @@ def test_the_picture_in_given_axes_without_units_or_knee():
     ax = Figure().add_subplot()
     assert plot(found, ax) is ax
     assert ax.get_xlabel() == "total weight of all planes"
-    assert ax.get_ylabel() == "amplitude after correction"
+    assert ax.get_ylabel() == "vibration after"
     assert len(ax.lines) == 2
 
 

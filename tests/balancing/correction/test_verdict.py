@@ -234,8 +234,11 @@ def test_words_table_and_picture(job):
     frame = found.to_frame()
     assert list(frame.verdict[:2]) == ["fail", "pass"]
     ax = plot(found)
-    assert ax.lines[0].get_ydata() == pytest.approx(np.full(361, 0.15))
-    shown = max(np.max(line.get_ydata(), initial=0.0) for line in ax.lines)
-    assert 0.2 <= shown < ax.get_rmax() < 3 * shown, "everything is in the picture, and fills it"
+    assert [bar.get_height() for bar in ax.patches] == pytest.approx([0.15, 0.15])
+    drawn = [line for line in ax.lines if line.get_label() == "residual unbalance"]
+    assert [line.get_ydata()[0] for line in drawn] == pytest.approx([0.2, 0.1])
+    assert [line.get_marker() for line in drawn] == ["s", "o"], "what fails has another shape"
+    low, high = ax.get_ylim()
+    assert 0.005 < low < 0.1 < 0.2 < high < 1, "everything is in the picture, and fills it"
     with pytest.raises(ValueError, match="no planes to draw"):
         plot(verdict_of_check(influence, check, limits=limits))

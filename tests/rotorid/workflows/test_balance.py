@@ -122,7 +122,7 @@ def test_pictures_of_what_was_asked_for():
 
     grade = {"grade": "G2.5", "rotor_mass": 500.0, "service_speed": 3000 * RPM, "planes": "left,right"}
     assert titles(split=True) == ["left: add", "middle: add", "right: add"]
-    assert titles(**grade)[1].startswith("Residual unbalance and tolerance")
+    assert titles(**grade)[2].startswith("Residual unbalance and tolerance")
     assert titles(trade_off=True) != titles()
 
 
