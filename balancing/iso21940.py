@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from balancing.tolerance_allocation import bearing_limits, safe_pair, transfer
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm, rpm_text
-from rotorid.base.text import wrap
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +37,7 @@ _GRAM_MM = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Tolerance:
+class Tolerance(Answered):
     """Permissible residual unbalance of a rotor, and where it may be.
 
     Attributes
@@ -135,16 +136,18 @@ class Tolerance:
 
     def to_frame(self) -> pd.DataFrame:
         """One row for the rotor, each bearing and each plane: place, position_mm, limit_g_mm."""
+        return frame(self._columns())
+
+    def _columns(self) -> tuple[Column, ...]:
         ends: FloatArray = np.zeros(0) if self.bearing_limits is None else self.bearing_limits
         names = ("bearing A", "bearing B")[: len(ends)]
         at = np.concatenate(([np.nan], self.bearings or (), self._places))
-        limits = np.concatenate(([self.total], ends, self.limits))
-        return frame(
-            (
-                Column("place", ("whole rotor", *names, *(f"plane {name}" for name in self.planes))),
-                Column("position_mm", at * 1e3),
-                Column("limit_g_mm", limits * _GRAM_MM),
-            )
+        limits = np.concatenate(([self.total], ends, self.limits)) * _GRAM_MM
+        places = ("whole rotor", *names, *(f"plane {name}" for name in self.planes))
+        return (
+            Column("place", places, str, ""),
+            Column("position_mm", at * 1e3, "at {:.6g} mm".format, ""),
+            Column("limit_g_mm", limits, figures, "g·mm"),
         )
 
     @property
@@ -152,19 +155,15 @@ class Tolerance:
         """Of the planes, m, NaN where unknown."""
         return np.full(len(self.planes), np.nan) if self.positions is None else self.positions
 
-    def summary(self) -> str:
-        """Text of 80 columns."""
-        head = (
-            f"G{self.grade:g} for {self.mass:.6g} kg at {rpm_text(self.speed)}: permissible "
-            f"residual unbalance {self.total * _GRAM_MM:.4g} g·mm "
-            f"({self.eccentricity * 1e6:.3g} g·mm/kg)"
+    @property
+    def answer(self) -> Answer:
+        """The permissible unbalance, and the share of each bearing and plane."""
+        return Answer(
+            f"G{self.grade:g} for {self.mass:.6g} kg at {rpm_text(self.speed)}: permissible residual "
+            f"unbalance {figures(self.total * _GRAM_MM)} g·mm ({self.eccentricity * 1e6:.3g} g·mm/kg).",
+            f"{text(self._columns())}\n\n{self.rule}",
+            self.warnings,
         )
-        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
-        lines += [wrap(head), ""]
-        for place, z, limit in self.to_frame().to_numpy().tolist():
-            where = "" if math.isnan(z) else f"at {z:.6g} mm"
-            lines.append(f"{place:24} {where:>16} {limit:14.4g} g·mm")
-        return "\n".join([*lines, "", wrap(self.rule)])
 
 
 def _limit_columns(positions: Sequence[float] | FloatArray, limits: FloatArray) -> tuple[Column, ...]:

@@ -24,7 +24,6 @@ from balancing.data.reading_errors import reading_covariance
 from balancing.trial_angle import Lag, Quantity, opposing_angle, positive
 from balancing.trial_weight_result import TrialWeight
 from rotorid.base.arrays import ComplexArray
-from rotorid.base.rpm import rpm_text
 from rotorid.base.suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -256,7 +255,8 @@ def trial_from_coefficients(  # noqa: PLR0913, PLR0915
         if not abs(w[most]):
             raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
         amount = share * size / abs(w[most])
-        reading = f"sensor {influence.sensors[most[1]]!r} at {rpm_text(influence.speeds[most[0]])}"
+        speed = influence.labels.speed_words(influence.speeds[most[0]])
+        reading = f"sensor {influence.sensors[most[1]]!r} at {speed}"
         basis = f"changes {reading} by {100 * share:.3g} % of the largest reading, the others by less"
         if amount > limit:
             amount, basis = limit, "the largest weight of the plane"

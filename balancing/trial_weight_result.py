@@ -1,4 +1,4 @@
-"""The proposed trial weight as people read it: text of 80 columns, JSON types, a polar picture."""
+"""The proposed trial weight as people read it: text and JSON types."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from balancing.data.conventions import Labels
-from balancing.data.result_columns import reading_columns, vector_columns
+from balancing.data.result_columns import largest_readings, reading_columns, three_figures, vector_columns
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame, rows
+from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm
-from rotorid.base.text import wrap
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
-class TrialWeight:
+class TrialWeight(Answered):
     """A proposed trial weight for one plane.
 
     Attributes
@@ -110,31 +110,33 @@ class TrialWeight:
             )
         )
 
-    def summary(self) -> str:
-        """Text of 80 columns."""
-        found = self.to_dict()
-        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
-        lines += [wrap(self.labels.assumed_in_words())] if self.labels.assumed else []
+    @property
+    def answer(self) -> Answer:
+        """Amount and place, what for, and the readings expected with it."""
+        found, labels = self.to_dict(), self.labels
         at = "" if self.radius is None else f" at the radius {self.radius * 1e3:.6g} mm"
         angle = "at any angle (no phase, or no lag, is known)"
         if found["angle_deg"] is not None:
-            angle = f"at {found['angle_deg']:.0f}° {self.labels.angle_words}"
+            angle = f"at {found['angle_deg']:.0f}° {labels.angle_words}"
             if self.angle_reach:
                 angle += f" (± {math.degrees(self.angle_reach):.0f}°)"
-        head = f"Trial weight in plane {self.plane}: {found['mass']:.4g} {found['unit']}{at}, {angle}"
-        lines += [wrap(head), wrap(f"Basis: {self.basis}")]
+        lines = [f"Plane {self.plane}: {self.basis}"]
         if self.force is not None:
             share = "" if self.load is None else f", {found['force_percent']:.3g} % of the load"
-            lines.append(f"Force at {found['speed_rpm']:.6g} rpm: {self.force:.4g} N{share}")
-        if found["expected"]:
-            unit = self.labels.vibration_in or "-"
-            lines += ["", f"{'Expected':24} {'now':>18} {'with it':>18} {'change':>10}   {unit}"]
-        for row in found["expected"] or ():
-            name = f"{row['sensor']}, {row['speed_rpm']:.6g} rpm"
-            now = f"{row['before']:.4g} @ {row['before_phase_deg']:.0f}°"
-            then = f"{row['after']:.4g} @ {row['after_phase_deg']:.0f}°"
-            lines.append(f"{name:24} {now:>18} {then:>18} {row['change']:10.4g}")
-        return "\n".join(lines)
+            lines[0] += f"; force at {labels.speed_words(self.speed)} {self.force:.4g} N{share}"
+        table: tuple[str, ...] = ()
+        if self.speeds is not None and self.before is not None and self.expected is not None:
+            largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.expected)
+            lines.append(f"  largest with it{largest}")
+            head = f"Plane {self.plane}, now and with the weight,, {labels.vibration_in}"
+            table = (f"{head}\n{text(self._columns() or (), left=2)}",)
+        return Answer(
+            f"Trial weight in plane {self.plane}: {found['mass']:.4g} {labels.weight_in}{at}, {angle}.",
+            "\n".join(lines),
+            ((labels.assumed_in_words(),) if labels.assumed else ()) + self.warnings,
+            tables=table,
+            more="every reading",
+        )
 
     def _weight(self) -> tuple[float, float]:
         """Size in the job's unit and angle in degrees; NaN: nothing is known to choose it by."""
@@ -147,8 +149,8 @@ class TrialWeight:
             return None
         change = np.abs(self.expected - self.before) * self.labels.vibration_scale
         return (
-            *reading_columns(self.speeds, self.sensors),
+            *reading_columns(self.labels, self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),
             *vector_columns(self.labels, "after", self.expected),
-            Column("change", change.ravel()),
+            Column("change", change.ravel(), three_figures),
         )

@@ -9,9 +9,11 @@ import numpy as np
 
 from balancing.data.conventions import Labels
 from balancing.data.result_columns import known, weight_columns
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import capital
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +26,7 @@ _NAMED = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Unbalance:
+class Unbalance(Answered):
     """Unbalance at Q stations that explains N readings.
 
     Attributes
@@ -160,21 +162,24 @@ class Unbalance:
             replace(size, name="unbalance", shown="{:.5g}".format),
             unit,
             angle,
-            Column("std", std, "{:.3g}".format),
+            Column("std", std, "± {:.3g}".format, "1 std"),
             Column("own_share", self.own_share),
             Column("determined", self.determined),
         )
 
-    def summary(self) -> str:
-        """Text: what is determined, and the unbalance of each station with its standard deviation."""
-        lines = [*(f"Warning: {words}" for words in self.warnings), f"{self.method}: {self.words()}"]
-        lines[:0] = [self.labels.assumed_in_words()] if self.labels.assumed else []
+    @property
+    def answer(self) -> Answer:
+        """What is determined, and the unbalance of each station with its standard deviation."""
         sure = [
             "yes" if alone else f"no ({_percent(share)} % its own)"
             for alone, share in zip(self.determined, self.own_share, strict=True)
         ]
-        lines.append(text((*self._columns(), Column("", sure, str, "determined"))))
-        return "\n".join(lines)
+        assumed = (self.labels.assumed_in_words(),) if self.labels.assumed else ()
+        return Answer(
+            f"{capital(self.words())} ({self.method}).",
+            text((*self._columns(), Column("", sure, str, "determined"))),
+            assumed + self.warnings,
+        )
 
 
 def _percent(share: float) -> str:

@@ -348,8 +348,8 @@ def unseen(run: RunErrors) -> tuple[str, ...]:
         return ()
     taken = f"{100 * ASSUMED:g} % are assumed" if run.origin == "assumed" else "none are stated"
     return (
-        f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: repeated readings "
-        "do not show them; one more baseline run at the end, or one more trial run, would measure them",
+        f"errors between runs (mounting, temperature, drift) are not seen here, {taken}: one more baseline "
+        "run at the end, or one more trial run, would measure them; repeated readings do not",
     )
 
 

@@ -20,6 +20,7 @@ from balancing.data.result_columns import rms, three_figures, weight_rows
 from balancing.data.trials import Trials
 from balancing.solvers.conditioning import check_stack
 from balancing.solvers.error_propagation import error_form
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
@@ -35,10 +36,11 @@ MOST = 20_000
 """More choices of planes than this are not tried."""
 
 _BATCH = 2**20
+_NAMED = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Subsets:
+class Subsets(Answered):
     """Choices of k planes, the best first, each with its own best weights.
 
     Attributes
@@ -105,8 +107,9 @@ class Subsets:
         """One row per choice: planes ("A, C"), rms_after, rms_expected, max_after, largest_weight, …"""
         return frame((Column("planes", list(map(", ".join, self.planes))), *self._columns()[1:]))
 
-    def summary(self) -> str:
-        """Table of 80 columns, the best choice first."""
+    @property
+    def answer(self) -> Answer:
+        """The best choices in words; then their table."""
         scale, unit = self.labels.vibration_scale, self.labels.vibration_in
         nothing = (("(none)",), self.rms_before * scale, None, self.largest_before * scale, None, None)
         shown = [
@@ -114,14 +117,20 @@ class Subsets:
             for first, column in zip(nothing, self._columns(), strict=True)
         ]
         choices = f"{counted(self.choices, 'choice')} of {counted(self.weights.shape[1], 'plane')}"
-        by = criterion_words(self.criterion, weighted=self.weighted)
-        head = f"The best of {choices}, by {by} after correction"
-        lines = [head + (f" ({unit})" if unit else ""), text(shown)]
+        by = criterion_words(self.criterion, weighted=self.weighted) + " after correction"
+        by += f" ({unit})" if unit else ""
+        size = self.largest if self.criterion == "max" else self.rms
+        each = [
+            f"{', '.join(planes)}: {three_figures(value * scale)}"
+            for planes, value in zip(self.planes[:_NAMED], size, strict=False)
+        ]
+        lines = [f"The best of {choices}, by {by}", text(shown)]
         if self.dependent:
             lines.append(
                 f"{self.dependent} more choices have planes that act alike: no weights are determined."
             )
-        return "\n".join(lines)
+        best = f"The best of {choices}, by {by}: {'; '.join(each)}."
+        return Answer(best, tables=("\n".join(lines),), more="choices of planes")
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale

@@ -8,21 +8,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_result import ROUNDING
 from balancing.data.conventions import Labels
-from balancing.data.result_columns import known, reading_columns, rms, vector_columns, weight_rows
+from balancing.data.result_columns import (
+    ROUNDING,
+    known,
+    largest_readings,
+    reading_columns,
+    rms,
+    small,
+    three_figures,
+    vector_columns,
+    weight_rows,
+)
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import rpm
-from rotorid.base.text import figures, sentence, wrap
+from rotorid.base.text import figures, sentence
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 @dataclass(frozen=True, eq=False)
-class CheckComparison:
+class CheckComparison(Answered):
     """Readings of R check runs beside their prediction.
 
     Attributes
@@ -142,23 +151,24 @@ class CheckComparison:
         """One row per run, speed and sensor: before, predicted, achieved, difference, distance."""
         return frame([column for column in self._columns() if column.name != "covariance"])
 
-    def summary(self) -> str:
-        """Text of 80 columns: warnings, verdict, readings beside the prediction, improvement."""
-        mounted = (
-            "the proposed corrections" if self.as_proposed else "what the weights table of the check says"
+    @property
+    def answer(self) -> Answer:
+        """Whether the rotor does what was predicted, what is left, and all readings beside the prediction."""
+        labels = self.labels
+        scale, unit = labels.vibration_scale, labels.vibration_in
+        before, predicted, achieved = (rms(z) * scale for z in (self.before, self.predicted, self.achieved))
+        heads = {True: "As predicted", False: "Not as predicted", None: "Not judged"}
+        left = f"rms {three_figures(before)} → {three_figures(achieved)} {unit}".rstrip()
+        judged = f"{heads[self.explained]}: with the weights {left} ({small(predicted, before)} predicted)."
+        largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.achieved[-1])
+        mounted = "the proposed corrections" if self.as_proposed else "what its weights table says"
+        return Answer(
+            f"{judged} {sentence(self.verdict)}",
+            f"Largest in run {self.runs[-1]!r}{largest}",
+            self.warnings,
+            tables=(f"Check run, mounted: {mounted}.\n{self._readings_text()}",),
+            more="the check run",
         )
-        blocks = [
-            *(wrap(f"Warning: {w}", "  ") for w in self.warnings),
-            wrap(f"Check run, mounted: {mounted}.", ""),
-            self._readings_text(),
-            wrap(sentence(self.verdict)),
-            wrap(
-                f"Vibration (rms) before by after: predicted {_times(self.improvement_predicted)}, "
-                f"achieved {_times(self.improvement_achieved)}.",
-                "",
-            ),
-        ]
-        return "\n\n".join(blocks)
 
     def _columns(self) -> tuple[Column, ...]:
         """One row per run, speed and sensor."""
@@ -173,7 +183,7 @@ class CheckComparison:
             Column("run", np.repeat(self.runs, S * C)),
             *(
                 replace(column, values=list(column.values) * R)
-                for column in reading_columns(self.speeds, self.sensors)
+                for column in reading_columns(labels, self.speeds, self.sensors)
             ),
             *vector_columns(labels, "before", before, rounding),
             *vector_columns(labels, "predicted", self.predicted, rounding),
@@ -208,7 +218,7 @@ class CheckComparison:
 def _verdict_words(c: CheckComparison) -> str:
     """`CheckComparison.verdict`."""
     r, s, k = c.worst
-    where = f"sensor {c.sensors[k]!r} at {rpm(c.speeds[s]):.6g} rpm"
+    where = f"sensor {c.sensors[k]!r} at {c.labels.speed_words(c.speeds[s])}"
     if len(c.runs) > 1:
         where += f" in run {c.runs[r]!r}"
     if c.explained is None or c.distance is None:
@@ -246,10 +256,6 @@ def _verdict_words(c: CheckComparison) -> str:
 
 def _two_figures(value: float) -> str:
     return figures(value, 2)
-
-
-def _times(factor: float | None) -> str:
-    return "nothing left" if factor is None else f"{figures(factor, 3)} times"
 
 
 def _percent(probability: float) -> str:

@@ -125,7 +125,7 @@ def correct(  # noqa: PLR0913
         rows,
         kept if kept is not None and kept.any else None,
         names,
-        reading_names(influence.sensors, influence.speeds[used]),
+        reading_names(start.labels, influence.sensors, influence.speeds[used]),
         start.labels.amplitude_words,
         start.labels.weight_words,
         None if errors is None else errors.common,

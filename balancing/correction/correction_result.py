@@ -1,13 +1,14 @@
-"""Correction weights with the vibration they should leave: result, text of 80 columns, and JSON types."""
+"""Correction weights with the vibration they should leave: result, text, and JSON types."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from balancing.coefficients.baseline import describe_errors
 from balancing.coefficients.convention_test import ConventionTest
 from balancing.coefficients.run_errors import RunErrors
 from balancing.correction.convention_assumptions import OtherReading, assumptions, contradiction
@@ -17,11 +18,15 @@ from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from balancing.data.reading_errors import Source
 from balancing.data.result_columns import (
+    INVISIBLE,
+    ROUNDING,
     covariance_column,
     degrees,
     known,
+    largest_readings,
     reading_columns,
     rms,
+    small,
     three_figures,
     vector_columns,
     weight_columns,
@@ -29,10 +34,11 @@ from balancing.data.result_columns import (
 )
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import cell, plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import capital, counted, figures, wrap
+from rotorid.base.text import capital, counted, cut, figures, listing, wrap
 from rotorid.regression import coverage_factor
 
 if TYPE_CHECKING:
@@ -41,14 +47,12 @@ if TYPE_CHECKING:
 
 HELD = 1e-5
 """Relative scatter of a weight below which a limit holds it."""
-ROUNDING = 1e-12
-"""Predicted amplitudes below this share of the largest one before are rounding."""
-INVISIBLE = 1e-9
-"""Those below this share are zero to a reader."""
+_NAME = 16
+"""So many letters of the name of a run stand over a column."""
 
 
 @dataclass(frozen=True, eq=False)
-class Correction:
+class Correction(Answered):
     """Weights to mount, and the vibration they should leave.
 
     Attributes
@@ -269,29 +273,52 @@ class Correction:
         for other in self.others:
             word = other.words.replace(" ", "_")
             shown[f"mass_if_{word}"] = other.labels.weight(other.weights)[0]
-            shown[f"angle_deg_if_{word}"] = self._other_places(other, self.planes, other.weights)
+            shown[f"angle_deg_if_{word}"] = self._other_places(other)
         return shown
 
     def residuals_frame(self) -> pd.DataFrame:
         """One row per speed and sensor: amplitude and phase before and after (NaN: after is nothing)."""
         return frame(self._residual_columns()[:-1])
 
-    def summary(self) -> str:
-        """Text for an engineer, 80 columns: warnings, corrections with 95 %, vibration before and after."""
+    @property
+    def answer(self) -> Answer:
+        """Whether to mount the weights, these with their 95 %, the largest readings left; then the tables."""
         test = self.convention_test
-        contradicted = 0 if test is None else len(contradiction(test, self.labels))
-        blocks = [
-            "\n".join(wrap(line, "  ") for line in self.decision.lines()),
-            *(wrap(f"Warning: {w}", "  ") for w in self.warnings[:contradicted]),
-            wrap(" ".join(assumptions(self.labels, test, self.others))),
-            *(wrap(f"Warning: {w}", "  ") for w in self.warnings[contradicted:]),
-            self._corrections_text(),
-            self._add_text(),
-            self._vibration_text(),
-            self._quality_text(),
-            *(wrap(f"Note: {w}.", "  ") for w in self.notes),
-        ]
-        return "\n\n".join(b for b in blocks if b)
+        assumed = assumptions(self.labels, test, self.others)
+        sure = test is not None and test.verdict == "confirmed"
+        said = (" ".join(assumed),) if assumed else ()
+        judged, rms_words = self._judgement(), self._rms_words()
+        promised = "" if rms_words in judged else f"Predicted: {rms_words}."
+        tables = (promised, self._mounted_text(), self._vibration_text(), self._quality_text())
+        return Answer(
+            judged,
+            f"{self._weights_text()}\n\n{self._left()}",
+            (() if sure else said) + self.warnings[len(self._contradictions) :],
+            (said if sure else ()) + self.notes,
+            tuple(table for table in tables if table),
+            "every reading, method and errors",
+        )
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing speaks against mounting the weights."""
+        return self.decision.word == "mount" and not self._contradictions
+
+    @property
+    def _contradictions(self) -> tuple[str, ...]:
+        return () if self.convention_test is None else contradiction(self.convention_test, self.labels)
+
+    def _judgement(self) -> str:
+        if not self.sound:
+            first = [f"Do not mount anything yet: {words}." for words in self._contradictions]
+            return "\n".join([*first, *self.decision.lines()])
+        if not self.weights.any():
+            return "Mount nothing: the limits leave no plane a weight."
+        gone = [plane in self.remove for plane in self.planes]
+        what = "Remove this material" if all(gone) else "Mount these weights"
+        ways = {"phase": f"phases {self.labels.phase}", "angles": f"angles count {self.labels.angle_words}"}
+        said = " and ".join(ways[name] for name in self.labels.assumed) if self.others else ""
+        return f"{what}{f', if {said} as assumed' if said else ''}: {self._rms_words()}."
 
     def _weight_columns(self) -> tuple[Column, ...]:
         n, covariance = len(self.planes), self.plane_covariance
@@ -324,7 +351,7 @@ class Correction:
         """
         nothing = rounding * float(np.abs(self.before).max()) * self.labels.vibration_scale
         return (
-            *reading_columns(self.speeds, self.sensors),
+            *reading_columns(self.labels, self.speeds, self.sensors),
             *vector_columns(self.labels, "before", self.before),
             *vector_columns(self.labels, "after", self.after if after is None else after, nothing),
         )
@@ -350,11 +377,11 @@ class Correction:
             "forbidden_deg": {plane: pairs for plane, pairs in arcs.items() if pairs},
         }
 
-    def _other_places(self, other: OtherReading, planes: Sequence[str], weights: ComplexArray) -> FloatArray:
-        return replace(self, labels=other.labels).places(planes, weights)
+    def _other_places(self, other: OtherReading) -> FloatArray:
+        return replace(self, labels=other.labels).places(self.planes, other.weights)
 
     def _other_rows(self, other: OtherReading) -> list[dict[str, Any]]:
-        n, at = len(self.planes), self._other_places(other, self.planes, other.weights)
+        n, at = len(self.planes), self._other_places(other)
         gone = [plane in self.remove for plane in self.planes]
         return rows(
             (
@@ -366,15 +393,12 @@ class Correction:
             )
         )
 
-    def _other_columns(self, planes: Sequence[str], shown: FloatArray, *, add: bool) -> list[Column]:
+    def _other_columns(self, shown: FloatArray) -> list[Column]:
         """The angles if a convention is otherwise, and the mass where that is another than the one shown."""
         found = []
         for other in self.others:
-            weights = other.to_add if add else other.weights
-            if weights is None:
-                continue
-            at = [degrees(angle) for angle in self._other_places(other, planes, weights)]
-            masses = map(figures, other.labels.weight(weights)[0])
+            at = [degrees(angle) for angle in self._other_places(other)]
+            masses = map(figures, other.labels.weight(other.weights)[0])
             cells = [
                 place if mass == figures(own) else f"{mass} at {place}"
                 for place, mass, own in zip(at, masses, shown, strict=True)
@@ -382,49 +406,78 @@ class Correction:
             found.append(Column(f"if {other.words}", cells, str))
         return found
 
-    def _plane_column(self, planes: Sequence[str]) -> Column:
-        return Column("plane", [f"{p} (remove)" if p in self.remove else p for p in planes], str)
-
-    def _corrections_text(self) -> str:
+    def _weights_text(self) -> str:
         unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
         columns = [
-            self._plane_column(self.planes),
+            Column("plane", [f"{p} (remove)" if p in self.remove else p for p in self.planes], str),
             Column(unit, mass, figures),
             Column("angle", self.places(self.planes, self.weights), degrees),
+            *self._width_columns(unit),
+            *self._other_columns(mass),
         ]
-        if self.coverage_factor:
-            sizes, angles = self.half_widths()
-            held = sizes < HELD * np.abs(self.weights)
-            widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}" for width in sizes]
-            columns += [
-                Column("95 %", ["at its limit" if h else w for h, w in zip(held, widths, strict=True)], str),
-                Column("", [_angle_width(half) for half in np.degrees(angles)], str),
-            ]
-        columns += self._other_columns(self.planes, mass, add=False)
-        head = "Corrections: total weights for the bare rotor, every weight of the runs removed"
         taken = f" ({' and '.join(self.labels.assumed)} assumed)" if self.labels.assumed else ""
-        foot = wrap(f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}.", "")
-        return f"{head}\n{text(columns)}\n{foot}"
+        conventions = f"{capital(self.labels.turning_in_words())}; phases as {self.labels.phase}{taken}"
+        lines = [f"{conventions}; weights for the bare rotor."]
+        if self.mounted is not None and self.mounted[2].any():
+            run, stays = self.mounted[0], self._in_planes(self.labels, self.to_add, self.remove)
+            cells = [stays.pop(plane, "nothing") for plane in self.planes]
+            columns.append(Column(f"add if {cut(run, _NAME)!r} stays", cells, str))
+            also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
+            lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
+        lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
+        return "\n".join([text(columns), *lines])
 
-    def _add_text(self) -> str:
-        if self.mounted is None or self.to_add is None:
-            return ""
-        run, planes, weights = self.mounted
-        (mass, angle), more = self.labels.weight(weights), self.labels.weight(self.to_add)[0]
-        unit = self.labels.weight_in
-        columns = [
-            self._plane_column(planes),
-            Column(f"mounted {unit}", mass, figures),
-            Column("angle", angle, degrees),
-            Column(f"add {unit}", more, figures),
-            Column("angle", self.places(planes, self.to_add), degrees),
-            *self._other_columns(planes, more, add=True),
+    def _width_columns(self, unit: str) -> list[Column]:
+        if not self.coverage_factor:
+            return []
+        sizes, angles = self.half_widths()
+        held = sizes < HELD * np.abs(self.weights)
+        widths = [f"± {figures(width * self.labels.weight_scale, 2)} {unit}" for width in sizes]
+        return [
+            Column("95 %", ["at its limit" if h else w for h, w in zip(held, widths, strict=True)], str),
+            Column("", [_angle_width(half) for half in np.degrees(angles)], str),
         ]
-        head = wrap(f"The same rotor, if the weights of run {run!r} (the last one) stay mounted:", "")
-        foot = ""
-        if any(plane in self.remove for plane in planes):
-            foot = "\nWhere material is removed, the last columns say how much and where."
-        return f"{head}\n{text(columns)}{foot}"
+
+    def _in_planes(
+        self, labels: Labels, weights: ComplexArray | None, gone: Collection[str] = ()
+    ) -> dict[str, str]:
+        """Weights in the planes of the runs, where there are any, and where to work."""
+        if self.mounted is None or weights is None:
+            return {}
+        mass, angle = labels.weight(weights)
+        return {
+            plane: f"{figures(m)} at {degrees(a + 180 * (plane in gone))}"
+            for plane, m, a in zip(self.mounted[1], mass, angle, strict=True)
+            if m
+        }
+
+    def _mounted_text(self) -> str:
+        if self.mounted is None:
+            return ""
+        run, _, weights = self.mounted
+        said = {f"Mounted in run {run!r}, the last one": self._in_planes(self.labels, weights)}
+        for other in self.others:
+            add = self._in_planes(other.labels, other.to_add, self.remove)
+            said[f"To add to that if it is {other.words}"] = add
+        each = [
+            f"{what} ({self.labels.weight_in}): {', '.join(map(' '.join, there.items())) or 'nothing'}."
+            for what, there in said.items()
+        ]
+        return "\n".join(wrap(line) for line in each)
+
+    def _left(self) -> str:
+        within = self.within(self.after_covariance).reshape(self.before.shape)
+        words = largest_readings(self.labels, self.speeds, self.sensors, self.before, self.after, within)
+        lines = [f"Largest predicted{words}"]
+        if self.error_source == "assumed" and self.errors is not None:
+            size = describe_errors(self.errors, self.labels.vibration_in, self.labels.vibration_scale)
+            lines.append(f"The errors of the readings are assumed, {size}: state them, or repeat readings.")
+        if self.covariance is None:
+            why = "no errors are stated, no reading is repeated, and no run is more than needed"
+            lines.append(
+                f"No intervals: {why if self.errors is None else 'the errors of the readings are not known'}."
+            )
+        return "\n".join(lines)
 
     def within(self, covariance: FloatArray | None) -> FloatArray:
         """Radius (S·C,) in the job's unit of the 95 % region of a check run's readings; NaN: not known."""
@@ -439,22 +492,22 @@ class Correction:
             within = self.within(self.after_covariance)
             columns.append(Column("95 % within", within, lambda reach: f"± {figures(reach, 2)}"))
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
+        old, new = (np.abs(z).max() * self.labels.vibration_scale for z in (self.before, self.after))
         head = f"Vibration{unit}, bare rotor before and predicted after"
-        return "\n".join([head, text(columns, left=2), wrap(self._rms_words(), "")])
+        return f"{head}\n{text(columns, left=2)}\nlargest {three_figures(old)} → {small(new, old)}"
 
     def _rms_words(self) -> str:
         """Before and after, and what a check run will show."""
-        scale = self.labels.vibration_scale
+        scale, unit = self.labels.vibration_scale, self.labels.vibration_in
         old, new = np.abs(self.before) * scale, np.abs(self.after) * scale
         before = f"rms {three_figures(rms(old))}"
         checked = None if self.check_rms is None else figures(self.check_rms * scale, 2)
         if new.max() <= ROUNDING * old.max():
             if checked is None:
                 return f"{before} → 0 by arithmetic: as many readings as weights say nothing of what is left"
-            return f"{before} → below {checked} in 95 of 100 check runs"
-        after = f"{before} → {small(rms(new), old.max())}"
-        words = f"{after}, largest {three_figures(old.max())} → {small(new.max(), old.max())}"
-        return words if checked is None else f"{words}; rms of a check run below {checked} in 95 of 100"
+            return " ".join(f"{before} → below {checked} {unit} in 95 of 100 check runs".split())
+        words = f"{before} → {small(rms(new), old.max())} {unit}".rstrip()
+        return words if checked is None else f"{words}; a check run stays below {checked} in 95 of 100"
 
     def _quality_text(self) -> str:
         n = len(self.planes)
@@ -463,8 +516,6 @@ class Correction:
         lines = [method_words(self.method, weighted=self.row_weights is not None)]
         if self.gap is not None:
             lines[0] += f" The optimum is certified: at most {max(self.gap, 0.0):.1e} better is possible."
-        if self.active:
-            lines.append(f"Limits that bind: {'; '.join(self.active)}.")
         if self.method not in ("ridge", "truncated"):
             lines.append(f"{planes.capitalize()} determined ({numbers}).")
         elif self.singular_values.size:
@@ -477,19 +528,8 @@ class Correction:
                 f"{counted(self.fit_dof, 'degree')} of freedom)."
             )
         if self.covariance is not None:
-            words = error_words(self.error_source, self.errors, self.dof, self.run_errors, self.labels)
-        elif self.errors is None:
-            words = (
-                "No intervals: no errors are stated, no reading is repeated, and no run is more than needed."
-            )
-        else:
-            words = "No intervals: the errors of the readings are not known."
-        return "\n".join(wrap(line, "") for line in [*lines, words])
-
-
-def small(value: float, scale: float) -> str:
-    """A predicted amplitude; rounding of an exact solution is zero to a reader."""
-    return "0" if value <= INVISIBLE * scale else three_figures(value)
+            lines.append(error_words(self.error_source, self.errors, self.dof, self.run_errors, self.labels))
+        return "\n".join(wrap(line, "") for line in lines)
 
 
 def _angle_width(half: float) -> str:

@@ -11,7 +11,6 @@ from balancing.coefficients.influence import Influence
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import rpm_text
 
 if TYPE_CHECKING:
     from balancing.correction.correction_result import Correction
@@ -27,9 +26,9 @@ _TOUCHES = 2e-3
 """Relative distance below which a limit with a price is touched (the solver stays a little inside)."""
 
 
-def reading_names(sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
+def reading_names(labels: Labels, sensors: tuple[str, ...], speeds: FloatArray) -> tuple[str, ...]:
     """What to call each reading, speed by speed."""
-    return tuple(f"sensor {c!r} at {rpm_text(s)}" for s in speeds for c in sensors)
+    return tuple(f"sensor {c!r} at {labels.speed_words(s)}" for s in speeds for c in sensors)
 
 
 def binding(stack: Stack, fitted: Fitted) -> tuple[str, ...]:
@@ -87,10 +86,9 @@ def warnings_of(result: Correction, W: ComplexArray, *, alike: bool, rising: boo
     if result.chi_square is not None and result.fit_dof and not told:
         ratio = np.sqrt(result.chi_square / result.fit_dof)
         out.append(
-            f"weights in these planes do not explain the vibration: what is left is {ratio:.2g} times as "
-            "large as the errors of the readings; unbalance outside the planes (or a bow, or a rotor that is "
-            "not linear) is likely, and the errors of the weights allow for it; if the readings have larger "
-            f"errors than stated instead, those of the weights are up to {ratio:.2g} times larger"
+            f"weights in these planes leave {ratio:.2g} times what the errors explain: unbalance elsewhere, "
+            "a bow or nonlinearity (the ± allow for it), or larger errors than stated (± up to "
+            f"{ratio:.2g} times larger)"
         )
     if rising and np.abs(result.after).max() > np.abs(result.before).max() * (1 + 1e-6):
         out += _rises(result)
@@ -132,9 +130,10 @@ def left_out(
     if limits is None:
         return words
     over = np.abs(after) > limits.residual[rest] * (1 + 1e-6)
+    names = reading_names(labels, influence.sensors, influence.speeds[rest])
     return words + tuple(
-        f"the vibration of {reading_names((influence.sensors[c],), influence.speeds[[rest[s]]])[0]}, a speed "
-        f"left out, is predicted to be {labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
+        f"the vibration of {names[s * len(influence.sensors) + c]}, a speed left out, is predicted to be "
+        f"{labels.amplitude_words(float(np.abs(after[s, c])))}, more than its "
         f"limit of {labels.amplitude_words(float(limits.residual[rest[s], c]))}"
         for s, c in np.argwhere(over)[:_RISES_NAMED]
     )
@@ -152,7 +151,7 @@ def _rising(
     places = [tuple(place) for place in np.argwhere(new > old * (1 + 1e-6))]
     places.sort(key=lambda place: old[place] - new[place])
     words = [
-        f"the vibration of sensor {sensors[c]!r} at {rpm_text(speeds[s])}{where} is predicted "
+        f"the vibration of sensor {sensors[c]!r} at {labels.speed_words(speeds[s])}{where} is predicted "
         f"to rise from {old[s, c]:.3g} to {new[s, c]:.3g} {labels.vibration_in}".rstrip()
         for s, c in places[:_RISES_NAMED]
     ]

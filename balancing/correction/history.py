@@ -13,11 +13,12 @@ from balancing.coefficients.baseline import match_speeds
 from balancing.correction.refine_coefficients import runs_and_weights, sensors_in
 from balancing.data.conventions import Labels
 from balancing.data.limits import Limits
-from balancing.data.result_columns import known, mounted_rows
+from balancing.data.result_columns import known, mounted_rows, three_figures
 from balancing.data.trials import Trials
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
-from rotorid.base.rpm import rpm
+from rotorid.base.rpm import RPM, rpm
 from rotorid.base.text import figures, table, wrap
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Answered):
     """All runs of a job in their order.
 
     Attributes
@@ -133,10 +134,22 @@ class History:
                 found.append({**own, **row})
         return pd.DataFrame(found).astype({"of_limit": float, "within_limits": object})
 
-    def summary(self) -> str:
-        """One table of 80 columns: runs, what was mounted, vibration at each speed, share of the limit."""
+    @property
+    def answer(self) -> Answer:
+        """The largest reading of each run; then what was mounted, and vibration at each speed."""
+        unit = f", {self.labels.vibration_in}" if self.labels.vibration_in else ""
+        size = np.nanmax(self.largest, axis=1) * self.labels.vibration_scale
+        each = [f"{run} {three_figures(value)}" for run, value in zip(self.runs, size, strict=True)]
+        return Answer(
+            "",
+            f"Largest reading of each run{unit}: {', '.join(each)}.",
+            tables=(self._table(),),
+            more="run by run",
+        )
+
+    def _table(self) -> str:
         unit = f" in {self.labels.vibration_in}" if self.labels.vibration_in else ""
-        head = ["run", f"mounted {self.labels.weight_in}".rstrip(), "rpm", "largest", "rms"]
+        head = ["run", f"mounted {self.labels.weight_in}".rstrip(), self.labels.speed_in, "largest", "rms"]
         limited = self.of_limit is not None
         lines = [[*head, "of limit"] if limited else head]
         for run in self.to_dict()["runs"]:
@@ -144,7 +157,7 @@ class History:
                 f"{figures(weight['mass'])} at {round(weight['angle_deg']) % 360}° {weight['plane']}"
                 for weight in run["weights"]
             ] or ["nothing"]
-            read = [_vibration(row, limited=limited) for row in run["speeds"]]
+            read = [_vibration(row, self.labels, limited=limited) for row in run["speeds"]]
             for name, weight, cells in zip_longest([run["run"]], weights, read):
                 row = [name or "", weight or "", *(cells or ())]
                 lines.append(row + [""] * (len(lines[0]) - len(row)))
@@ -203,8 +216,9 @@ def _kind(check: bool) -> str:
     return "check run" if check else "trial run"
 
 
-def _vibration(row: dict[str, Any], *, limited: bool) -> list[str]:
-    cells = [f"{row['speed_rpm']:.6g}", figures(row["largest"], 3), figures(row["rms"], 3)]
+def _vibration(row: dict[str, Any], labels: Labels, *, limited: bool) -> list[str]:
+    speed = labels.speed_words(row["speed_rpm"] / RPM).partition(" ")[0]
+    cells = [speed, figures(row["largest"], 3), figures(row["rms"], 3)]
     if limited:
         share = row["of_limit"]
         cells.append("" if share is None else f"{figures(100 * share, 3)} %{'' if share <= 1 else ' !'}")

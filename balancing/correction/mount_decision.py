@@ -39,7 +39,6 @@ from balancing.data.result_columns import rms
 from balancing.solvers.error_propagation import error_form, region_radius
 from balancing.solvers.regularised import ridge
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import rpm_text
 from rotorid.base.text import figures, listing
 from rotorid.regression import solution
 
@@ -435,8 +434,9 @@ def _separating(inputs: Inputs) -> str:
     others = {s: apart([s]) for s in range(len(influence.speeds)) if s not in inputs.used}
     best = max(others, key=lambda s: others[s], default=None)
     if best is not None and others[best] > max(2 * now, WEAK):
+        speed = influence.labels.speed_words(influence.speeds[best])
         return (
-            f"use {rpm_text(influence.speeds[best])} too, a speed left out, where planes {named} are told "
+            f"use {speed} too, a speed left out, where planes {named} are told "
             f"apart by {others[best]:.2g} times the errors (now {now:.2g})"
         )
     told = f" ({now:.2g} times the errors)" if now else ""

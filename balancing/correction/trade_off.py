@@ -14,6 +14,7 @@ from balancing.correction.best_planes import Criterion, criterion_words
 from balancing.data.conventions import Labels
 from balancing.data.result_columns import three_figures, weight_rows
 from balancing.solvers.conditioning import check_stack
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
@@ -29,7 +30,7 @@ ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class TradeOff:
+class TradeOff(Answered):
     """The least vibration that a total weight can leave, from no weight to the best correction.
 
     Attributes
@@ -93,8 +94,9 @@ class TradeOff:
         knee = Column("knee", np.arange(len(self.totals)) == self.knee)
         return frame((*self._columns(), knee, *each))
 
-    def summary(self) -> str:
-        """Table of 80 columns, the knee marked."""
+    @property
+    def answer(self) -> Answer:
+        """Where the knee is; then the curve, the knee marked."""
         vibration = self.labels.vibration_in
         gained = self.objective[0] - self.objective[-1]
         share = (self.objective[0] - self.objective) / (gained if gained > 0 else 1.0)
@@ -106,7 +108,7 @@ class TradeOff:
         )
         what = criterion_words(self.criterion, weighted=self.weighted)
         head = f"The least {what} that a total weight leaves{f' ({vibration})' if vibration else ''}"
-        return f"{head}\n{text(shown, left=0)}\n{self._words()}"
+        return Answer(self._words(), tables=(f"{head}\n{text(shown, left=0)}",), more="trade-off")
 
     def _columns(self) -> tuple[Column, ...]:
         labels, scale = self.labels, self.labels.vibration_scale
@@ -118,18 +120,16 @@ class TradeOff:
         )
 
     def _words(self) -> str:
-
         if self.knee is None:
             if len(self.totals) == 1:
                 return "There is nothing to take away."
-            return "The curve has no clear knee: the last weights pay nearly as well as the first."
-        unit, scale = self.labels.weight_in, self.labels.weight_scale
-        gain_there = (self.objective[0] - self.objective[self.knee]) / (
-            self.objective[0] - self.objective[-1]
-        )
+            return "There is no clear knee: the last weights pay nearly as well as the first."
+        scale, best = self.labels.weight_scale, self.objective[0] - self.objective[-1]
+        share = (self.objective[0] - self.objective[self.knee]) / best
         return (
-            f"The knee: {three_figures(self.totals[self.knee] * scale)} {unit} of "
-            f"{three_figures(self.totals[-1] * scale)} {unit} bring {100 * gain_there:.0f} % of the effect."
+            f"The knee: {three_figures(self.totals[self.knee] * scale)} of "
+            f"{three_figures(self.totals[-1] * scale)} {self.labels.weight_in} bring {100 * share:.0f} % of "
+            "the effect; more weight pays little."
         )
 
 

@@ -30,10 +30,11 @@ from balancing.data.limits import Limits
 from balancing.data.trials import Trials
 from balancing.iso21940 import Tolerance
 from balancing.solvers.correction_methods import Stack, fit_weights
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, frame, rows
-from rotorid.base.rpm import rpm
-from rotorid.base.text import wrap
+from rotorid.base.rpm import RPM, rpm
+from rotorid.base.text import capital, counted
 from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 _GRAM_MM = 1e6
 POOR = 1e-3
 """Probability of χ² below which unbalance in the planes does not explain the readings."""
+_SHOWN = 3
 _UNEXPLAINED = (
     "unbalance in these planes does not explain the readings within their errors: there is more, "
     "elsewhere on the rotor or not from unbalance; the residual is less certain than it seems"
@@ -50,7 +52,7 @@ _UNEXPLAINED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class Verdict(Answered):
     """All judgements of a balance.
 
     Attributes
@@ -91,33 +93,36 @@ class Verdict:
         """One row per judgement: the keys of `to_dict`."""
         return frame(self._columns())
 
-    def summary(self) -> str:
-        """Text of 80 columns."""
-        judged = rows(self._columns())
-        lines = [wrap(f"Warning: {w}", "  ") for w in self.warnings]
-        lines.append(f"Verdict ({self.source}): {self.overall}")
-        for row in judged:
-            unit = (
-                weight_unit_words(row["unit"])
-                if row["kind"] != "sensor"
-                else vibration_unit_words(row["unit"])
-            )
-            at = "" if row["speed_rpm"] is None else f" at {row['speed_rpm']:.6g} rpm"
-            within = (
-                "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
-            )
-            line = (
-                f"  {row['kind']} {row['name']}{at}: {row['size']:.4g} {unit}".rstrip()
-                + f" ({within}), limit {row['limit']:.4g}: {row['verdict']}"
-            )
-            lines.append(wrap(line, "    "))
-        if any(row["verdict"] == "not decidable" for row in judged):
-            words = (
-                "Not decidable: the 95 % region of the value lies on both sides of the limit, or the errors "
-                "are unknown; repeated readings or stated errors would tell."
-            )
-            lines.append(wrap(words))
-        return "\n".join(lines)
+    @property
+    def answer(self) -> Answer:
+        """Pass, fail or not decidable, the planes and the sensors nearest to it; then all the others."""
+        told = [self._row_words(row) for row in rows(self._columns())]
+        same = [k for k, row in enumerate(self.rows) if row.verdict == self.overall]
+        near = sorted(same, key=lambda k: self.rows[k].limit / (self.rows[k].size or 1e-30))
+        shown = [k for k, row in enumerate(self.rows) if row.kind != "sensor"]
+        shown += [k for k in near if k not in shown][:_SHOWN]
+        others = [words for k, words in enumerate(told) if k not in shown]
+        why = ""
+        if self.overall == "not decidable":
+            why = ": the 95 % region lies on both sides, or the errors are unknown; repeated readings "
+            why += "or stated errors would tell"
+        of = f"{len(same)} of {counted(len(told), 'limit')}"
+        return Answer(
+            f"{capital(self.overall)} ({self.source}), {of}{why}.",
+            "\n".join(told[k] for k in shown),
+            self.warnings,
+            tables=("\n".join(["The other limits:", *others]),) if others else (),
+            more="the other limits",
+        )
+
+    def _row_words(self, row: dict[str, Any]) -> str:
+        sensor = row["kind"] == "sensor"
+        unit = vibration_unit_words(row["unit"]) if sensor else weight_unit_words(row["unit"])
+        at = "" if row["speed_rpm"] is None else f" at {self.labels.speed_words(row['speed_rpm'] / RPM)}"
+        within = "errors unknown" if row["low"] is None else f"{row['low']:.3g} … {row['high']:.3g} with 95 %"
+        value = f"{row['size']:.4g} {unit}".rstrip()
+        name = f"{row['kind']} {row['name']}{at}"
+        return f"  {name}: {value} ({within}), limit {row['limit']:.4g}: {row['verdict']}"
 
     def _columns(self) -> tuple[Column, ...]:
         labels = self.labels
@@ -242,7 +247,7 @@ def verdict_of_check(
         check_planes(W, used)
         errors = stack_errors(known, start, list(range(len(at))), chosen)
         own, common = (None, None) if errors is None else (errors.channels, errors.common)
-        names = reading_names(known.sensors, known.speeds)
+        names = reading_names(start.labels, known.sensors, known.speeds)
         found = fit_weights(Stack(W, Y, own, None, None, used, names, str, str, common), "least-squares")
         covariance, dof = (None, None) if errors is None else errors.weights(found)
         if errors is not None and not errors.explain(found.weights, POOR):

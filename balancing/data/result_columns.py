@@ -11,8 +11,14 @@ from numpy.typing import ArrayLike
 from balancing.data.conventions import Labels
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
-from rotorid.base.rpm import rpm
+from rotorid.base.rpm import RPM, rpm
 from rotorid.base.text import figures
+
+ROUNDING = 1e-12
+"""Predicted amplitudes below this share of the largest one before are rounding."""
+INVISIBLE = 1e-9
+"""Those below this share are zero to a reader."""
+_LARGEST = 3
 
 
 def known(values: FloatArray | None, shape: int | tuple[int, ...]) -> FloatArray:
@@ -57,13 +63,49 @@ def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -
     return weight_rows(labels, [planes[p] for p in there], weights[there])
 
 
-def reading_columns(speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
+def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
     """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
     turns = [rpm(speed) for speed in speeds]
+
+    def shown(speed_rpm: float) -> str:
+        return labels.speed_words(speed_rpm / RPM).partition(" ")[0]
+
     return (
-        Column("speed_rpm", np.repeat(turns, len(sensors)), "{:.6g}".format, "rpm"),
+        Column("speed_rpm", np.repeat(turns, len(sensors)), shown, labels.speed_in),
         Column("sensor", tuple(sensors) * len(turns), str),
     )
+
+
+def largest_readings(
+    labels: Labels,
+    speeds: FloatArray,
+    sensors: Sequence[str],
+    before: ComplexArray,
+    after: ComplexArray,
+    within: FloatArray | None = None,
+) -> str:
+    """The three largest readings (S, C) after in words, with those before: "probe 1 at 1220 rpm 3.36 → 0.05".
+
+    `within` is the radius of their 95 % region in the job's unit, NaN where it is not known; where nothing is
+    left, the three largest of these.
+    """
+    old, new = (labels.vibration(readings)[0] for readings in (before, after))
+    reach = known(within, old.shape)
+    size = new if new.max() > ROUNDING * old.max() else np.nan_to_num(reach)
+    share = np.round(size / (size.max() or 1.0), 6)  # equal ones in their order, whatever was rounded
+    words = []
+    for place in np.argsort(-share, axis=None, kind="stable")[:_LARGEST]:
+        s, c = divmod(int(place), len(sensors))
+        width = "" if np.isnan(reach[s, c]) else f" (± {figures(reach[s, c], 2)})"
+        left = f"{three_figures(old[s, c])} → {small(new[s, c], old.max())}{width}"
+        words.append(f"{sensors[c]} at {labels.speed_words(speeds[s])} {left}")
+    unit = f", {labels.vibration_in}" if labels.vibration_in else ""
+    return f"{unit}: {'; '.join(words)}."
+
+
+def small(value: float, scale: float) -> str:
+    """A predicted amplitude; rounding of an exact solution is zero to a reader."""
+    return "0" if value <= INVISIBLE * scale else three_figures(value)
 
 
 def covariance_column(labels: Labels, name: str, covariance: FloatArray | None, count: int) -> Column:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from balancing.data.conventions import Labels
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import percent
 
@@ -68,14 +69,14 @@ class TwoPositions:
             for size, angle in zip(found["masses"], solution["angles_deg"], strict=True)
         ]
 
-    def summary(self, labels: Labels) -> str:
-        """Text: both solutions."""
+    def answer(self, labels: Labels) -> Answer:
+        """Both solutions."""
         unit, (one, other) = labels.weight_in, self.masses * labels.weight_scale
-        lines = [f"{labels.weight_at(self.target)} from two weights:"]
+        lines = []
         for row, word in zip(self.angles, ("either", "or"), strict=True):
             a, b = labels.directions(row)
             lines.append(f"  {word:<6} {one:g} {unit} at {a:.1f}° and {other:g} {unit} at {b:.1f}°")
-        return "\n".join(lines)
+        return Answer(f"{labels.weight_at(self.target)} from two weights:", "\n".join(lines))
 
 
 @dataclass(frozen=True)
@@ -120,17 +121,14 @@ class Rounded:
         shown = labels.weight_entry(self.weight)
         return [{f"mass_{labels.weight_unit}": shown["mass"], "angle_deg": shown["angle_deg"]}]
 
-    def summary(self, labels: Labels) -> str:
-        """Text: the weight, and what rounding did to it."""
+    def answer(self, labels: Labels) -> Answer:
+        """The weight, and what rounding did to it."""
         scale, unit = labels.weight_scale, labels.weight_in
-        if not self.worst:
-            return labels.weight_at(self.weight)
-        return (
-            f"{labels.weight_at(self.weight)}\n"
-            f"instead of {labels.weight_at(self.wanted)}: error "
-            f"{abs(self.error) * scale:.3g} {unit} ({percent(self.relative_error)} %); with these steps at "
-            f"most {self.worst * scale:.3g} {unit}"
+        lost = (
+            f"Instead of {labels.weight_at(self.wanted)}: error {abs(self.error) * scale:.3g} {unit} "
+            f"({percent(self.relative_error)} %); with these steps at most {self.worst * scale:.3g} {unit}."
         )
+        return Answer(f"Mount {labels.weight_at(self.weight)}.", lost if self.worst else "")
 
 
 def two_positions(target: complex, mass_a: float, mass_b: float) -> TwoPositions:

@@ -7,7 +7,7 @@ therefore not of the correction D; it counts only where the plane's total is lim
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -183,6 +183,18 @@ def mounting(holes: Holes, counts: ArrayLike | None = None, amounts: ArrayLike |
         number = np.zeros(shape, dtype=np.int64) if counts is None else np.asarray(counts, dtype=np.int64)
         weight = number @ holes.pieces
     return Mounting(number, weight, complex(weight @ np.exp(1j * holes.angles)))
+
+
+def equal_together(contents: Iterable[tuple[str, str]]) -> list[str]:
+    """What is in each hole in words, equal contents once.
+
+    >>> equal_together([("10 g", "3"), ("2 × 10 g", "5"), ("10 g", "7")])
+    ['10 g in holes 3, 7', '2 × 10 g in hole 5']
+    """
+    same: dict[str, list[str]] = {}
+    for content, hole in contents:
+        same.setdefault(content, []).append(hole)
+    return [f"{what} in {'holes' if at[1:] else 'hole'} {', '.join(at)}" for what, at in same.items()]
 
 
 def _numbers(values: ArrayLike, what: str) -> FloatArray:

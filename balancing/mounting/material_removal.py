@@ -34,6 +34,7 @@ from typing import Any, Literal
 import numpy as np
 
 from balancing.data.conventions import Labels
+from rotorid.base.answer import Answer
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.text import counted
 
@@ -212,21 +213,20 @@ class Drilling:
         at = enumerate(labels.directions(self.angles), start=1)
         return [{"hole": k, "angle_deg": angle, **same} for k, angle in at]
 
-    def summary(self, labels: Labels) -> str:
-        """Text: where and how deep."""
+    def answer(self, labels: Labels) -> Answer:
+        """Where and how deep."""
         at = ", ".join(f"{a:.1f}°" for a in labels.directions(self.angles))
         tool, n = self.drill, len(self.angles)
         where = "towards the axis from" if tool.way == "radial" else "parallel to the axis at"
         deep = f"full diameter {1e3 * self.depth:.2f} mm deep" if self.depth else "only the tip goes in"
-        return "\n".join(
-            [
-                f"Instead of adding {labels.weight_at(self.target(labels))}, take away opposite:",
-                f"  {counted(n, 'hole')} of diameter {1e3 * tool.diameter:g} mm at {at}, {where} a "
-                f"radius of {1e3 * tool.radius:g} mm",
-                f"  {deep}, tip at {1e3 * self.tip_depth:.2f} mm",
-                f"  each takes away {1e3 * self.mass:.4g} g, {1e6 * self.unbalance:.5g} g·mm",
-            ]
+        lines = (
+            f"  {counted(n, 'hole')} of diameter {1e3 * tool.diameter:g} mm at {at}, {where} a radius of "
+            f"{1e3 * tool.radius:g} mm",
+            f"  {deep}, tip at {1e3 * self.tip_depth:.2f} mm",
+            f"  each takes away {1e3 * self.mass:.4g} g, {1e6 * self.unbalance:.5g} g·mm",
         )
+        weight = labels.weight_at(self.target(labels))
+        return Answer(f"Instead of adding {weight}, take away opposite:", "\n".join(lines))
 
 
 @dataclass(frozen=True)
@@ -261,13 +261,12 @@ class Grinding:
         angle = self.to_dict(labels)["angle_deg"]
         return [{"angle_deg": angle, "mass_g": 1e3 * self.mass, "radius_mm": 1e3 * self.radius}]
 
-    def summary(self, labels: Labels) -> str:
-        """Text: how much, and where."""
+    def answer(self, labels: Labels) -> Answer:
+        """How much, and where."""
         (angle,) = labels.directions(np.array([self.angle]))
-        return (
-            f"Instead of adding {labels.weight_at(self.target(labels))}, "
-            f"grind off {1e3 * self.mass:.5g} g at {angle:.1f}°, "
-            f"radius {1e3 * self.radius:g} mm ({1e6 * self.unbalance:.5g} g·mm)"
+        return Answer(
+            f"Instead of adding {labels.weight_at(self.target(labels))}, grind off {1e3 * self.mass:.5g} g "
+            f"at {angle:.1f}°, radius {1e3 * self.radius:g} mm ({1e6 * self.unbalance:.5g} g·mm)."
         )
 
 

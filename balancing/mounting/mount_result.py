@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_result import Correction, small
+from balancing.correction.correction_result import Correction
 from balancing.data.result_columns import (
     covariance_column,
+    largest_readings,
     reading_columns,
     rms,
+    small,
+    three_figures,
     vector_columns,
     weight_columns,
 )
 from balancing.mounting.discrete_weights import Discrete
+from balancing.mounting.holes import equal_together
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.text import figures, wrap
+from rotorid.base.text import figures
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from balancing.mounting.holes import Holes, Mounting
 
+_ANY = "any"
+"""Hole of a plane that takes any weight at any angle."""
 AGAINST = 3.0
 """Pieces that weigh more than this times what they make are said to act against each other."""
 
 
 @dataclass(frozen=True, eq=False)
-class Mounted:
+class Mounted(Answered):
     """Pieces in holes that leave the least vibration.
 
     Attributes
@@ -90,7 +98,7 @@ class Mounted:
         c, labels = self.correction, self.correction.labels
         actions = Column("action", [_action(c, plane) for plane in c.planes])
         residuals = (
-            *reading_columns(c.speeds, c.sensors),
+            *reading_columns(labels, c.speeds, c.sensors),
             *vector_columns(labels, "after", self.after),
             covariance_column(labels, "after_covariance", self.after_covariance, self.after.size),
         )
@@ -114,43 +122,49 @@ class Mounted:
         """One row per hole that gets something: plane, action, hole, angle_deg, mass, unit, pieces."""
         return frame(_columns(self))
 
-    def summary(self) -> str:
-        """Text: hole by hole, what is left of the vibration, and how sure the optimum is."""
+    @property
+    def answer(self) -> Answer:
+        """What goes into which hole and what it leaves; then hole by hole."""
         c, labels = self.correction, self.correction.labels
-        columns = _columns(self)
+        unit, columns = labels.vibration_in, _columns(self)
         used = columns[0].values
-        head = "What to mount, all planes together" if not c.remove else "What to mount or to remove"
-        stays = (
-            "" if self.on_top_of is None else f", in addition to what is mounted in run {self.on_top_of!r}"
-        )
-        lines = [*(f"Warning: {words}" for words in self.warnings), head + stays]
+        old, new, free = (labels.vibration(z)[0] for z in (c.before, self.after, c.after))
+        left = f"rms {three_figures(rms(old))} → {small(rms(new), old.max())} {unit}".rstrip()
+        what = "Mount or remove" if c.remove else "Mount"
+        stays = "" if self.on_top_of is None else f", beside what is mounted in run {self.on_top_of!r}"
+        lines = [f"Pieces in {labels.weight_in}{stays}:", *self._in_planes(columns)]
         if labels.assumed:
             said = " and ".join(labels.assumed)
-            lines.append(
-                wrap(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
-            )
-        lines.append(text(columns, left=2) if used else "  nothing: every piece would make it worse")
-        scale = float(labels.vibration(c.before)[0].max())
-        left = []
-        for z in (self.after, c.after):
-            size = labels.vibration(z)[0]
-            left.append(f"rms {small(rms(size), scale)}, largest {small(size.max(), scale)}")
-        lines.append(f"{labels.vibration_in} left: {left[0]}; with any weights {left[1]}".strip())
-        lines += [
-            f"Plane {plane}: nothing; no pieces that it can take make it better."
-            for plane in c.planes
-            if plane not in used
-        ]
-        if np.isfinite(self.plane_by_plane):
-            lines.append(
-                f"Plane by plane the nearest pieces would leave {self.plane_by_plane:.3g} times as much."
-            )
-        lines.append(
-            "No other choice of pieces is better (proven)."
-            if self.found.proven
-            else f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %."
+            lines.append(f"For {said} as assumed: if that is otherwise, state it and choose the pieces anew.")
+        largest = largest_readings(labels, c.speeds, c.sensors, c.before, self.after)
+        lines += ["", f"Largest predicted{largest}", self._proof()]
+        return Answer(
+            f"{what} these pieces: {left} (with any weights {small(rms(free), old.max())}).",
+            "\n".join(lines),
+            self.warnings,
+            tables=(f"Hole by hole:\n{text(columns, left=2)}",) if used else (),
+            more="hole by hole",
         )
-        return "\n".join(lines)
+
+    def _in_planes(self, columns: Sequence[Column]) -> list[str]:
+        shown = list(zip(*(column.values for column in columns), strict=True))
+        lines = []
+        for plane in self.correction.planes:
+            own = [row for row in shown if row[0] == plane]
+            words = [f"{figures(row[4])} at {row[3]:.1f}°" for row in own if row[2] == _ANY]
+            words += equal_together((row[6] or figures(row[4]), row[2]) for row in own if row[2] != _ANY)
+            gone = " (remove)" if plane in self.correction.remove else ""
+            nothing = "nothing; no pieces that it can take make it better"
+            lines.append(f"  {plane}{gone}: {', '.join(words) or nothing}")
+        return lines
+
+    def _proof(self) -> str:
+        sure = "No other choice of pieces is better (proven)"
+        if not self.found.proven:
+            sure = f"A better choice, if there is one, is better by at most {100 * self.found.gap:.2g} %"
+        if np.isfinite(self.plane_by_plane):
+            sure += f"; plane by plane the nearest would leave {self.plane_by_plane:.3g} times as much"
+        return f"{sure}."
 
 
 def _action(correction: Correction, plane: str) -> str:
@@ -163,7 +177,7 @@ def _columns(m: Mounted) -> tuple[Column, ...]:
     places: list[tuple[str, str, complex, str]] = []
     for plane, holes, mounting, weight in zip(c.planes, m.holes, m.found.mountings, m.weights, strict=True):
         if holes is None or mounting is None:
-            places.append((plane, "any", complex(weight), ""))
+            places.append((plane, _ANY, complex(weight), ""))
             continue
         for h in np.flatnonzero(mounting.amounts > 0):
             vector = mounting.amounts[h] * np.exp(1j * holes.angles[h])

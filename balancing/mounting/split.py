@@ -12,17 +12,18 @@ This minimises the error of one weight. What is left of the vibration is minimis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from balancing.data.conventions import Labels
 from balancing.mounting.free_amounts import FreeAmounts
-from balancing.mounting.holes import Holes, Mounting
+from balancing.mounting.holes import Holes, Mounting, equal_together
 from balancing.mounting.mountable_vectors import Attainable, nearest
 from balancing.mounting.piece_sums import PieceSums
-from rotorid.base.text import percent
+from rotorid.base.answer import Answer
+from rotorid.base.text import capital, counted, percent
 
 _PROVEN = 1e-9
 _TIE = 1e-10
@@ -117,20 +118,31 @@ class Split:
             "number_of_pieces": self.pieces,
         }
 
-    def summary(self, labels: Labels) -> str:
-        """Text: hole by hole, what they make together, and what is missing."""
-        sizes, angles = labels.weight([self.target, self.mounting.vector, self.error])
-        unit, what = labels.weight_in, ("wanted", "mounted", "error")
-        lines = [*self.lines(labels), ""]
-        for name, size, angle in zip(what, sizes, angles, strict=True):
-            share = f"   ({percent(self.relative_error)} %)" if name == "error" else ""
-            lines.append(f"{name:<8} {size:>10.5g} {unit} at {angle:5.1f}°{share}")
+    def in_holes(self, labels: Labels) -> list[str]:
+        """The same with equal contents together: "1 × 10 g in holes 7 (120°), 9 (150°)"."""
+        used = [int(h) for h in np.flatnonzero(self.mounting.amounts)]
+        angles = labels.directions(self.holes.angles[used])
+        return equal_together(
+            (self._content(h, labels), f"{self.holes.names[h]} ({_degrees(angle)})")
+            for h, angle in zip(used, angles, strict=True)
+        )
+
+    def answer(self, labels: Labels) -> Answer:
+        """What goes where, what it makes, and what is missing."""
+        made, wanted = labels.weight_at(self.mounting.vector), labels.weight_at(self.target)
+        error = f"error {percent(self.relative_error)} %"
+        error += f" ({labels.weight_at(self.error)})" if self.error else ""
+        many = counted(self.pieces, "hole" if self.holes.free_amounts else "piece")
+        what = f"in {many}" if self.holes.free_amounts else many
+        lines = [f"  {words}" for words in self.in_holes(labels)]
         if not self.proven:
             lines.append(
-                f"these holes have more combinations than can be tried: nothing better than an error of "
-                f"{self.bound * labels.weight_scale:.2g} {unit} exists"
+                f"These holes have more combinations than can be tried: nothing better than an error of "
+                f"{self.bound * labels.weight_scale:.2g} {labels.weight_in} exists."
             )
-        return "\n".join(lines)
+        if not self.pieces:
+            return Answer(f"{capital(self.lines(labels)[0])}, {wanted}.", "\n".join(lines))
+        return Answer(f"Mount {what}: {made} together, for {wanted}; {error}.", "\n".join(lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,15 +174,14 @@ class OnHoles:
             for row, words in zip(found["holes"], found["words"], strict=False)
         ]
 
-    def summary(self, labels: Labels) -> str:
-        """Text: what goes where, and what fewer pieces can do."""
-        lines = [self.nearest.summary(labels)]
-        if self.fewer:
-            lines += ["", "With fewer pieces:"]
+    def answer(self, labels: Labels) -> Answer:
+        """What goes where, and what fewer pieces can do."""
+        nearest = self.nearest.answer(labels)
+        lines = [nearest.found, *(["", "With fewer pieces:"] if self.fewer else [])]
         for one in self.fewer:
-            words = ", ".join(one.lines(labels))
+            words = ", ".join(one.in_holes(labels))
             lines.append(f"  {one.pieces}: error {percent(one.relative_error)} %: {words}")
-        return "\n".join(lines)
+        return replace(nearest, found="\n".join(lines))
 
 
 def split_on_holes(

@@ -24,14 +24,16 @@ from __future__ import annotations
 
 import re
 import textwrap
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rotorid.base.text import capital, counted
+from rotorid.base.text import capital, counted, cut
 
 LINES, COLUMNS = 24, 100
 _VARIABLE = re.compile(r"'[^']*'|[-+]?\d[\d.,]*(?:e[-+]?\d+)?")
 """What differs between two remarks of a kind: names and numbers."""
+_SIGN, _KEPT = re.compile(r"(?<=[±→]) "), "\u00a0"
 
 
 @dataclass(frozen=True)
@@ -68,16 +70,30 @@ class Answer:
             _wrapped(self.found.splitlines()), room - max(map(len, remarks[:1]), default=0)
         )
         told, untold = _fitting(remarks, room - len(found))
-        left = [self.more if self.tables else "", hidden, counted(untold, "more remark") if untold else ""]
-        rest = capital("; ".join(part for part in left if part))
+        left = [hidden, counted(untold, "more remark") if untold else "", self.more if self.tables else ""]
+        rest = cut(capital("; ".join(part for part in left if part)), COLUMNS - len(": --table."))
         return _joined(head, found, told, [f"{rest}: --table."] if rest else [])
 
     def whole(self) -> str:
         """Everything."""
         remarks = [_remark("Warning", each) for each in self.warnings]
         remarks += [_remark("Note", each) for each in self.notes]
-        parts = (self.judgement, self.found, *map("\n".join, remarks), *self.tables)
+        first = (_wrapped(part.splitlines()) for part in (self.judgement, self.found))
+        parts = (*map("\n".join, [*first, *remarks]), *self.tables)
         return "\n\n".join(part for part in parts if part)
+
+
+class Answered(ABC):
+    """A result that tells its answer; `summary` prints it."""
+
+    @property
+    @abstractmethod
+    def answer(self) -> Answer:
+        """The judgement and the answer first, and the tables behind them."""
+
+    def summary(self) -> str:
+        """For a terminal, at most 24 lines of at most 100 columns."""
+        return self.answer.brief()
 
 
 def together(answers: Iterable[Answer]) -> Answer:
@@ -89,7 +105,7 @@ def together(answers: Iterable[Answer]) -> Answer:
         tuple(dict.fromkeys(warning for one in each for warning in one.warnings)),
         tuple(dict.fromkeys(note for one in each for note in one.notes)),
         tuple(table for one in each for table in one.tables),
-        "; ".join(one.more for one in each if one.more),
+        "; ".join(dict.fromkeys(one.more for one in each if one.more)),
     )
 
 
@@ -105,11 +121,14 @@ def _kinds(word: str, clauses: Iterable[str]) -> list[list[str]]:
 
 
 def _remark(word: str, clause: str) -> list[str]:
-    return textwrap.wrap(f"{word}: {clause}", COLUMNS, subsequent_indent="  ")
+    return _wrapped([f"{word}: {clause}"])
 
 
 def _wrapped(lines: Iterable[str]) -> list[str]:
-    return [part for line in lines for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+    """Lines of at most `COLUMNS`; a sign stays beside its number."""
+    kept = (_SIGN.sub(_KEPT, line) for line in lines)
+    parts = [part for line in kept for part in textwrap.wrap(line, COLUMNS, subsequent_indent="  ") or [""]]
+    return [part.replace(_KEPT, " ") for part in parts]
 
 
 def _first(lines: list[str], room: int) -> tuple[list[str], str]:

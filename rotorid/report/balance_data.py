@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from balancing.correction.correction_result import HELD, INVISIBLE
-from balancing.data.result_columns import known, mounted_rows, reading_columns, vector_columns
+from balancing.correction.correction_result import HELD
+from balancing.data.result_columns import INVISIBLE, known, mounted_rows, reading_columns, vector_columns
 from balancing.solvers.error_propagation import region_radius
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.result import Column, rows
@@ -92,7 +92,7 @@ def _runs(trials: Trials) -> list[dict[str, Any]]:
             ]
             for place in np.ndindex(*size.shape[2:])
         ]
-        readings = (*reading_columns(trials.speeds, trials.sensors), Column("values", values))
+        readings = (*reading_columns(trials.labels, trials.speeds, trials.sensors), Column("values", values))
         weights = mounted_rows(trials.labels, trials.planes, trials.weights[r])
         found.append({"run": run, "weights": weights, "readings": rows(readings)})
     return found
@@ -106,7 +106,9 @@ def _slow_roll(job: Job) -> list[dict[str, Any]] | None:
     by_speed = job.slow_roll.ndim == 2
     speeds = trials.speeds if by_speed else np.full(1, np.nan)
     size, phase = vector_columns(trials.labels, "amplitude", job.slow_roll)
-    return rows((*reading_columns(speeds, trials.sensors), size, replace(phase, name="phase_deg")))
+    return rows(
+        (*reading_columns(trials.labels, speeds, trials.sensors), size, replace(phase, name="phase_deg"))
+    )
 
 
 def _influence(f: Influence) -> dict[str, Any]:
@@ -114,7 +116,7 @@ def _influence(f: Influence) -> dict[str, Any]:
     size = np.abs(f.W) * (f.labels.vibration_scale / f.labels.weight_scale)
     along, across = _widths(f)
     share = 100 * along / np.where(np.abs(f.W) > 0, np.abs(f.W), np.nan)
-    readings = reading_columns(f.speeds, f.sensors)
+    readings = reading_columns(f.labels, f.speeds, f.sensors)
     table = (
         *(replace(column, values=np.repeat(list(column.values), len(f.planes))) for column in readings),
         Column("plane", f.planes * (len(f.speeds) * len(f.sensors))),

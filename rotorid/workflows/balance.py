@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
+from rotorid.base.answer import Answer, together
 from rotorid.workflows.balance_verdict import judge
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import check_choices, file_of
@@ -184,12 +185,26 @@ class Balance(Parts):
             "history": self.history,
         }
 
-    def summary(self) -> str:
-        """For the terminal."""
-        text = super().summary()
+    @property
+    def answer(self) -> Answer:
+        """The judgement first: of limits, of the check run, of the pieces, or whether to mount at all."""
+        weights, sound = self.result.answer, self.result.sound
+        if sound and (self.check or self.mounted):
+            weights = replace(weights, judgement="")
+        if self.mounted:
+            weights = replace(weights, found="", tables=(weights.found, *weights.tables))
+        elif self.check:
+            first, _, predicted = weights.found.partition("\n\n")
+            weights = replace(weights, found=first, tables=(predicted, *weights.tables))
+        judged = [part.answer for part in (self.verdict, self.check, self.mounted) if part]
+        asked = [part.answer for part in (self.subsets, self.curve, self.history) if part]
+        found = together([*judged, weights, *asked] if sound else [weights, *judged, *asked])
+        notes = list(found.notes)
+        if self.check:
+            notes.insert(0, "--refine adds the check run, and gives the trim")
         if self.result.limits is not None and (self.subsets or self.curve):
-            text += "\n\nThe comparison of planes and the trade-off do not look at the limits."
-        return text
+            notes.append("the comparison of planes and the trade-off do not look at the limits")
+        return replace(found, notes=tuple(notes))
 
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from balancing.mounting.holes import Holes
     from balancing.mounting.material_removal import Drilling, Grinding
     from balancing.mounting.split import OnHoles
+    from rotorid.base.answer import Answer
     from rotorid.workflows.option_quantities import Amount, Vector
 
     Found = OnHoles | TwoPositions | Drilling | Grinding | Rounded
@@ -127,9 +128,10 @@ class SplitWeight(Outcome):
         """As JSON types, without the provenance."""
         return self.found.to_dict(self.labels)
 
-    def summary(self) -> str:
-        """For the terminal."""
-        return self.found.summary(self.labels)
+    @property
+    def answer(self) -> Answer:
+        """What to mount or to take away."""
+        return self.found.answer(self.labels)
 
     def to_frame(self) -> pd.DataFrame:
         """What is mounted or taken away, place by place."""

@@ -8,6 +8,7 @@ from math import inf, radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from rotorid.base.answer import Answer, together
 from rotorid.workflows.input_checks import job_source, refuse
 from rotorid.workflows.option_values import Names, degrees, names, number, one_of
 from rotorid.workflows.result_provenance import Outcome, log, provenance, workflow
@@ -111,9 +112,10 @@ class TrialWeights(Outcome):
             "conventions": self.weights[0].labels.conventions(),
         }
 
-    def summary(self) -> str:
-        """For the terminal."""
-        return "\n\n".join(weight.summary() for weight in self.weights)
+    @property
+    def answer(self) -> Answer:
+        """Those of the planes."""
+        return together(weight.answer for weight in self.weights)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per plane, speed and sensor."""

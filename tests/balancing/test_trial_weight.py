@@ -216,7 +216,7 @@ def test_force_with_an_angle_in_the_conventions_of_the_job():
     text = found.summary()
     assert "24.84 g" in text
     assert "105° against rotation (± 45°)" in " ".join(text.split())
-    assert max(len(line) for line in text.splitlines()) <= 80
+    assert max(len(line) for line in text.splitlines()) <= 100
     frame = found.to_frame()
     assert frame.mass[0] == pytest.approx(24.84, abs=0.005)
     arrow = plot(found).lines[0]

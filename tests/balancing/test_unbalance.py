@@ -273,8 +273,8 @@ def test_result_in_the_labels_units():
     assert list(frame["station"]) == ["DE", "NDE"]
     assert frame["determined"].all()
     lines = found.summary().splitlines()
-    assert lines[0] == "least-squares: the readings determine all 2 stations"
-    assert lines[2].split() == ["DE", "1000", "0.0°", "1", "yes"]
+    assert lines[0] == "The readings determine all 2 stations (least-squares)."
+    assert lines[3].split() == ["DE", "1000", "0.0°", "±", "1", "yes"]
     assert all(len(a) < 110 for a, _ in pairwise(lines))
 
 

@@ -199,7 +199,8 @@ def test_where_nobody_states_or_measures_errors_they_are_assumed_and_called_so()
     assert c.errors == ASSUMED == ReadingErrors(0.02, np.deg2rad(2.0))
     assert c.error_source == influence.run_errors.origin == "assumed"
     assert influence.run_errors.sizes[0] @ influence.run_errors.sizes[0] == pytest.approx(0.02**2)
-    assert "2 % of the amplitude, 2° (assumed" in c.summary().replace("\n", " ")
+    assert "assumed, 2 % of the amplitude, 2°: state them" in " ".join(c.summary().split())
+    assert "2 % of the amplitude, 2° (assumed" in c.answer.whole().replace("\n", " ")
     assert c.to_dict()["errors"]["between_runs"]["source"] == "assumed"
     assert not c.warnings
     assert "one more baseline run" in c.notes[0]

@@ -97,7 +97,7 @@ def test_choices_with_planes_that_act_alike_are_left_out_and_counted():
     found = best_subsets(W, Y, NAMES[:4], 2)
     assert set(found.planes) == {("A", "B"), ("B", "C")}
     assert (found.choices, found.dependent) == (2, 4)
-    assert "4 more choices have planes that act alike" in found.summary()
+    assert "4 more choices have planes that act alike" in found.answer.whole()
     with pytest.raises(UndeterminedError, match="planes of every choice of 2 act alike"):
         best_subsets(W[:, [0, 2]], Y, "AC", 2)
 
@@ -134,8 +134,10 @@ def test_tables_speak_the_units_of_the_job():
     np.testing.assert_allclose(
         weight["angle_deg"], np.degrees(np.angle(found.weights[0, 1])) % 360, rtol=1e-9
     )
-    lines = found.summary().splitlines()
-    assert lines[0] == "The best of 10 choices of 2 planes, by rms after correction (um_pp)"
+    best, rms = ", ".join(found.planes[0]), found.rms[0] * 2e6
+    assert f"by rms after correction (µm pp): {best}: {rms:.2f}; " in found.summary()
+    lines = found.answer.tables[0].splitlines()
+    assert lines[0] == "The best of 10 choices of 2 planes, by rms after correction (µm pp)"
     assert lines[1].split() == [
         "planes",
         "rms",

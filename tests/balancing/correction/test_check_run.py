@@ -203,7 +203,7 @@ def test_several_runs_share_the_errors_of_the_prediction():
             total += d @ np.linalg.solve(V, d)
     assert found.chi_square == pytest.approx(total, rel=1e-6)
     assert found.n == 4 * S * C
-    assert "sensor" in found.summary()
+    assert "sensor" in found.answer.whole()
     channels = influence.covariance.reshape(-1, 2 * P + 2, 2 * P + 2)
     alone = prediction_covariance(mounted[1], channels).reshape(S, C, 2, 2)
     np.testing.assert_allclose(
@@ -247,8 +247,10 @@ def test_without_known_errors_there_is_no_verdict():
     )
     assert found.improvement_predicted is None  # an exact solution leaves nothing
     assert found.improvement_achieved == pytest.approx(np.hypot(7.2, 13.5) / np.hypot(0.5, 1.0))
-    text = found.summary()
-    assert "predicted nothing left" in text
+    assert found.summary().startswith(
+        "Not judged: with the weights rms 10.8 → 0.791 (0 predicted). No verdict"
+    )
+    text = found.answer.whole()
     assert "std" not in text
     document = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert document["explained"] is None
@@ -302,8 +304,9 @@ def test_json_and_table_in_the_units_of_the_job():
     frame = found.to_frame()
     assert len(frame) == S * C
     assert frame["distance"].to_numpy() == pytest.approx(found.distance.ravel())
-    lines = found.summary().splitlines()
-    assert max(map(len, lines)) <= 80
+    assert found.summary().startswith("As predicted: ")
+    assert max(map(len, found.summary().splitlines())) <= 100
+    assert max(map(len, found.answer.tables[0].splitlines())) <= 80
     factors = found.improvement_predicted, found.improvement_achieved
     before, after = np.linalg.norm(found.before), np.linalg.norm(found.achieved)
     assert factors[1] == pytest.approx(before / after)

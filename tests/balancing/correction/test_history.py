@@ -62,18 +62,20 @@ def test_json_and_frame():
 
 
 def test_the_table():
-    lines = history(TRIALS, CHECK, limits=LIMITS).summary().splitlines()
+    made = history(TRIALS, CHECK, limits=LIMITS).answer
+    assert made.found == "Largest reading of each run: initial 6.00, trial 8.00, check 2.00."
+    lines = made.tables[0].splitlines()
     assert lines[0] == "History of the job"
     assert lines[1].split() == ["run", "mounted", "g", "rpm", "largest", "rms", "of", "limit"]
     assert lines[2].split() == ["initial", "nothing", "954.93", "4.00", "3.54", "200", "%", "!"]
     assert lines[4].split() == ["trial", "2.000", "at", "90°", "A", "954.93", "2.00", "1.58", "100", "%"]
     assert lines[6].split() == ["check", "3.000", "at", "0°", "A", "1909.86", "2.00", "2.00", "50.0", "%"]
-    assert "of limit" not in history(bruel_kjaer()).summary()
+    assert "of limit" not in history(bruel_kjaer()).answer.whole()
 
 
 def test_planes_below_each_other():
     trials, *_ = synthetic(np.random.default_rng(2), planes=3, speeds=1, weights=[[0, 0, 0], [1, 2, 3]])
-    lines = history(trials).summary().splitlines()
+    lines = history(trials).answer.tables[0].splitlines()
     assert [line.split()[-1] for line in lines[4:6]] == ["B", "C"]
 
 
@@ -99,5 +101,5 @@ def test_the_turbo_job_fits_a_page():
     read = read_job(SAMPLES / "turbo_job" / "checked.toml")
     made = history(read.trials, read.check, limits=read.limits)
     assert made.readings.shape[0] == len(read.trials.runs) + 1
-    assert max(map(len, made.summary().splitlines())) <= 80
+    assert max(map(len, made.answer.tables[0].splitlines())) <= 80
     assert made.rms[-1].max() < made.rms[0].max()

@@ -54,8 +54,11 @@ def test_trial_weights_left_in_of_feese_and_grazier():
     assert c.mounted[0] == "run 2"
     np.testing.assert_allclose(c.to_add + c.mounted[2], c.weights, rtol=1e-12)
     text = c.summary()
-    assert "total weights for the bare rotor" in text
-    assert "add" in text
+    assert "weights for the bare rotor" in text
+    line = next(line for line in text.splitlines() if line.startswith("  A "))
+    (mass, *_), (angle, *_) = c.labels.weight(c.to_add)
+    assert line.endswith(f"  {mass:.3f} at {angle:.1f}°")
+    assert "add if 'run 2' stays" in text
 
 
 @pytest.mark.parametrize("phase", ["lead", "lag"])

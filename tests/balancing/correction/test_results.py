@@ -87,10 +87,12 @@ def test_influence_frame():
 
 
 def test_the_text_fits_a_terminal(correction):
-    text = correction.summary()
-    assert max(map(len, text.splitlines())) <= 80
-    for words in ("2.951", "50.2°", "bare rotor", "rank 2 of 2", "condition number 2.48", "13.5"):
+    text, whole = correction.summary(), correction.answer.whole()
+    assert max(map(len, text.splitlines())) <= 100
+    for words in ("2.951", "50.2°", "bare rotor", "13.5"):
         assert words in text
+    for words in ("rank 2 of 2", "condition number 2.48", *correction.answer.tables):
+        assert words in whole
     assert ("95 %" in text) == (correction.covariance is not None)
 
 
@@ -99,17 +101,19 @@ def test_long_names_and_many_warnings_fit_too():
     labels = Labels("mil_pp", 1e3, "oz", 35.27, "lag", "against rotation")
     c = correct(estimate_influence(feese_grazier(errors=ERRORS, sensors=sensors, labels=labels)))
     text = c.summary()
-    assert max(map(len, text.splitlines())) <= 80
+    assert max(map(len, text.splitlines())) <= 100
+    assert len(text.splitlines()) <= 24
     assert "against the rotation; phases as lag" in text
-    assert "mil_pp" in text
+    assert "mil pp" in text
+    assert max(len(line) for table in c.answer.tables for line in table.splitlines()) <= 80
 
 
-def test_warnings_come_first():
+def test_a_warning_is_told_in_the_brief_text():
     apart = bruel_kjaer()
     again = np.concatenate((apart.readings[0], 1.5 * apart.readings[0, :1]))
     c = correct(estimate_influence(job(again, np.vstack((apart.weights, [[0, 0]])))), refuse=False)
     assert "runs 'run 0' and 'run 3' have the same weights mounted" in c.warnings[0]
-    assert c.summary().index("have the same weights mounted") < c.summary().index("Corrections")
+    assert "Warning: runs 'run 0' and 'run 3' have the same weights mounted" in c.summary()
 
 
 def test_the_95_percent_of_the_text_is_that_of_the_numbers():
@@ -166,3 +170,16 @@ def test_many_speeds_and_sensors_are_drawn_too(tmp_path):
     texts = [text.get_text() for text in upper.get_xticklabels()]
     assert texts == [f"{v * 30 / np.pi:.6g}" for v in c.speeds[::2]]
     assert upper.get_xticks()[0] < upper.get_xticks()[1]
+
+
+def test_speeds_in_the_unit_of_the_readings():
+    trials, _, _ = synthetic(np.random.default_rng(3), speeds=2)
+    turns = replace(trials, speeds=np.array([20.0, 25.5]) * 2 * np.pi)
+    hertz = replace(turns, labels=replace(trials.labels, speed_unit="Hz"))
+    told, usual = (correct(estimate_influence(made)).answer for made in (hertz, turns))
+    assert " at 20 Hz " in told.brief()
+    assert " rpm" not in told.whole()
+    head, *rows = told.tables[1].splitlines()[1:]
+    assert head.split()[0] == "Hz"
+    assert {row.split()[0] for row in rows[:-1]} == {"20", "25.5"}
+    assert " at 1530 rpm " in usual.whole()

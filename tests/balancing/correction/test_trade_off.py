@@ -100,8 +100,8 @@ def test_the_curve_of_an_exact_plane_is_straight_and_has_no_knee():
     np.testing.assert_allclose(found.objective / found.objective[0], 1 - found.totals / 2, atol=1e-6)
     np.testing.assert_allclose(found.totals, [0, 0.5, 1, 1.5, 2], atol=1e-6)
     assert found.knee is None
-    assert found.summary().endswith(
-        "The curve has no clear knee: the last weights pay nearly as well as the first."
+    assert found.summary().startswith(
+        "There is no clear knee: the last weights pay nearly as well as the first."
     )
     assert found.to_dict()["knee"] is None
 
@@ -152,8 +152,9 @@ def test_tables_speak_the_units_of_the_job():
     data = json.loads(json.dumps(found.to_dict()))
     assert data["knee"] == found.knee
     assert [w["plane"] for w in data["points"][3]["weights"]] == ["A", "B", "C"]
-    lines = found.summary().splitlines()
-    assert lines[0] == "The least rms that a total weight leaves (um_pp)"
+    assert found.answer.judgement.startswith(f"The knee: {found.totals[found.knee] * 1e3:.3g} of ")
+    lines = found.answer.tables[0].splitlines()
+    assert lines[0] == "The least rms that a total weight leaves (µm pp)"
     assert [i for i, line in enumerate(lines) if line.endswith("← knee")] == [2 + found.knee]
     assert lines[2].split() == ["0", *lines[2].split()[1:3], "0", "%"]
     assert max(map(len, lines)) <= 80
@@ -164,7 +165,7 @@ def test_a_rotor_without_vibration_has_one_point():
     assert found.totals.tolist() == [0.0]
     assert found.knee is None
     assert found.to_frame()["max_after"].tolist() == [0.0]
-    assert found.summary().endswith("There is nothing to take away.")
+    assert found.summary().startswith("There is nothing to take away.")
 
 
 def test_the_picture_holds_the_curve_the_knee_and_the_weights():

@@ -100,7 +100,7 @@ def test_more_than_can_be_listed_has_an_honest_bound():
     assert not found.proven
     assert found.bound <= abs(found.error) < 2e-3 * 0.05
     assert (found.mounting.counts.sum(axis=0) <= 9).all()
-    assert "more combinations than can be tried" in found.summary(GRAMS)
+    assert "more combinations than can be tried" in found.answer(GRAMS).brief()
     plenty = split(0.05j, from_list(angles, [0.01, 0.02, 0.03], per_hole=2))
     assert abs(plenty.error) < 1e-4 * 0.05
     # a plane limited to less than the target: nothing better than the limit's circle, nearly reached

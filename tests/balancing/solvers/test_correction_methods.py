@@ -76,7 +76,7 @@ def test_truth_lies_in_the_weighted_region():
 def test_unbalance_outside_the_planes_is_said_by_the_weighted_fit():
     trials, D = job(outside=0.5, effect=1.5)
     found = correct(estimate_influence(trials), method="weighted")
-    assert any("unbalance outside the planes" in w for w in found.warnings)
+    assert any("unbalance elsewhere" in w for w in found.warnings)
     d = (found.weights - D).view(float)
     assert d @ np.linalg.solve(found.covariance, d) < 18.47  # χ² with 4, 99.9 %
     assert (found.mass_std < 0.2 * np.abs(D)).all()
@@ -271,7 +271,7 @@ def test_a_method_is_one_entry(monkeypatch):
     found = correct(influence, method="mine")
     np.testing.assert_array_equal(found.weights, correct(influence, method="least-squares").weights)
     assert found.to_dict()["method"] == "mine"
-    assert "Mine: the answer is that of least squares." in " ".join(found.summary().split())
+    assert "Mine: the answer is that of least squares." in " ".join(found.answer.whole().split())
 
 
 @pytest.mark.parametrize(

@@ -83,21 +83,22 @@ def test_one_of_both_answers_is_right(cli, tmp_path, runs, phase, angles):
 def test_the_first_lines_say_so(cli, tmp_path):
     files = shop(tmp_path, ON_AXIS)
     text = cli("balance", *files, "--amplitude-error", 1, "--phase-error", 1).out
-    first = " ".join(text.split("\n\n")[0].split())
+    assert text.startswith("Mount these weights, if phases lead as assumed: ")
+    first = " ".join(text.split("\nWarning: ")[1].split())
     assert first.startswith("Neither the job nor the command line says whether phases lead or lag; lead is")
     assert "The runs cannot tell: none is more than the planes need." in first
-    assert "If it is lag, the weights go to the angles under “if lag”." in first
+    assert "If it is lag, the weights go to the angles under “if lag”" in first
     head = next(line for line in text.splitlines() if line.strip().startswith("plane"))
-    assert head.split()[-2:] == ["if", "lag"]
+    assert "  if lag  add if 'r2' stays" in head
     document = cli("balance", *files, "--json").json
     rows = [line for line in text.splitlines() if line.strip().startswith(PLANES)]
     for row, line in zip(document["other_readings"], rows, strict=False):
         assert f"{row['angle_deg']:.1f}°" in line
     assert "phases as lead (phase assumed)" in text
-    assert max(map(len, text.splitlines())) <= 80
+    assert max(map(len, text.splitlines())) <= 100
     assert document["assumptions"][0] in first
-    added = text[text.index("The same rotor") :]
-    assert "if lag" in added[: added.index("Vibration")]
+    whole = cli("balance", *files, "--amplitude-error", 1, "--phase-error", 1, "--table").out
+    assert "\nTo add to that if it is lag (g): left " in whole[: whole.index("\nVibration")]
 
 
 @pytest.mark.parametrize("runs", [ON_AXIS, OFF_AXIS])
@@ -108,7 +109,8 @@ def test_what_is_stated_is_not_said_again(cli, tmp_path, runs, phase, angles):
     assert outcome.json["conventions"]["assumed"] == outcome.json["assumptions"] == []
     assert outcome.json["other_readings"] == []
     text = cli("balance", *files, *said(phase, angles)).out
-    assert text.startswith("Corrections")
+    assert text.startswith("Mount these weights: ")
+    assert "assumed)" not in text[: text.index("Largest predicted")]
 
 
 @pytest.mark.parametrize(
@@ -184,7 +186,8 @@ def test_redundant_runs_confirm(cli, tmp_path, seed, phase, given):
     assert document["assumptions"][1].startswith(f"The runs themselves confirm '{name}': χ² ")
     assert not any("contradict" in words for words in document["warnings"])
     text = cli("balance", *files, *said(phase, "with")).out
-    assert text.startswith("Corrections")
+    assert text.startswith("Mount these weights: ")
+    assert "assumed)" not in text[: text.index("Largest predicted")]
 
 
 def test_both_assumed_and_confirmed_needs_no_other_angles(cli, tmp_path):
@@ -228,6 +231,9 @@ def test_a_check_run_is_asked_too(cli, tmp_path, assumed):
     document = cli("balance", job, "--json").json
     assert document["convention_test"]["verdict"] == "contradicted"
     assert document["warnings"][0].startswith("these runs contradict 'lead'")
+    lines = cli("balance", job).out.splitlines()
+    assert lines[0].startswith("Do not mount anything yet: these runs contradict 'lead'")
+    assert not any(line.startswith("Warning: these runs contradict") for line in lines)
 
 
 def test_stored_coefficients(cli, tmp_path):

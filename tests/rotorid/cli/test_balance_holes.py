@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -46,8 +48,15 @@ def test_prediction_of_what_is_mounted():
     assert m.after_covariance.shape == (*m.after.shape, 2, 2)
     assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
     text = m.summary()
-    assert "No other choice of pieces is better (proven)." in text
-    assert "2 × 150.0" in text or "150.0" in text
+    assert "No other choice of pieces is better (proven); plane by plane" in text
+    assert text.startswith("Mount these pieces: ")
+    for holes, mounting in zip(m.holes, m.found.mountings, strict=True):
+        for hole, counts in zip(holes.names, mounting.counts.sum(axis=1), strict=True):
+            pieces = "2 × 150.0" if counts == 2 else "150.0"
+            said = re.compile(rf"\b{pieces} in holes? [^×]*\b{hole}\b")
+            lines = [line for line in text.splitlines() if said.search(line)]
+            assert bool(lines) or not counts
+    assert m.answer.tables[0].startswith("Hole by hole:")
 
 
 def job_with(tmp_path, text):

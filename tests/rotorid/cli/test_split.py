@@ -48,8 +48,9 @@ def test_holes_pieces_and_what_is_taken(run, tmp_path):
     assert document["relative_error"] == pytest.approx(abs(error) / 35, rel=1e-9)
     outcome = run(*args, "--plot", tmp_path / "d.png", "--output", tmp_path / "t.csv")
     assert outcome.code == 0, outcome.err
-    for words in document["words"]:
-        assert words in outcome.out
+    assert document["words"] == ["1 × 20 g in hole 7 (at 90°)", "1 × 20 g in hole 11 (at 150°)"]
+    assert outcome.out.startswith("Mount 2 pieces: ")
+    assert "\n  1 × 20 g in holes 7 (90°), 11 (150°)\n" in outcome.out
     assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
     table = pd.read_csv(tmp_path / "t.csv", encoding="utf-8-sig")
     assert list(table["mass_g"]) == [row["mass"] for row in document["holes"]]

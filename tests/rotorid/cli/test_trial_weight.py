@@ -113,7 +113,7 @@ def test_limit_of_a_plane(cli, weights):
     outcome = cli("trial-weight", TURBO, "--plane", "left", "--max-mass", "100", "--mass", "150g_mm")
     assert outcome.code == 2
     assert (
-        "the trial weight of 150 g_mm is larger than the largest weight of plane 'left', 100 g_mm"
+        "the trial weight of 150 g·mm is larger than the largest weight of plane 'left', 100 g·mm"
         in outcome.err
     )
     outcome = cli("trial-weight", *FORCE, "--max-mass", "20g")

@@ -28,7 +28,7 @@ def balance(cli, name, *options):
         ),
         (
             "one_digit",
-            ["the readings have one digit (steps of 0.10 um_pp, readings of 0.29 um_pp)", "17.02 g ± "],
+            ["the readings have one digit (steps of 0.10 µm pp, readings of 0.29 µm pp)", "17.02 g ± "],
             ["repeat the trial run of plane 'P1'", "read the instrument in a range that shows more digits"],
         ),
         (
@@ -45,7 +45,9 @@ def test_the_first_line_says_that_the_weights_cannot_be_meant(cli, method, name,
     first, *rest = re.split(r"\n(?=Instead|Or)", ran.out.split("\n\n")[0])
     first, rest = " ".join(first.split()), " ".join(" ".join(rest).split())
     assert first.startswith("Do not mount these weights: ")
-    assert re.search(r"with the weights, expect rms \S+ \S+ rather than .*; without them it is ", first)
+    assert re.search(
+        r"with the weights, expect rms \S+ (µm pp|mm/s rms) rather than .*; without them it is ", first
+    )
     for words in says:
         assert words in first
     for words in instead:
@@ -71,9 +73,9 @@ def test_planes_that_act_alike_with_stated_errors_are_refused_with_what_to_do(cl
     lines = ran.err.splitlines()
     assert "planes 'P1' and 'P2' act alike at every sensor and speed" in lines[0]
     assert lines[1].startswith(
-        "Instead: plane 'P2' alone (--planes P2; 1.778 g) would leave rms 13.5 um_pp, at most"
+        "Instead: plane 'P2' alone (--planes P2; 1.778 g) would leave rms 13.5 µm pp, at most"
     )
-    assert lines[2].startswith("Or: --ridge 0.3 would leave rms 13.3 um_pp, at most")
+    assert lines[2].startswith("Or: --ridge 0.3 would leave rms 13.3 µm pp, at most")
     assert lines[3].startswith("Or: add a sensor or a speed")
 
 
@@ -112,4 +114,4 @@ def test_the_sheet_begins_with_the_judgement(cli, tmp_path):
 def test_best_planes_leave_out_the_one_that_fights(cli):
     row = balance(cli, "alike_planes", "--best-planes", "1", "--json").json["best_planes"]["rows"][0]
     assert row["rms_expected"] > row["rms_after"]
-    assert "expected" in balance(cli, "alike_planes", "--best-planes", "1").out
+    assert "expected" in balance(cli, "alike_planes", "--best-planes", "1", "--table").out

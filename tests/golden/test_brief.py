@@ -1,0 +1,81 @@
+"""What is printed fits a terminal and begins with the judgement; the stored texts are computed anew."""
+
+import re
+
+import pytest
+
+from golden.cases import CASES, TEXT
+from golden.storing import read
+from rotorid.base.answer import COLUMNS, LINES
+from rotorid.samples import sample_data
+from rotorid.workflows import BalanceOptions, balance
+
+NO_ANSWER = ("schema", "--version")
+"""What they print is no answer."""
+JUDGEMENTS = {
+    "balance": r"(Mount|Remove) (these|this|nothing)|Do not mount|Measure again|"
+    r"(Pass|Fail|Not decidable) \(|As predicted: |Not as predicted: |Not judged: |written: ",
+    "split": r"Mount |Instead of adding .*(take away opposite:|grind off )|.* from two weights:$",
+    "trial-weight": r"Trial weight in plane ",
+    "tolerance": r"G[\d.]+ for .*: permissible residual unbalance [\d.]+ g·mm",
+    "unbalance": r"The readings determine ",
+}
+"""How the first line begins."""
+
+
+def answered(case):
+    told = case.stored and TEXT in case.forms and case.words[0] not in NO_ANSWER
+    return told and "\nstatus 0" in read(case.name)[0]["status"]
+
+
+def complaints(words, output):
+    lines = output.rstrip("\n").splitlines()
+    found = [f"{len(lines)} lines"] if len(lines) > LINES and "--table" not in words else []
+    found += [f"{len(line)} columns: {line}" for line in lines if len(line) > COLUMNS]
+    found += [f"a token for a unit: {line}" for line in lines if re.search(r"\d (g_mm|um_pp)", line)]
+    if not re.match(JUDGEMENTS.get(words[0], ""), lines[0]):
+        found.append(f"no judgement: {lines[0]}")
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if answered(case)])
+def test_an_answer_fits_a_terminal_and_begins_with_the_judgement(name):
+    assert not complaints(CASES[name].words, read(name)[0]["output"])
+
+
+@pytest.mark.parametrize(
+    ("output", "words"),
+    [
+        ("Mount these weights: rms 3 → 1.\n" + 24 * "more\n", "25 lines"),
+        ("Mount these weights: rms 3 → 1.\n" + 101 * "x", "101 columns"),
+        ("Corrections\nMount these weights.", "no judgement: Corrections"),
+        ("Mount these weights: 3 g_mm", "a token for a unit: Mount these weights: 3 g_mm"),
+    ],
+)
+def test_what_does_not_fit_is_found(output, words):
+    assert complaints(["balance", "job.toml"], output)[0].startswith(words)
+    assert not complaints(["balance", "job.toml"], "Mount these weights: rms 3 → 1.\n" + 23 * "more\n")
+
+
+JOBS = {
+    "job.toml": {"best_planes": 2, "trade_off": True, "history": True},
+    "checked.toml": {"limit": ("2",), "history": True},
+    "holes.toml": {"split": True},
+}
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_nothing_is_lost_and_nothing_printed_twice(job):
+    found = balance(sample_data() / "turbo_job" / job, BalanceOptions(**JOBS[job]))
+    answer, whole = found.answer, found.answer.whole()
+    assert found.summary() == answer.brief()
+    assert len(answer.tables) >= 3
+    for table in answer.tables:
+        assert whole.count(table) == 1
+        assert table not in found.summary()
+    for words in (*answer.warnings, *answer.notes):
+        assert " ".join(whole.split()).count(words) == 1
+    readings = re.findall(r"^  +\d+  probe \d .*$", whole, re.M)
+    each = 2 if found.check else 1  # predicted, and read in the check run
+    assert len(readings) == each * len(found.result.speeds) * len(found.result.sensors)
+    assert whole.splitlines()[0] == found.summary().splitlines()[0]
