@@ -42,6 +42,7 @@ def balance_report(
     job: Job,
     provenance: Mapping[str, Any],
     *,
+    judgement: str,
     mounted: Mounted | None = None,
     verdict: Verdict | None = None,
     curve: TradeOff | None = None,
@@ -58,6 +59,8 @@ def balance_report(
         The correction, its coefficients, and the job of both.
     provenance
         Program version, input files with hashes, date and options.
+    judgement
+        What to do: the lines of the answer's.
     mounted
         Pieces in the holes of the planes, where they were chosen.
     verdict
@@ -91,7 +94,7 @@ def balance_report(
         "coefficients": _coefficients(influence, job, provenance),
         "turn": _turn(result),
         "turning": labels.turning_in_words(),
-        "speed": labels.speed_unit.replace("_", "/"),
+        "speed": labels.speed_in,
         "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
     }
     return render_report(
@@ -99,7 +102,7 @@ def balance_report(
         whole,
         title=f"Balancing sheet: {name}",
         warnings=[sentence(words) for words in every_warning(document)],
-        judgement=_judgement(document, result),
+        judgement=judgement.splitlines(),
         provenance=provenance,
         job_files=[path.name for path in job.files],
         text=text,
@@ -133,25 +136,6 @@ def _name(job: Job) -> str:
     if folder in ("", own):
         return own
     return folder if own.casefold() in ("job", "runs") else f"{folder}, {own}"
-
-
-def _judgement(document: Mapping[str, Any], result: Correction) -> list[str]:
-    """What to do, in sentences."""
-    check, verdict, mounting = (document.get(part) for part in ("check", "verdict", "mounting"))
-    said = list(result.decision.lines())
-    if check is not None:
-        said = [
-            f"Check run: {check['verdict']}.",
-            "Do not mount the weights below again: they are for the bare rotor. What to add to the machine as "
-            "it stands says --refine.",
-            *said,
-        ]
-    elif not said:
-        what = "weights" if mounting is None else "pieces"
-        on_top = mounting and mounting["on_top_of"]
-        bare = f"in addition to what is mounted in run “{on_top}”" if on_top else "on the bare rotor"
-        said = [f"Mount the {what} below, {bare}."]
-    return said if verdict is None else [f"{verdict['verdict']} ({verdict['source']}).".capitalize(), *said]
 
 
 def _method(result: Correction) -> str:

@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.plot_style import TEXT
 from rotorid.base.rpm import RPM
 from rotorid.base.unit_words import speed_words
 from rotorid.report.conventions_explained import plain
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from balancing import Correction
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 
 ROWS_SHOWN = 60
 """Readings in one figure; beyond that the largest ones are shown."""
-_WIDTH, _REACH, _TALL = 3.4, (1.8, 2.15), 1.42
+_WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42
 """Of a picture of a plane: inches on paper; half its width (of two, of more planes) and height in radii."""
 
 
@@ -66,10 +64,11 @@ def plane_figure(
     if mounted is not None and mounting is None and mounted.weights[p] != 0:
         loose = (complex(mounted.weights[p]),)
     with mpl.rc_context({"font.size": 10.0}):
-        lines = 1 + 2 * (mounted is not None) + (tolerance is not None)
+        arcs = () if result.limits is None else result.limits.forbidden[p]
+        lines = 1 + 2 * (mounted is not None) + (tolerance is not None) + bool(arcs)
         reach = _REACH[len(result.planes) > 2]
         axes = _WIDTH * _TALL / reach
-        height = axes + 0.42 + 0.15 * lines  # a title above the axes, lines of text below
+        height = axes + 0.37 + 0.15 * lines  # a title above the axes, lines of text below
         figure = Figure(figsize=(_WIDTH, height))
         ax = figure.add_axes((0.0, 1 - (axes + 0.25) / height, 1.0, axes / height))
         disc(
@@ -82,26 +81,11 @@ def plane_figure(
             weight=wanted,
             tolerance=tolerance,
             loose=loose,
+            forbidden=arcs,
             clockwise=labels.drawn_sign < 0,
         )
         ax.set(xlim=(-reach, reach), ylim=(-_TALL, _TALL))
-        _forbidden(ax, result, p)
-        for text in ax.texts:
-            text.set_fontsize(max(text.get_fontsize(), TEXT))
-            if text.get_ha() != "center":  # beside the disc there is little room
-                text.set_text(text.get_text().replace(f" {labels.weight_in}", f"\n{labels.weight_in}"))
     return figure
-
-
-def _forbidden(ax: Axes, result: Correction, p: int) -> None:
-    """Hatch the arcs of a plane where nothing can be mounted, as it is seen in the picture."""
-    from matplotlib.patches import Wedge
-
-    turn = 180.0 * (result.planes[p] in result.remove)
-    for start, width in () if result.limits is None else result.limits.forbidden[p]:
-        ends = result.labels.drawn_sign * (np.degrees([start, start + width]) + turn)
-        wedge = Wedge((0, 0), 1.0, *sorted(ends), width=0.12, fc="0.9", ec="0.4", hatch="xxxx", lw=0.8)
-        ax.add_patch(wedge)
 
 
 def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str = "rpm") -> Figure:

@@ -235,6 +235,7 @@ class Balance(Parts):
             self.influence,
             self.job,
             self.provenance,
+            judgement=self.answer.judgement,
             mounted=self.mounted,
             verdict=self.verdict,
             curve=self.curve,
