@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from balancing.correction.correction_result import Correction, small
 from balancing.data.result_columns import rms
 from balancing.plots.amplitude_bars import amplitudes, left_is_small, sizes_of, unit
 from balancing.solvers.error_propagation import region_edge
@@ -27,8 +26,12 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
     from balancing.correction.check_run_result import CheckComparison
+    from balancing.correction.correction_result import Correction
     from balancing.data.conventions import Labels
     from balancing.data.trials import Trials
+
+_NOTHING = 1e-9
+"""Share of the vibration before that is nothing to a reader."""
 
 
 def draw_correction(c: Correction, ax: Axes | None = None) -> Figure | Axes:
@@ -178,7 +181,8 @@ def _headline(c: Correction, check: CheckComparison | None) -> str:
     if check is not None:
         values = [check.before, check.predicted[-1], check.achieved[-1]]
         word = {True: "As predicted", False: "Not as predicted", None: "Check run"}[check.explained]
-    words = [f"{small(rms(z) * scale, rms(c.before) * scale)} {unit}".rstrip() for z in values]
+    sizes = [rms(z) * scale if rms(z) > _NOTHING * rms(c.before) else 0.0 for z in values]
+    words = [f"{figures(size, 3)} {unit}".rstrip() for size in sizes]
     told = zip(words, ("before", "predicted", "achieved"), strict=False)
     return f"{word}: rms {', '.join(' '.join(pair) for pair in told)}"
 

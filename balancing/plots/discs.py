@@ -99,7 +99,7 @@ def disc(  # noqa: PLR0913
     _dial(ax, labels, clockwise, where)
     reach = _room(where)
     if holes is not None:
-        _draw_holes(ax, holes, turn, reach / np.sqrt(largest), clockwise)
+        _draw_holes(ax, holes, mounting, turn, reach / np.sqrt(largest), clockwise)
     for w in where:
         _draw_weight(ax, w, reach * np.sqrt(abs(w) / largest), clockwise, remove)
     _draw_forbidden(ax, forbidden, turn, clockwise)
@@ -266,7 +266,9 @@ def _dial(ax: Axes, labels: Labels, clockwise: bool, places: Sequence[complex]) 
     ax.plot(0.965, 0, marker=(3, 0, 90), color="black", ms=9, zorder=5)
 
 
-def _draw_holes(ax: Axes, holes: Holes, turn: float, scale: float, clockwise: bool) -> None:
+def _draw_holes(
+    ax: Axes, holes: Holes, mounting: Mounting | None, turn: float, scale: float, clockwise: bool
+) -> None:
     """Numbered circles; hatched, radius scale × √weight, where something is mounted already."""
     from matplotlib.patches import Circle
 
@@ -279,7 +281,8 @@ def _draw_holes(ax: Axes, holes: Holes, turn: float, scale: float, clockwise: bo
         if holes.taken[h] > 0:
             reach = max(scale * np.sqrt(holes.taken[h]), 0.035)
             ax.add_patch(Circle(centre, reach, fc="0.85", ec="0.3", hatch="////", lw=0.9, zorder=3))
-        if count <= _CROWD or h % (count // _CROWD + 1) == 0 or holes.taken[h] > 0:
+        used = mounting is not None and mounting.amounts[h] > 0
+        if count <= _CROWD or h % (count // _CROWD + 1) == 0 or used:
             x, y = _at((_NUMBERS - 0.14 * (h % 2) * (count > _CROWD // 2)) * way, clockwise)
             ax.text(x, y, holes.names[h], ha="center", va="center", fontsize=TEXT)
 

@@ -53,7 +53,7 @@ def residuals(v: Verdict, ax: Axes | None = None, t: Tolerance | None = None) ->
         raise ValueError("this verdict has no planes to draw: give a tolerance")
     ax = _rotor(ax, {key: row.limit * scale for key, row in rows.items()}, t)
     sizes = [size * scale for row in rows.values() for size in (row.low or row.size, row.limit) if size > 0]
-    bottom = float(10 ** np.floor(np.log10(0.7 * min(sizes, default=1.0))))
+    bottom = float(10 ** np.floor(np.log10(max(0.7 * min(sizes), 1e-5 * max(sizes)))))
     for at, key in enumerate(sorted(rows, key=lambda key: _position(key, t))):
         _residual(ax, at, rows[key], v, bottom)
     ax.set_yscale("log")
@@ -77,7 +77,7 @@ def _residual(ax: Axes, at: int, row: Judgement, v: Verdict, bottom: float) -> N
     text = f"{figures(size, 2)} at {angle:.0f}°"
     if row.low == 0 and row.high is not None:  # then the angle is not known either
         text = f"up to {figures(row.high * v.labels.weight_scale, 2)}"
-    note(ax, f"{text}\n{row.verdict}", (at - 0.3, max(size, bottom)), (8, 0), va="center")
+    note(ax, f"{text}\n{row.verdict}", (at - 0.3, max(size, bottom)), (8, -2), va="bottom")
 
 
 def _position(key: tuple[str, str], t: Tolerance | None) -> float:

@@ -90,12 +90,8 @@ def choices(found: Subsets, ax: Axes) -> Axes:
     at = np.arange(shown)
     bars: dict[str, Any] = {"color": "0.86", "edgecolor": "0.5", "lw": 0.6}
     ax.barh(at, found.expected[:shown] * scale, 0.7, **bars, label="rms expected in a check run")
-    for values, marker, label in (
-        (found.rms, "o", "rms predicted"),
-        (found.largest, ">", "largest predicted"),
-    ):
-        ax.plot(values[:shown] * scale, at, marker, color="black", ms=5, label=label)
-    ax.axvline(found.rms_before * scale, color="black", ls="--", lw=1.2, label="rms before")
+    ax.plot(found.rms[:shown] * scale, at, "o", color="black", ms=5, label="rms predicted")
+    ax.plot(found.largest[:shown] * scale, at, ">", color="black", ms=5, label="largest predicted")
     ax.set_yticks(at, [", ".join(names) for names in found.planes[:shown]], fontsize=TEXT)
     ax.set_ylim(shown - 0.5, -0.5)
     ax.set_xlim(left=0)

@@ -102,7 +102,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str =
     """
     from matplotlib.figure import Figure
 
-    from balancing.plots.amplitude_bars import before_and_after
+    from balancing.plots.amplitude_bars import before_and_after, left_is_small
 
     if len(rows) > ROWS_SHOWN:
         largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
@@ -116,10 +116,18 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str =
     reach = np.array([row["within_95"] for row in rows], dtype=float)
     known = bool(np.isfinite(reach).all())
     label = "predicted with 95 % of a check run" if known else "predicted"
+    closer = None
+    if left_is_small((old, new), reach if known else None):
+        parts = figure.add_gridspec(1, 2, width_ratios=[1.5, 1])
+        ax.set_subplotspec(parts[0])
+        closer = figure.add_subplot(parts[1], sharey=ax)
+        closer.tick_params(axis="y", length=0, labelleft=False)
+        closer.set_xlabel(f"what is left, {plain(unit)}" if unit else "what is left")
     before_and_after(
         ax,
         y,
         (old, new),
+        closer=closer,
         reach=reach if known else None,
         limit=np.array([row["limit"] for row in rows], dtype=float),
         after=label,
@@ -136,7 +144,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str =
     ax.tick_params(axis="y", length=0)
     ax.spines[["top", "right"]].set_visible(False)
     shown = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    order = [name for name in ("before", label, "limit") if name in shown]
+    order = [name for name in ("before", label, "perhaps no better than before", "limit") if name in shown]
     figure.legend(
         [shown[name] for name in order],
         order,

@@ -175,10 +175,9 @@ def test_a_figure_of_readings_holds_before_after_their_reach_and_limits():
     assert {t.get_text(): t.get_position()[1] for t in ax.texts} == pytest.approx(
         {"1000 rpm": 0.0, "3000 rpm": 2.5}
     )
-    dots, bars = ax.containers[1].lines[0], ax.containers[1].lines[2][0]
-    assert dots.get_xdata().tolist() == [4.0, 2.0, 5.0]
+    assert [line.get_xdata().tolist() for line in ax.lines] == [[4.0, 2.0, 5.0]]
     # an amplitude reaches to 0 at least
-    ends = [(segment[0][0], segment[1][0]) for segment in bars.get_segments()]
+    ends = [(segment[0][0], segment[1][0]) for segment in ax.collections[0].get_segments()]
     assert ends == [(3.0, 5.0), (0.0, 5.0), (3.0, 7.0)]
     limits = next(c for c in ax.collections if c.get_label() == "limit")
     assert [segment[0][0] for segment in limits.get_segments()] == [6.0, 7.0]
@@ -188,7 +187,16 @@ def test_a_figure_of_readings_holds_before_after_their_reach_and_limits():
     assert (ax.get_xlabel(), ax.get_xscale()) == ("amplitude, µm pp", "linear")
     for row in rows:
         row["within_95"] = row["limit"] = None
-    rows[1]["after"] = 0.9  # less than a twentieth of the largest
-    plain = residual_figure(rows, "")
-    assert [text.get_text() for text in plain.legends[0].get_texts()] == ["before", "predicted"]
-    assert (plain.axes[0].get_xlabel(), plain.axes[0].get_xscale()) == ("amplitude", "symlog")
+    assert len(figure.axes) == 1
+    rows[1]["after"] = 13.0
+    grown = residual_figure(rows, "")
+    names = [text.get_text() for text in grown.legends[0].get_texts()]
+    assert names == ["before", "predicted", "perhaps no better than before"]
+    assert [line.get_mfc() for line in grown.axes[0].lines] == ["black", "white"]
+    rows[0]["after"], rows[1]["after"], rows[2]["after"] = 0.4, 0.9, 0.5  # too small to be read beside 20
+    plain, closer = residual_figure(rows, "").axes
+    assert (plain.get_xlabel(), plain.get_xscale()) == ("amplitude", "linear")
+    assert (closer.get_xlabel(), closer.get_xscale()) == ("what is left", "linear")
+    assert closer.lines[0].get_xdata().tolist() == [0.4, 0.9, 0.5]
+    assert 0.9 < closer.get_xlim()[1] < 1.1
+    assert plain.get_xlim()[1] > 20

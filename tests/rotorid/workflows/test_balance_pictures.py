@@ -233,6 +233,7 @@ def test_choices_of_planes_from_zero_on_a_linear_scale():
     assert [bar.get_width() for bar in ax.patches] == pytest.approx(found.subsets.expected * 2e6)
     assert named(ax, "rms predicted").get_xdata() == pytest.approx(found.subsets.rms * 2e6)
     assert ax.get_xlabel() == "vibration, µm pp; before: rms 28.4"
+    assert found.subsets.largest.max() * 2e6 < ax.get_xlim()[1] < 10, "what was before does not hide the rest"
 
 
 def test_all_trial_weights_stand_in_one_picture():
@@ -295,9 +296,18 @@ def test_holes_have_their_pieces_as_on_the_console():
     figure = found.figure()
     check_hygiene(figure)
     texts = [text.get_text() for text in figure.axes[0].texts]
-    assert "2 × 20 g" in texts
-    assert sum("20 g" in text or text == "10 g" for text in texts) == found.summary().count("in hole") - 6
+    console = [[(one["count"], one["mass"]) for one in row["pieces"]] for row in found.to_dict()["holes"]]
+    words = [" + ".join(f"{n} × {m:g}" if n > 1 else f"{m:g}" for n, m in row) + " g" for row in console]
+    assert words
+    assert sorted(text for text in texts if text[-2:] == " g" and "\n" not in text) == sorted(words)
     assert {str(k) for k in range(1, 25)} <= set(texts)
+
+
+def test_of_many_holes_those_that_are_used_have_their_numbers():
+    figure = split("35g@10.5", SplitOptions(holes=48, pieces="35g", first_hole=3.0)).figure()
+    check_hygiene(figure)
+    numbers = {text.get_text() for text in figure.axes[0].texts} & {str(k) for k in range(1, 49)}
+    assert numbers == {"2"} | {str(k) for k in range(1, 49, 2)}
 
 
 def test_forbidden_arcs_are_hatched_where_the_job_counts_them(tmp_path):
