@@ -35,7 +35,7 @@ _SOURCES = {
 }
 
 
-def balance_report(
+def balance_report(  # noqa: PLR0913
     document: Mapping[str, Any],
     result: Correction,
     influence: Influence,

@@ -170,7 +170,7 @@ def rotor_figure(
         way = np.exp(1j * (mark + count * np.radians(degrees)))
         _line(ax, [0.94 * way, way], color="black", lw=1)
         if degrees:
-            _say(ax, complex(1.27 * way.real, 1.17 * way.imag), f"{degrees}°")
+            _say(ax, complex(1.24 * way.real, 1.18 * way.imag), f"{degrees}°")
     tip = np.exp(1j * mark)
     _line(ax, 0.93 * tip, marker=(3, 0, 90 + np.degrees(mark)), color="black", ms=11, zorder=5)
     _say(ax, 0.66 * tip, "mark\n0°")
