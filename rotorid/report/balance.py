@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from balancing import Correction, Influence
-    from balancing.correction.trade_off import TradeOff
     from balancing.correction.verdict import Verdict
     from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
@@ -35,40 +34,30 @@ _SOURCES = {
 }
 
 
-def balance_report(  # noqa: PLR0913
+def balance_report(
     document: Mapping[str, Any],
-    result: Correction,
+    parts: Mapping[str, Any],
     influence: Influence,
     job: Job,
     provenance: Mapping[str, Any],
-    *,
     judgement: str,
-    mounted: Mounted | None = None,
-    verdict: Verdict | None = None,
-    curve: TradeOff | None = None,
-    title: str | None = None,
 ) -> bytes:
     """Make the sheet of a balancing job: one HTML file that needs nothing else.
 
     Parameters
     ----------
     document
-        What `rotorid balance --json` prints, without its provenance: warnings, check and verdict are taken
-        from it. The sheet holds it as JSON, with what only the sheet shows under the key "sheet".
-    result, influence, job
-        The correction, its coefficients, and the job of both.
+        What `rotorid balance --json` prints, without its provenance. The sheet holds it as JSON, with what
+        only the sheet shows under the key "sheet".
+    parts
+        What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
+        "mounting" (`Mounted`), "verdict" (`Verdict`, whose tolerances are drawn), "trade_off" (`TradeOff`).
+    influence, job
+        Coefficients and job of the correction.
     provenance
         Program version, input files with hashes, date and options.
     judgement
         What to do: the lines of the answer's.
-    mounted
-        Pieces in the holes of the planes, where they were chosen.
-    verdict
-        Its tolerances of planes are drawn.
-    curve
-        Residual against total weight, drawn where there is one.
-    title
-        Name of the machine or job; by default that of the job's file and folder.
 
     Raises
     ------
@@ -77,6 +66,7 @@ def balance_report(  # noqa: PLR0913
     """
     from balancing.plots.trade_off_curve import overview
 
+    result, mounted, verdict, curve = (parts[key] for key in ("", "mounting", "verdict", "trade_off"))
     labels = result.labels
     sheet = sheet_data(result, influence, job, mounted)
     whole = {**document, "sheet": sheet}
@@ -84,8 +74,7 @@ def balance_report(  # noqa: PLR0913
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
-    name = title or _name(job)
-    text = {
+    text: dict[str, Any] = {
         "vibration": labels.vibration_in,
         "weight": labels.weight_in,
         "seen": conventions_explained.seen_from(labels),
@@ -100,7 +89,7 @@ def balance_report(  # noqa: PLR0913
     return render_report(
         "balance.html",
         whole,
-        title=f"Balancing sheet: {name}",
+        title=f"Balancing sheet: {_name(job)}",
         warnings=[sentence(words) for words in every_warning(document)],
         judgement=judgement.splitlines(),
         provenance=provenance,
