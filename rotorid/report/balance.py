@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from balancing.correction.correction_words import method_words
+from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
 from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
 from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
+from rotorid.report.number_tables import every_warning
 from rotorid.report.page import inline_svg, render_report
+from rotorid.tables.reader import units
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -20,9 +23,6 @@ if TYPE_CHECKING:
     from balancing.correction.verdict import Verdict
     from balancing.mounting.mount_result import Mounted
     from rotorid.tables import Job
-
-RUNS_ABREAST = 4
-PLANES_ABREAST = 3
 
 _SOURCES = {
     "stated": "as stated in the job",
@@ -36,38 +36,37 @@ _SOURCES = {
 
 def balance_report(
     document: Mapping[str, Any],
-    result: Correction,
+    parts: Mapping[str, Any],
     influence: Influence,
     job: Job,
     provenance: Mapping[str, Any],
-    *,
-    mounted: Mounted | None = None,
-    verdict: Verdict | None = None,
-    title: str | None = None,
+    judgement: str,
 ) -> bytes:
     """Make the sheet of a balancing job: one HTML file that needs nothing else.
 
     Parameters
     ----------
     document
-        What `rotorid balance --json` prints, without its provenance: warnings, check and verdict are taken
-        from it. The sheet holds it as JSON, with what only the sheet shows under the key "sheet".
-    result, influence, job
-        The correction, its coefficients, and the job of both.
+        What `rotorid balance --json` prints, without its provenance. The sheet holds it as JSON, with what
+        only the sheet shows under the key "sheet".
+    parts
+        What the document is made of, by its keys: "" (the `Correction`), and, None where there is none,
+        "mounting" (`Mounted`), "verdict" (`Verdict`, whose tolerances are drawn), "trade_off" (`TradeOff`).
+    influence, job
+        Coefficients and job of the correction.
     provenance
         Program version, input files with hashes, date and options.
-    mounted
-        Pieces in the holes of the planes, where they were chosen.
-    verdict
-        Its tolerances of planes are drawn.
-    title
-        Name of the machine or job; by default that of the job's file and folder.
+    judgement
+        What to do: the lines of the answer's.
 
     Raises
     ------
     ValueError
         If the document holds a number that is not finite.
     """
+    from balancing.plots.trade_off_curve import overview
+
+    result, mounted, verdict, curve = (parts[key] for key in ("", "mounting", "verdict", "trade_off"))
     labels = result.labels
     sheet = sheet_data(result, influence, job, mounted)
     whole = {**document, "sheet": sheet}
@@ -75,22 +74,24 @@ def balance_report(
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
-    name = title or _name(job)
-    text = {
+    text: dict[str, Any] = {
         "vibration": labels.vibration_in,
         "weight": labels.weight_in,
         "seen": conventions_explained.seen_from(labels),
-        "method": method_words(result.method, weighted=result.row_weights is not None),
+        "method": _method(result),
         "errors": _SOURCES.get(result.error_source, result.error_source),
         "coefficients": _coefficients(influence, job, provenance),
         "turn": _turn(result),
+        "turning": labels.turning_in_words(),
+        "speed": labels.speed_in,
+        "speed_scale": 1.0 if labels.speed_unit == "rpm" else units.SPEED[labels.speed_unit].scale / RPM,
     }
     return render_report(
         "balance.html",
         whole,
-        title=f"Balancing sheet: {name}",
-        warnings=_warnings(document),
-        judgement=result.decision.lines(),
+        title=f"Balancing sheet: {_name(job)}",
+        warnings=[sentence(words) for words in every_warning(document)],
+        judgement=judgement.splitlines(),
         provenance=provenance,
         job_files=[path.name for path in job.files],
         text=text,
@@ -105,13 +106,14 @@ def balance_report(
         ),
         discs=_discs(result, job, mounted, verdict, text["seen"]),
         residual_figure=inline_svg(
-            residual_figure(sheet["residuals"], text["vibration"]), "Vibration before and predicted after"
+            residual_figure(sheet["residuals"], text["vibration"], labels.speed_unit),
+            "Vibration before and predicted after",
         ),
+        trade_off_figure="" if curve is None else inline_svg(overview(curve), "Residual over total weight"),
         rows_shown=ROWS_SHOWN,
-        run_groups=_groups(len(runs), RUNS_ABREAST),
-        plane_groups=_groups(len(influence.planes), PLANES_ABREAST),
         influence_planes=influence.planes,
         several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
+        forbidden=result.limits is not None and any(result.limits.forbidden),
         unsplit=[p for p in result.planes if p in job.holes] if mounted is None else [],
     )
 
@@ -125,18 +127,12 @@ def _name(job: Job) -> str:
     return folder if own.casefold() in ("job", "runs") else f"{folder}, {own}"
 
 
-def _warnings(document: Mapping[str, Any]) -> list[str]:
-    """All sentences of all parts, each once, and a verdict that is not a pass."""
-    found: list[str] = []
-    verdict = document.get("verdict")
-    if verdict is not None and verdict["verdict"] == "fail":
-        found.append(f"the limits are not kept: the verdict ({verdict['source']}) is fail")
-    for part in (document, document.get("mounting"), document.get("check"), verdict):
-        found += [] if part is None else part["warnings"]
-    check = document.get("check")
-    if check is not None and check["explained"] is False:
-        found.append(f"check run: {check['verdict']}")
-    return [sentence(words) for words in dict.fromkeys(found)]
+def _method(result: Correction) -> str:
+    """How the weights were found."""
+    words = method_words(result.method, weighted=result.row_weights is not None)
+    if len(result.speeds) == 1 or result.method == "minmax":
+        return words
+    return f"{words} Den Hartog's multi-speed method: least squares over all speeds."
 
 
 def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any]) -> str:
@@ -176,12 +172,3 @@ def _discs(
         )
         for plane in result.planes
     ]
-
-
-def _groups(count: int, size: int) -> list[list[int]]:
-    """Indices in groups that fit side by side, as even as possible."""
-    if count == 0:
-        return []
-    parts = -(-count // size)
-    each = -(-count // parts)
-    return [list(range(first, min(first + each, count))) for first in range(0, count, each)]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotorid.base.rpm import RPM
+from rotorid.base.unit_words import speed_words
 from rotorid.report.conventions_explained import plain
 
 if TYPE_CHECKING:
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
 
 ROWS_SHOWN = 60
 """Readings in one figure; beyond that the largest ones are shown."""
-_WIDTH, _REACH = 4.6, 2.25
-"""Of the picture of a plane: inches, and half of its width in radii of the disc (room for texts)."""
+_WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42
+"""Of a picture of a plane: inches on paper; half its width (of two, of more planes) and height in radii."""
 
 
 def plane_figure(
@@ -61,12 +63,14 @@ def plane_figure(
     loose = (wanted,) if mounting is None and wanted != 0 else ()
     if mounted is not None and mounting is None and mounted.weights[p] != 0:
         loose = (complex(mounted.weights[p]),)
-    with mpl.rc_context({"font.size": 11.0}):
-        lines = 1 + 2 * (mounted is not None) + (tolerance is not None)
-        axes = _WIDTH * 3.2 / (2 * _REACH)
-        height = axes + 0.3 + 0.2 * lines  # a title above the axes, lines of text below
+    with mpl.rc_context({"font.size": 10.0}):
+        arcs = () if result.limits is None else result.limits.forbidden[p]
+        lines = 1 + 2 * (mounted is not None) + (tolerance is not None) + bool(arcs)
+        reach = _REACH[len(result.planes) > 2]
+        axes = _WIDTH * _TALL / reach
+        height = axes + 0.37 + 0.15 * lines  # a title above the axes, lines of text below
         figure = Figure(figsize=(_WIDTH, height))
-        ax = figure.add_axes((0.0, 1 - (axes + 0.3) / height, 1.0, axes / height))
+        ax = figure.add_axes((0.0, 1 - (axes + 0.25) / height, 1.0, axes / height))
         disc(
             ax,
             plain(plane),
@@ -77,13 +81,14 @@ def plane_figure(
             weight=wanted,
             tolerance=tolerance,
             loose=loose,
+            forbidden=arcs,
             clockwise=labels.drawn_sign < 0,
         )
-        ax.set_xlim(-_REACH, _REACH)
+        ax.set(xlim=(-reach, reach), ylim=(-_TALL, _TALL))
     return figure
 
 
-def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
+def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str = "rpm") -> Figure:
     """Draw readings before (bars) and after (dots with 95 %), and limits (thick lines), one below the other.
 
     Parameters
@@ -92,6 +97,8 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
         `residuals` of `rotorid.report.balance_data.sheet_data`; of more than `ROWS_SHOWN` the largest.
     unit
         Of the amplitudes, in words.
+    speed_unit
+        Of the speeds, as in a column's name.
     """
     from matplotlib.figure import Figure
 
@@ -100,7 +107,7 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
     if len(rows) > ROWS_SHOWN:
         largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
         rows = [rows[i] for i in sorted(largest[:ROWS_SHOWN])]
-    figure = Figure(figsize=(5.8, 1.2 + 0.185 * len(rows)), layout="constrained")
+    figure = Figure(figsize=(5.8, 1.0 + 0.145 * len(rows)), layout="constrained")
     ax = figure.add_subplot()
     speeds = [row["speed_rpm"] for row in rows]
     step = [0.0] + [0.5 * (b != a) for a, b in pairwise(speeds)]
@@ -129,9 +136,8 @@ def residual_figure(rows: Sequence[dict[str, Any]], unit: str) -> Figure:
     ax.set_yticks(y, [_short(row["sensor"]) for row in rows], fontsize="small")
     for speed in dict.fromkeys(speeds):
         first = y[speeds.index(speed)]
-        ax.text(
-            1.01, first, f"{speed:.6g} rpm", transform=ax.get_yaxis_transform(), fontsize="small", va="center"
-        )
+        words = speed_words(speed / RPM, speed_unit)
+        ax.text(1.01, first, words, transform=ax.get_yaxis_transform(), va="center")
     ax.set_xlim(left=0)
     ax.set_ylim(y[-1] + 0.7, -0.7)
     ax.set_xlabel(f"amplitude, {plain(unit)}" if unit else "amplitude")

@@ -66,8 +66,7 @@ def words(
         found.append(
             (
                 "Key phasor",
-                "gives a pulse when the mark on the rotor passes it. Its place is not stated, and does not "
-                "matter as long as it stays where it was during the runs.",
+                "gives a pulse when the mark on the rotor passes it. Its place is not stated.",
             )
         )
     if places:
@@ -77,8 +76,7 @@ def words(
         found.append(
             (
                 "Sensors",
-                "their directions are not stated, and do not matter as long as the sensors stay where they "
-                "were during the runs.",
+                "their directions are not stated: they stay as during the runs.",
             )
         )
     found.append(("Vibration", _amplitude(labels)))
@@ -90,8 +88,8 @@ def words(
 def _rotation(labels: Labels) -> str:
     if labels.rotation is None:
         return (
-            "the job does not say which way the rotor turns. With the rotation means: the way in which the "
-            "surface of the rotor moves. Look at the machine before you count angles."
+            "the job does not say which way the rotor turns: look at the machine before you count angles. "
+            "With the rotation means: the way in which the surface of the rotor moves."
         )
     end = "" if labels.view is None else f" seen from the {labels.view}"
     more = "" if labels.view is not None else "; from which end that is seen is not stated"
@@ -157,7 +155,7 @@ def rotor_figure(
 
     steep = [abs(np.sin(np.radians(angle))) > 0.6 for angle in (places or {}).values()]
     tall = _TALL if any(steep) else _FLAT
-    figure = Figure(figsize=(4.4, 4.4 * tall / _SIDE))
+    figure = Figure(figsize=(3.4, 3.4 * tall / _SIDE))
     ax = figure.add_axes((0, 0, 1, 1))
     ax.set_aspect("equal")
     ax.set(xlim=(-_SIDE, _SIDE), ylim=(-tall, tall))
@@ -167,12 +165,12 @@ def rotor_figure(
     count = labels.angles_on_paper
     ax.add_patch(Circle((0, 0), 1.0, fc="white", ec="black", lw=1.4))
     _turning(ax, 0.27, np.radians(100), drawn * np.radians(250))
-    _say(ax, 0.0, "rotation", fontsize=7)
+    _say(ax, 0.0, "rotation", bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5})
     for degrees in (0, 90, 180, 270):
         way = np.exp(1j * (mark + count * np.radians(degrees)))
         _line(ax, [0.94 * way, way], color="black", lw=1)
         if degrees:
-            _say(ax, complex(1.17 * way.real, 1.14 * way.imag), f"{degrees}°")
+            _say(ax, complex(1.24 * way.real, 1.18 * way.imag), f"{degrees}°")
     tip = np.exp(1j * mark)
     _line(ax, 0.93 * tip, marker=(3, 0, 90 + np.degrees(mark)), color="black", ms=11, zorder=5)
     _say(ax, 0.66 * tip, "mark\n0°")
@@ -238,7 +236,7 @@ def _beside(across: float) -> str:
 
 def _say(ax: Axes, at: complex, words: str, **style: Any) -> None:  # noqa: ANN401  as of matplotlib
     """A text around a point of the complex plane."""
-    options: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, **style}
+    options: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 9, **style}
     ax.text(at.real, at.imag, words, **options)
 
 
@@ -264,7 +262,7 @@ def phase_figure(labels: Labels) -> Figure:
     """Draw a reading over time with the pulses of the key phasor, and what its phase is."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(3.9, 2.4), layout="constrained")
+    figure = Figure(figsize=(3.4, 2.1), layout="constrained")
     ax = figure.add_subplot()
     ax.axis("off")
     turn = np.linspace(-100.0, 560.0, 600)

@@ -6,7 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fem.model.rotor import Rotor
+from fem.plots.mode_shapes import smooth_shapes
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.report.document import NOTHING, Cells, Document
 from rotorid.report.number_tables import Grid, Part, evenly, every_warning, figures, numbered, words
@@ -63,7 +66,7 @@ def critical_report(
             drawings=(modes_picture(modes),),
         ),
         *_map(document, chart, operating),
-        Part("Mode shapes", tables=_shapes(document)),
+        Part("Mode shapes", tables=_shapes(document, modes)),
     ]
     return render_report(
         "rotor.html",
@@ -217,16 +220,19 @@ def _map(document: Document, chart: SpeedMap | None, operating: Band) -> list[Pa
     return [Part("Critical speed map", (said,), kept, (map_picture(chart, operating),))]
 
 
-def _shapes(document: Document) -> tuple[Grid, ...]:
-    """Deflections at the nodes, some modes abreast."""
-    count = len(document["mode_shapes"])
+def _shapes(document: Document, modes: Modes) -> tuple[Grid, ...]:
+    """Deflections at the nodes, some modes abreast, each in the scale of the picture."""
+    largest = np.abs(smooth_shapes(modes)[1]).max(axis=0)
     nodes = numbered("node", len(document["positions_m"]))
     positions = document.column("position, m", "positions_m.*", decimals=4)
-    modes = [document.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4) for k in range(count)]
-    caption = "Deflection at the nodes, 1 at node 1 (or the largest 1)"
+    shapes = [
+        document.column(f"mode {k + 1}", f"mode_shapes.{k}.*", decimals=4, scale=1 / float(size))
+        for k, size in enumerate(largest)
+    ]
+    caption = "Deflection at the nodes, in the scale of the picture: the largest between the ends is 1"
     return tuple(
-        Grid(caption, (nodes, positions, *modes[first : first + MODES_ABREAST]))
-        for first in range(0, count, MODES_ABREAST)
+        Grid(caption, (nodes, positions, *shapes[first : first + MODES_ABREAST]))
+        for first in range(0, len(shapes), MODES_ABREAST)
     )
 
 

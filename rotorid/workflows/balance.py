@@ -234,13 +234,7 @@ class Balance(Parts):
         from rotorid.report.balance import balance_report
 
         return balance_report(
-            self.to_dict(),
-            self.result,
-            self.influence,
-            self.job,
-            self.provenance,
-            mounted=self.mounted,
-            verdict=self.verdict,
+            self.to_dict(), self.parts, self.influence, self.job, self.provenance, self.answer.judgement
         )
 
     def workbook(self, path: Path | str) -> bytes:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 from collections.abc import Mapping
 
 import numpy as np
+import openpyxl
 from tables_data import RUNS
+
+from rotorid.tables.job.workbook_template import template_bytes
 
 SAMPLES = (
     "turbo_job/job",
@@ -106,3 +110,25 @@ def _unlike(a, b, name):
             yield name
     elif isinstance(a, np.ndarray) or isinstance(b, np.ndarray) or a != b:
         yield name
+
+
+def filled(path, **sheets):
+    """The form with rows written into its sheets, below the header; phase and angles are chosen."""
+    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
+    keys = [cell.value for cell in book["settings"]["A"]]
+    for key, value in (("phase", "lead"), ("angles", "with rotation")):
+        book["settings"].cell(keys.index(key) + 1, 2).value = value
+    for name, rows in sheets.items():
+        sheet = book[name]
+        header = [cell.value for cell in sheet[1]]
+        for number, row in enumerate(rows, start=2):
+            for column, value in row.items():
+                sheet.cell(number, header.index(column) + 1).value = value
+    book.save(path)
+    return path
+
+
+def rows(table, **renamed):
+    """Rows of a table by column."""
+    names = [renamed.get(name, name) for name in table[0]]
+    return [dict(zip(names, row, strict=True)) for row in table[1:]]

@@ -1,6 +1,7 @@
 """The balancing sheet: its numbers are those of the document, and it can be used without the program."""
 
 import doctest
+import html
 import json
 import re
 
@@ -131,9 +132,10 @@ def test_it_refers_to_nothing_outside_and_ids_are_unique(made):
 def test_warnings_come_before_results(made):
     text, sheet, report, _ = made
     order = [name for name in sheet.ids if not name.startswith("f")]
-    assert order[:4] == ["warnings", "in-short", "machine", "conventions"]
+    expected = ["judgement", "warnings", *["assumed"] * bool(sheet.document["assumptions"]), "weights"]
+    assert order[: len(expected)] == expected
     assert order[-2:] == ["provenance", "result"]
-    head = text[: text.index('id="in-short"')]
+    head = text[: text.index('id="weights"')]
     first = re.sub(r"<[^>]*>", "", head).replace("&#39;", "'").replace("&#34;", '"').replace("&gt;", ">")
     mounting = report.mounted.warnings if report.mounted else ()
     for warning in report.result.warnings + mounting + (report.verdict.warnings if report.verdict else ()):
@@ -145,10 +147,11 @@ def test_warnings_come_before_results(made):
 def test_there_is_room_for_check_readings_and_a_signature(made):
     text, sheet, report, _ = made
     blank = [cell for cell in sheet.cells if cell["class"] == "write"]
-    assert len(blank) == 2 * report.result.before.size
+    assert len(blank) == (0 if report.check else 2 * report.result.before.size)
     assert all(cell["text"] == "" for cell in blank)
     assert text.count('class="tall"') == 3
-    for word in ("date", "name", "signature", "amplitude read", "phase read"):
+    read = () if report.check else ("amplitude read", "phase read")
+    for word in ("date", "name", "signature", *read):
         assert f"<th>{word}</th>" in text
 
 
@@ -221,7 +224,7 @@ def test_removal_slow_roll_radii_and_limits(tmp_path):
     assert own["corrections"][middle]["mass_at_radius"] == pytest.approx(row["mass"] / 100)
     assert own["corrections"][0]["mass_at_radius"] == pytest.approx(document["corrections"][0]["mass"] / 120)
     assert own["corrections"][2]["mass_at_radius"] is None
-    assert "take away from plane <strong>middle</strong>" in re.sub(r"\s+", " ", text)
+    assert "<th>middle</th><td>take away</td>" in text
     assert own["slow_roll"][0]["amplitude"] == pytest.approx(0.3)
     assert own["slow_roll"][0]["phase_deg"] == pytest.approx(35)
     # the file says 3.36 at 89° (lag): what is left has the slow roll taken off
@@ -261,19 +264,55 @@ def test_names_are_neither_formulas_nor_markup(tmp_path):
     assert ax.get_yticklabels()[0].get_text() == r"A\$_1\$ <i>"
 
 
-def test_a_verdict_that_fails_is_a_warning():
-    document = {
-        "warnings": ["first", "twice"],
-        "check": {"warnings": ["twice"], "explained": False, "verdict": "not explained"},
-        "verdict": {"verdict": "fail", "source": "check run x", "warnings": ["third"]},
+def test_the_judgement_of_the_answer_stands_first():
+    for options in ({}, {"limit": ("0.8",)}, {"refine": True}):
+        text, _, report, _ = sheet_of(DATA / "turbo_job" / "checked.toml", **options)
+        first = re.sub(r"<[^>]*>", "", text[text.index('id="judgement"') : text.index('id="warnings"')])
+        for line in report.answer.judgement.splitlines():
+            assert html.escape(line, quote=False) in first
+
+
+def test_what_was_asked_for_is_in_the_sheet():
+    asked = {"trade_off": True, "best_planes": 2, "history": True}
+    text, sheet, report, _ = sheet_of(DATA / "turbo_job" / "job.toml", **asked)
+    keys = {key for key, _ in sheet.shown}
+    for i in range(len(report.subsets.planes)):
+        assert {f"best_planes.rows.{i}.{key}" for key in ("rms_after", "largest_weight")} <= keys
+    assert {f"trade_off.points.{i}.rms_after" for i in range(len(report.curve.totals))} <= keys
+    for r, run in enumerate(sheet.document["history"]["runs"]):
+        assert {f"history.runs.{r}.speeds.{s}.largest" for s in range(len(run["speeds"]))} <= keys
+        assert {f"history.runs.{r}.weights.{w}.mass" for w in range(len(run["weights"]))} <= keys
+    assert text.count("<svg") == 4 + len(report.result.planes)
+
+
+def test_arcs_where_nothing_goes_are_hatched(tmp_path):
+    from matplotlib.patches import Wedge
+
+    text, _, report, _ = sheet_of(hard(tmp_path))
+    drawn = {
+        plane: [p for p in plane_figure(report.result, plane).axes[0].patches if isinstance(p, Wedge)]
+        for plane in report.result.planes
     }
-    assert balance._warnings(document) == [
-        "The limits are not kept: the verdict (check run x) is fail.",
-        "First.",
-        "Twice.",
-        "Third.",
-        "Check run: not explained.",
-    ]
+    assert {plane: len(arcs) for plane, arcs in drawn.items()} == {"left": 0, "middle": 0, "right": 1}
+    assert drawn["right"][0].get_hatch()
+    assert "or a forbidden arc" in text
+
+
+def test_speeds_are_in_the_unit_of_the_runs(tmp_path):
+    for name in ("runs.csv", "weights.csv", "job.toml"):
+        (tmp_path / name).write_text((DATA / "bk_two_plane" / name).read_text())
+    runs = (tmp_path / "runs.csv").read_text()
+    (tmp_path / "runs.csv").write_text(runs.replace("speed_rpm", "speed_Hz").replace(",3000,", ",50,"))
+    text, _, _, _ = sheet_of(tmp_path / "job.toml")
+    assert '<th class="n">Hz</th>' in text
+    assert re.search(r'<span data-key="sheet.residuals.0.speed_rpm" data-scale="[^"]*">50</span>', text)
+    assert "3000" not in re.sub(r"<svg.*?</svg>|<script.*", "", text, flags=re.DOTALL).split("provenance")[0]
+
+
+def test_the_method_of_several_speeds_is_named():
+    for job, named in (("turbo_job", True), ("bk_two_plane", False)):
+        text, _, _, _ = sheet_of(DATA / job / "job.toml")
+        assert ("Den Hartog" in text) == named
 
 
 def test_what_stays_mounted_is_said(tmp_path):
@@ -357,8 +396,8 @@ def test_examples_in_the_docstrings():
 def test_after_a_check_run_nothing_is_mounted_twice():
     text, _, _, _ = sheet_of(DATA / "turbo_job" / "checked.toml")
     words = re.sub(r"\s+", " ", text)
-    assert "A check run was made with the weights listed under Check run" in words
-    assert "Do not mount these again" in words
+    assert "Check run: predicted and achieved" in words
+    assert "Do not mount the weights below again" in words
     assert "Remove every trial weight and every weight of the runs" not in words
     before, _, _, _ = sheet_of(DATA / "turbo_job" / "job.toml")
     assert "Remove every trial weight and every weight of the runs" in re.sub(r"\s+", " ", before)

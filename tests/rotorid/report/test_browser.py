@@ -77,6 +77,23 @@ def test_a_sheet_on_a_telephone_a_screen_and_paper(browser, address, name):
     assert {(round(float(w)), round(float(h))) for w, h in boxes} == {A4}
 
 
+@pytest.mark.parametrize("name", ["balance two planes", "balance holes"])
+def test_four_pages_hold_a_balance_and_the_first_all_to_mount_by(browser, address, name):
+    path = address(name)
+    browser.resize(SCREEN)
+    browser.open(path)
+    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) <= 4
+    for section in ("#readings", "#besides", "#machine", "#conventions", "#runs", "#influence", "footer"):
+        browser.driver.execute_script(
+            "document.querySelectorAll(arguments[0]).forEach(e => e.remove())", section
+        )
+    first = browser.text("body")
+    for word in ("Mount these", "weights mounted", "signature"):
+        assert word in first
+    assert len(browser.tops(".discs svg")) == len(make(name).document["corrections"])
+    assert len(re.findall(rb"/Type\s*/Page\b", browser.print())) == 1
+
+
 def test_the_browser_sees_what_a_sheet_must_not_do(browser, tmp_path):
     page = tmp_path / "bad.html"
     page.write_text(

@@ -11,7 +11,7 @@ import openpyxl
 import pytest
 from cases import each_of
 from tables_data import DATE, RUNS, WEIGHTS, complaints, csv_text, replaced, the_only, write_book
-from workbook_jobs import differences
+from workbook_jobs import differences, filled, rows
 
 from balancing import correct, estimate_influence
 from rotorid.samples import sample_data
@@ -37,28 +37,6 @@ def european(table):
     return [
         [str(cell).replace(".", ",") if type(cell) in (int, float) else cell for cell in row] for row in table
     ]
-
-
-def filled(path, **sheets):
-    """The form with rows written into its sheets, below the header; phase and angles are chosen."""
-    book = openpyxl.load_workbook(io.BytesIO(template_bytes()))
-    keys = [cell.value for cell in book["settings"]["A"]]
-    for key, value in (("phase", "lead"), ("angles", "with rotation")):
-        book["settings"].cell(keys.index(key) + 1, 2).value = value
-    for name, rows in sheets.items():
-        sheet = book[name]
-        header = [cell.value for cell in sheet[1]]
-        for number, row in enumerate(rows, start=2):
-            for column, value in row.items():
-                sheet.cell(number, header.index(column) + 1).value = value
-    book.save(path)
-    return path
-
-
-def rows(table, **renamed):
-    """Rows of a table by column."""
-    names = [renamed.get(name, name) for name in table[0]]
-    return [dict(zip(names, row, strict=True)) for row in table[1:]]
 
 
 def bk(name):
