@@ -116,7 +116,7 @@ def draw_phases(result: Identification, axes: Axes) -> None:
             if style["linestyle"]:
                 angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan  # no line across a full turn
             axes.plot(w, angle, **style)
-    axes.set(xlabel=result.experiments.axis.word, ylabel="phase lead, °", ylim=(-190, 190))
+    axes.set(xlabel=result.experiments.axis.word, ylabel="phase lead, °", ylim=(-205, 205))
     axes.set_yticks(range(-180, 181, 90))
     plain(axes)
 
