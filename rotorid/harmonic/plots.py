@@ -146,7 +146,7 @@ def draw_shapes(result: Identification, axes: Axes) -> None:
     fitted, natural = _modes(result)
     unit = axis.word.rpartition(", ")[2]
     for i, w in enumerate(axis.scale * result.experiments.frequencies):
-        style = look(i, len(table))
+        style = look(i)
         label = f"{w:.5g} {unit}"
         if np.isfinite(natural[i]):
             label += f" (model {axis.scale * natural[i]:.5g})"
@@ -228,8 +228,7 @@ def _mark(result: Identification, name: str) -> dict[str, Any]:
 
 
 def _line(result: Identification, name: str) -> dict[str, Any]:
-    outputs = result.model.outputs
-    return {**look(outputs.index(name), len(outputs)), "linewidth": 1.4}
+    return {**look(result.model.outputs.index(name)), "linewidth": 1.4}
 
 
 def _combinations(result: Identification) -> tuple[FoundCombination, ...]:

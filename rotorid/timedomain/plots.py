@@ -156,7 +156,7 @@ def _mark(result: Fit, k: int) -> dict[str, Any]:
 
 def _line(result: Fit, k: int, number: int) -> dict[str, Any]:
     """Line of a record; a single value is a dash, as a line through it would not show."""
-    style = look(k, len(result.records)) if len(result.records) > 1 else {"color": BLUE, "linestyle": "-"}
+    style = look(k) if len(result.records) > 1 else {"color": BLUE, "linestyle": "-"}
     return {**style, "lw": 1.3, "alpha": 1.0, **({"marker": "_", "ms": 22.0} if number == 1 else {})}
 
 
