@@ -1,37 +1,268 @@
-"""The figures of the documentation: what the commands of its pages draw from the sample data."""
+"""The pictures of the documentation: what commands draw from the sample data, and what each lets one read."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import os
+import re
 import shlex
 import tempfile
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 COMPRESSOR = "sample_data/compressor/rotor.toml"
-FIGURES = {
-    "balance": "balance sample_data/turbo_job/job.toml",
-    "discs": "balance sample_data/turbo_job/holes.toml --split",
-    "modes": "critical sample_data/rotor23.csv -n 3",
-    "campbell": f"campbell {COMPRESSOR} --speeds 1000:15000:500rpm",
-    "response": f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv "
-    "--speeds 1000:15000:100rpm --sensors 'probe DE:45,probe NDE:45' --operating 5300:6500rpm",
-    "reduction": "reduce sample_data/rotor23.csv --nodes 7,12,18 --modes 2",
-    "fit": "fit sample_data/fit/run_down/model.toml sample_data/fit/run_down/record.csv",
-}
-"""Commands by the name of the figure, without `rotorid` and `--plot`."""
-DENSE = ("fit",)
-"""Figures of so many points that pixels are smaller."""
+TURBO, MODEL_JOB = "sample_data/turbo_job", "sample_data/model_job/job.toml"
+IDENTIFY, FIT = "sample_data/identify", "sample_data/fit"
+PROBES = "--sensors 'probe DE:45,probe NDE:45'"
+RESPONSE = (
+    f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv "
+    f"--speeds 1000:15000:100rpm {PROBES}"
+)
+THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
+PNG_DOTS = 150
+"""Dots an inch of a .png."""
 
 
-def kind(name: str) -> str:
-    """How a figure is drawn, svg or png."""
-    return "png" if name in DENSE else "svg"
+@dataclass(frozen=True)
+class Picture:
+    """One picture.
+
+    Attributes
+    ----------
+    name, group
+        Of the picture, and where in the gallery it stands.
+    command
+        Without `rotorid` and `--plot`.
+    read
+        The sentence that it lets one read.
+    dense
+        Of so many points that pixels are smaller than lines.
+    """
+
+    name: str
+    group: str
+    command: str
+    read: str
+    dense: bool = False
+
+    @property
+    def typed(self) -> str:
+        """The command as a reader types it, in any shell."""
+        return f"rotorid {self.command} --plot {self.name}.png".replace("'", '"')
+
+    @property
+    def kind(self) -> str:
+        """How it is drawn, svg or png."""
+        return "png" if self.dense else "svg"
 
 
+GALLERY = (
+    Picture(
+        "balance",
+        "balancing",
+        f"balance {TURBO}/job.toml",
+        "Mount 423 g·mm at 169° on the left plane, 304 at 278° on the middle and 448 at 12° on the "
+        "right one: the worst probe shows 60 µm pp now and about 2 at most then.",
+    ),
+    Picture(
+        "checked",
+        "balancing",
+        f"balance {TURBO}/checked.toml",
+        "The check run shows what was predicted: every star lies within its bar, and an rms of 28.4 "
+        "µm pp has become 0.4.",
+    ),
+    Picture(
+        "discs",
+        "balancing",
+        f"balance {TURBO}/holes.toml --split",
+        "Which pieces go into which hole, seen from the end from which the rotor turns "
+        "counter-clockwise, and how far the weight that they make (bold) is from the wanted one "
+        "(dashed).",
+    ),
+    Picture(
+        "trade-off",
+        "balancing",
+        f"balance {TURBO}/job.toml --best-planes 2 --trade-off",
+        "With two planes half the weight leaves half the vibration; the least vibration needs about "
+        "930 g·mm in all.",
+    ),
+    Picture(
+        "grade",
+        "balancing",
+        f"balance {TURBO}/checked.toml --planes left,right --grade G6.3 --rotor-mass 558kg "
+        "--service-speed 4500rpm --positions left=600mm,right=2500mm --bearings 200mm,3000mm --centre 1600mm",
+        "In both planes and at both bearings more than 700 times less unbalance is left than G6.3 "
+        "permits: pass.",
+    ),
+    Picture(
+        "tolerance",
+        "balancing",
+        "tolerance --mass 500kg --speed 3000rpm --grade G2.5 --planes left=100mm,right=600mm "
+        "--bearings 0mm,700mm --centre 320mm",
+        "G2.5 allows this rotor 3979 g·mm, 2228 of it in the left plane and 1751 in the right one.",
+    ),
+    Picture(
+        "trial-weight",
+        "balancing",
+        f"trial-weight {MODEL_JOB} --plane middle",
+        "Begin in the middle plane with 408 g·mm at 234° from the mark, with the rotation.",
+    ),
+    Picture(
+        "split",
+        "balancing",
+        "split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2",
+        "Which pieces go into which of the 24 holes, that hole 3 has one already, and that all of "
+        "them together are the wanted 35 g at 120°.",
+    ),
+    Picture(
+        "drill",
+        "balancing",
+        "split 35g@120 --drill 8mm --depth 20mm --radius 100mm",
+        "Drill five holes of 8 mm, 19.2 mm deep, opposite the 35 g that are missing at 120°.",
+    ),
+    Picture(
+        "unbalance",
+        "balancing",
+        f"unbalance {MODEL_JOB} --stations 6,12,19 --model-error 2",
+        "Where the unbalance sits, how large and in which direction; the closed line at the tip of "
+        "each is the region where it lies with 95 %.",
+    ),
+    Picture(
+        "modes",
+        "rotors",
+        "critical sample_data/rotor23.csv -n 3",
+        "At the first critical speed, 1291 rpm, the middle swings most; at the second, 5164 rpm, both"
+        " halves swing against each other about a node 1.7 m from the end.",
+    ),
+    Picture(
+        "map",
+        "rotors",
+        f"critical {COMPRESSOR} -n 3 --map",
+        "At the stiffness of the bearings, about 10⁸ N/m, stiffer supports would hardly raise the "
+        "first critical speed, but the second and the third.",
+    ),
+    Picture(
+        "campbell",
+        "rotors",
+        f"campbell {COMPRESSOR} --speeds 1000:15000:500rpm",
+        "Where the line 1× meets a mode, unbalance excites it; the decrement of mode 2 falls below "
+        "zero at about 11 000 rpm: the rotor is unstable above.",
+    ),
+    Picture(
+        "response",
+        "rotors",
+        f"{RESPONSE} --operating 5300:6500rpm",
+        "Both probes peak near 4400, 8330 and 10 700 rpm, not in the operating range; beyond 10 932 "
+        "rpm there is no steady state.",
+    ),
+    Picture(
+        "polar",
+        "rotors",
+        f"{RESPONSE} --view polar",
+        "Each loop is a critical speed: while the speed passes it, the phase turns by half a circle.",
+    ),
+    Picture(
+        "orbits",
+        "rotors",
+        f"{RESPONSE} --view orbits --at 5000rpm",
+        "At 5000 rpm, a stable speed, both ends run forward on nearly round orbits, the non-drive end"
+        " on the larger one.",
+    ),
+    Picture(
+        "influence",
+        "rotors",
+        f"influence {COMPRESSOR} --planes 'impeller 1,impeller 5' {PROBES} --speeds 1000:15000:100rpm",
+        "How many µm a g·mm in each plane moves each probe, at every speed: impeller 1 hardly moves "
+        "the probe DE near 5500 rpm.",
+    ),
+    Picture(
+        "reduction",
+        "reduction",
+        f"{THREE} --modes 2",
+        "Three masses of 134, 197 and 157 kg at nodes 7, 12 and 18 have the first two modes of the "
+        "rotor; the third is 8 % too low.",
+    ),
+    Picture(
+        "places",
+        "reduction",
+        "reduce sample_data/rotor23.csv --rank",
+        "Few of the 2024 choices of three nodes have both good frequencies and good shapes: the line "
+        "joins those that no other beats in both.",
+    ),
+    Picture(
+        "methods",
+        "reduction",
+        f"{THREE} --methods",
+        "Guyan's third frequency is 7.5 % too high, that of the regression 8.1 % too low; SEREP keeps"
+        " all three, with masses that are no longer diagonal.",
+    ),
+    Picture(
+        "masses-trade-off",
+        "reduction",
+        f"{THREE} --trade-off",
+        "The third frequency comes nearer than 8 % only where the first two or the shapes get worse.",
+    ),
+    Picture(
+        "errors",
+        "reduction",
+        f"{THREE} --errors compliance=1,shapes=1",
+        "Errors of 1 % of the compliances and shapes leave the masses uncertain by 4 to 7 %, and the "
+        "third frequency by 14 %.",
+    ),
+    Picture(
+        "what-if",
+        "reduction",
+        f"{THREE} --what-if alpha12=1.3",
+        "If the compliance between the first and the second mass were 1.3 times as large, the third "
+        "frequency would be 13 % higher and no mass would change by more than 2 %.",
+    ),
+    Picture(
+        "reduced-response",
+        "reduction",
+        f"{THREE} --response auto",
+        "Up to 3000 rpm, beside the critical speed, three masses answer as the rotor does within 2 %;"
+        " near the second critical speed they do not.",
+    ),
+    Picture(
+        "reduced-stability",
+        "reduction",
+        f"reduce {COMPRESSOR} --nodes 8,14,20 --modes 1 --stability 1000:14000rpm",
+        "The rotor becomes unstable at 10 932 rpm, the three masses at 11 153 rpm: the small model "
+        "keeps the threshold within about 2 %.",
+    ),
+    Picture(
+        "identify",
+        "identification",
+        f"identify {IDENTIFY}/section_1_6/model.toml {IDENTIFY}/section_1_6/data.csv "
+        "--amplitude-error 2 --phase-error 1",
+        "The model passes through all amplitudes and phases within their errors; these tell the three "
+        "damping coefficients to 7, 16 and 11 %.",
+    ),
+    Picture(
+        "shapes",
+        "identification",
+        f"identify {IDENTIFY}/task_7_1/model.toml {IDENTIFY}/task_7_1/data.csv",
+        "The three springs that were found give the measured natural frequencies within 0.2 %, and "
+        "the measured shapes.",
+    ),
+    Picture(
+        "fit",
+        "identification",
+        f"fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv",
+        "The model follows all three readings and leaves no pattern; the damping at the ends is known"
+        " to about 10 %, the mass in the middle to 0.02 %.",
+        dense=True,
+    ),
+)
+FIGURES = {one.name: one for one in GALLERY}
+"""The same by name."""
+
+
+@functools.cache
 def picture(name: str) -> bytes:
     """Run the command of a figure in the folder of the repository, and return what it draws.
 
@@ -44,7 +275,7 @@ def picture(name: str) -> bytes:
 
     from rotorid.cli import app
 
-    words = shlex.split(FIGURES[name])
+    words = shlex.split(FIGURES[name].command)
     os.environ.setdefault("SOURCE_DATE_EPOCH", "0")
     with (
         tempfile.TemporaryDirectory() as folder,
@@ -55,6 +286,23 @@ def picture(name: str) -> bytes:
         warnings.catch_warnings(),
     ):
         warnings.simplefilter("ignore")
-        target = Path(folder) / f"{name}.{kind(name)}"
+        target = Path(folder) / f"{name}.{FIGURES[name].kind}"
         app([*words, "--plot", str(target)], standalone_mode=False)
         return target.read_bytes()
+
+
+def width(drawn: bytes) -> float:
+    """Width of a picture, inches."""
+    if drawn.startswith(b"\x89PNG"):
+        return int.from_bytes(drawn[16:20], "big") / PNG_DOTS
+    found = re.search(rb'<svg[^>]* width="([\d.]+)pt"', drawn)
+    if found is None:
+        raise ValueError("neither a .png nor an .svg with a width in points")
+    return float(found[1]) / 72
+
+
+if __name__ == "__main__":  # python docs/figures.py FOLDER [NAME …]: the pictures as files, to be looked at
+    import sys
+
+    for each in sys.argv[2:] or FIGURES:
+        (Path(sys.argv[1]) / f"{each}.{FIGURES[each].kind}").write_bytes(picture(each))

@@ -1,4 +1,7 @@
-"""`{drawn} NAME`: a figure that `docs/figures.py` draws while the pages are built, inside the page itself."""
+"""Pictures that commands draw while the pages are built, inside the page itself.
+
+`{drawn} NAME`: one of `docs/figures.py`; `{gallery} GROUP`: all of a group with their commands and sentences.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,9 @@ from sphinx.util.docutils import SphinxDirective
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+PIXELS = 108
+"""An inch of a picture on the screen: letters of 9 pt are as large as those of the page, in every picture."""
+
 
 class Drawn(SphinxDirective):
     """A figure; the text below the directive says what is to be seen."""
@@ -21,24 +27,52 @@ class Drawn(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """The picture with its caption."""
-        from figures import FIGURES, kind, picture
+        from figures import FIGURES
 
         name = self.arguments[0]
         if name not in FIGURES:
             raise self.error(f"docs/figures.py draws no {name!r}, only {', '.join(FIGURES)}")
-        caption = html.escape(" ".join(self.content), quote=True)
-        if not caption:
+        if not self.content:
             raise self.error("a figure needs a text that says what is to be seen")
-        media = {"svg": "image/svg+xml", "png": "image/png"}[kind(name)]
-        address = f"data:{media};base64,{base64.b64encode(picture(name)).decode('ascii')}"
-        text = (
-            f'<figure class="drawn" id="figure-{nodes.make_id(name)}"><img alt="{caption}" src="{address}">'
-            f"<figcaption>{caption}</figcaption></figure>"
-        )
-        return [nodes.raw(text, text, format="html")]
+        return [figure(name, " ".join(self.content))]
+
+
+class Gallery(SphinxDirective):
+    """Pictures of one group: command, picture, and the sentence that it lets one read."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """All of them."""
+        from figures import GALLERY
+
+        group = [one for one in GALLERY if one.group == self.arguments[0]]
+        if not group:
+            raise self.error(f"docs/figures.py has no pictures of {self.arguments[0]!r}")
+        out: list[nodes.Node] = []
+        for one in group:
+            line = f"$ {one.typed}"
+            out += [nodes.literal_block(line, line, language="console"), figure(one.name, one.read)]
+        return out
+
+
+def figure(name: str, caption: str) -> nodes.raw:
+    """A picture inside the page, as wide as its letters ask for, with its caption."""
+    from figures import FIGURES, picture, width
+
+    drawn, said = picture(name), html.escape(caption, quote=True)
+    media = {"svg": "image/svg+xml", "png": "image/png"}[FIGURES[name].kind]
+    address = f"data:{media};base64,{base64.b64encode(drawn).decode('ascii')}"
+    text = (
+        f'<figure class="drawn" id="figure-{nodes.make_id(name)}">'
+        f'<img alt="{said}" width="{PIXELS * width(drawn):.0f}" src="{address}">'
+        f"<figcaption>{said}</figcaption></figure>"
+    )
+    return nodes.raw(text, text, format="html")
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the directive."""
+    """Register the directives."""
     app.add_directive("drawn", Drawn)
+    app.add_directive("gallery", Gallery)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

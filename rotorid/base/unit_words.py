@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 _SPEEDS = {"rpm": ("rpm", 60 / math.tau), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
 _BASES = {
@@ -18,6 +19,14 @@ _BASES = {
     "m_s2": "m/s²",
     "mm_s2": "mm/s²",
 }
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How people see a quantity: its number in SI times `scale`, and this unit or name of an axis."""
+
+    word: str
+    scale: float = 1.0
 
 
 def vibration_unit_words(unit: str) -> str:
@@ -40,6 +49,16 @@ def weight_unit_words(unit: str) -> str:
     ('g·mm', 'g')
     """
     return unit.replace("_", "·")
+
+
+def speed_axis(name: str, unit: str) -> Shown:
+    """An axis of speeds or frequencies in rad/s, shown in the unit of a file.
+
+    >>> speed_axis("speed", "rpm").word
+    'speed, rpm'
+    """
+    word, scale = _SPEEDS[unit]
+    return Shown(f"{name}, {word}", scale)
 
 
 def speed_words(speed: float, unit: str) -> str:

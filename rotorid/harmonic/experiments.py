@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
+from rotorid.base.unit_words import Shown
 
 if TYPE_CHECKING:
     from rotorid.harmonic.operator_model import HarmonicModel
+
+RAD_PER_S = Shown("frequency, rad/s")
 
 
 @dataclass(frozen=True)
@@ -76,6 +79,8 @@ class Experiments:
         From repeated readings: by signal (n, 2, 2), real and imaginary part; before `errors`.
     varying
         Known quantities (n,) that change from row to row, by name; NaN where unknown.
+    axis, units
+        How people see frequencies, and the amplitudes of signals that are not in the unit of the model.
     """
 
     names: tuple[str, ...]
@@ -85,6 +90,8 @@ class Experiments:
     errors: AmplitudeErrors | None = None
     covariances: Mapping[str, FloatArray] = field(default_factory=dict)
     varying: Mapping[str, FloatArray] = field(default_factory=dict)
+    axis: Shown = RAD_PER_S
+    units: Mapping[str, Shown] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -126,8 +133,15 @@ class Experiments:
         chosen = np.arange(len(self))[np.asarray(index)]
         tables = (self.signals, self.covariances, self.varying)
         signals, covariances, varying = ({name: x[chosen] for name, x in table.items()} for table in tables)
-        names, w, free = tuple(self.names[i] for i in chosen), self.frequencies[chosen], self.free[chosen]
-        return Experiments(names, w, signals, free, self.errors, covariances, varying)
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in chosen),
+            frequencies=self.frequencies[chosen],
+            signals=signals,
+            free=self.free[chosen],
+            covariances=covariances,
+            varying=varying,
+        )
 
     def table(self, names: Sequence[str]) -> ComplexArray:
         """Amplitudes of some signals, (n, signals), NaN where not measured."""

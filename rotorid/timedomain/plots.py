@@ -1,278 +1,175 @@
-"""Pictures of a fit to time records. Nothing is shown or saved: functions draw on axes.
-
-Legends stand below the axes, where they cover no curve; give the figure the layout "constrained".
-"""
+"""Pictures of a fit to time records. Nothing is shown or saved: functions draw on axes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotorid.base.arrays import BoolArray, FloatArray
-from rotorid.base.plot_style import COLORS
+from rotorid.base.arrays import FloatArray
+from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, look, new_figure, plain
 from rotorid.base.text import counted
+from rotorid.regression.interval_plot import ROOM, draw_intervals
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
     from rotorid.timedomain.integration.simulate import Trajectory
     from rotorid.timedomain.models.record import Record
     from rotorid.timedomain.result import Fit
 
-
-CURVE_POINTS = 600
+CURVE_POINTS, BAND = 600, "#d9dde3"
 MANY = 8
-"""Outputs, parameters or records that a legend still names."""
-STYLES: tuple[str | tuple[int, tuple[int, ...]], ...] = (
-    "-",
-    "--",
-    ":",
-    "-.",
-    (0, (8, 2)),
-    (0, (4, 1, 1, 1, 1, 1)),
-    (0, (1, 4)),
-    (0, (8, 4, 2, 4)),
-)
-MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")
-UNLIKE = 20.0
-"""Ratio of sizes above which curves on one plain scale cannot be read together."""
-FLOOR = 1e-4
-"""Smallest sensitivity that a logarithmic axis shows, relative to the largest."""
-ROUNDING = 1e-13
-"""Residuals relative to the output that are rounding errors, and not enlarged."""
-FAR = 1e6
-"""Ratio to the last value beyond which iterations are drawn at this ratio."""
+"""Records that a legend still names."""
+IN_A_COLUMN = 3
+"""Signals that stand below each other; more stand in two columns."""
+SIGNAL, STRIP, INPUT = 1.4, 0.8, 0.9
+"""Heights of a signal, of its residuals and of an input, inches."""
 
 
 def figure_fit(result: Fit) -> Figure:
-    """All about a fit: record and model, residuals, sensitivities, iterations of the parameters."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(12.5, 8.5), layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(3, 2))
-    above = figure.add_subplot(grid[0, 0])
+    """All about a fit: each signal with the model and its residuals, the inputs, the parameters."""
+    outputs, inputs = result.model.outputs, tuple(result.records[0].inputs)
+    columns = 1 if len(outputs) <= IN_A_COLUMN else 2
+    signals, driven = -(-len(outputs) // columns), -(-len(inputs) // columns)
+    heights = [SIGNAL, STRIP] * signals + [INPUT] * driven
+    parts = 0.9 + sum(heights), 0.2 + ROOM[0] + ROOM[1] * len(result.parameters)
+    figure = new_figure(sum(parts))
+    above, below = figure.subfigures(2, height_ratios=parts, squeeze=False)[:, 0]
+    axes = above.subplots(len(heights), columns, sharex=True, height_ratios=heights, squeeze=False)
     curves = fine_curves(result)
-    draw_records(result, above, curves)
-    draw_residuals(result, figure.add_subplot(grid[1, 0], sharex=above))
-    draw_sensitivities(result, figure.add_subplot(grid[0, 1]), curves)
-    draw_iterations(result, figure.add_subplot(grid[1, 1]))
+    for j, name in enumerate(outputs):
+        row, column = 2 * (j // columns), j % columns
+        draw_signal(result, name, axes[row, column], curves)
+        draw_residuals(result, name, axes[row + 1, column])
+    for j, name in enumerate(inputs):
+        draw_input(result, name, axes[2 * signals + j // columns, j % columns])
+    for column in axes.T:
+        drawn = [ax for ax in column if ax.has_data() or ax.texts]
+        drawn[-1].tick_params(labelbottom=True)
+        drawn[-1].set_xlabel(result.records[0].axis.word)
+        for ax in set(column) - set(drawn):
+            ax.remove()
+        figure.align_ylabels(drawn)
+    _legend(result, above)
+    draw_parameters(result, below.subplots())
     return figure
 
 
 def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
-    """Model and sensitivities of each record, smooth where the integrator allows it."""
+    """The model at the times of each record, and between them where the integrator allows it."""
     return tuple(_fine(result, k) for k in range(len(result.simulations)))
 
 
-def draw_records(result: Fit, axes: Axes, curves: Sequence[Trajectory] | None = None) -> None:
-    """Measured samples (points) and the fitted model (lines) over time.
-
-    Outputs of very different size are drawn over their largest measured value, which the legend gives.
-    """
+def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory] | None = None) -> None:
+    """Measured samples (points) of an output and the fitted model (lines) over time."""
+    j = result.model.outputs.index(name)
     curves = fine_curves(result) if curves is None else curves
-    scales, unlike = _scales(result)
     for k, record in enumerate(result.records):
-        for j, (name, scale) in enumerate(_named(result, scales)):
-            if name in record.outputs:
-                measured = record.outputs[name] / scale
-                axes.plot(record.t, measured, _mark(k), color=_color(j), ms=_size(record), alpha=0.5)
-            if k < len(curves):
-                y = curves[k].y[:, j] / scale
-                axes.plot(curves[k].t, y, color=_color(j), **_line(k, y))
-    axes.set(xlabel="t, s", ylabel="output / largest value" if unlike else "output")
-    axes.set_title("measured (points) and fitted model (lines)", fontsize=10)
-    _plain_numbers(axes)
-    words = [f"{name} ({_short(s)})" if unlike else name for name, s in _named(result, scales)]
-    _legend(axes, _colored(words) + _record_keys(result, lines=bool(curves)))
+        if name in record.outputs:
+            axes.plot(_times(record, record.t), record.outputs[name], **_mark(result, k))
+    for k, (record, curve) in enumerate(zip(result.records, curves, strict=False)):
+        axes.plot(_times(record, curve.t), curve.y[:, j], **_line(result, k, len(curve.t)))
+    _finish(axes, name)
 
 
-def draw_residuals(result: Fit, axes: Axes) -> None:
-    """Model minus measured, over time; over the rms of each output where these are very different."""
-    rms, sizes, unlike = _residual_sizes(result)
-    for k, j, r in _residuals(result):
-        t = result.records[k].t
-        axes.plot(t, r / sizes[j], _mark(k), color=_color(j), ms=2.5 if len(t) > 60 else 4.0)
-    axes.axhline(0.0, color="0.6", lw=0.8)
-    axes.set(xlabel="t, s", ylabel="(model − measured) / own rms" if unlike else "model − measured")
-    one = f"residuals (rms {result.residual_rms:.3g})"
-    axes.set_title("residuals, each output over its own rms" if unlike else one, fontsize=10)
-    _plain_numbers(axes)
-    if not result.simulations:
-        _say(axes, "the states diverge with the last values:\nno residuals")
-        return
-    words = list(result.model.outputs)
-    if unlike:
-        notes = [
-            "" if size == own or own == 0 else ": rounding" for size, own in zip(sizes, rms, strict=True)
-        ]
-        words = [
-            f"{n} (rms {_short(s)}{note})" for (n, s), note in zip(_named(result, rms), notes, strict=True)
-        ]
-    _legend(axes, _colored(words, line="", mark="o") + _record_keys(result, lines=False))
+def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
+    """Model minus measured over time, in a band of ± 2σ: as stated, or twice the rms of this output."""
+    j = result.model.outputs.index(name)
+    found = [
+        (k, record, run.y[:, j] - record.outputs[name])
+        for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
+        if name in record.outputs
+    ]
+    if not found:
+        words = "nothing measured" if result.simulations else "the states diverge: no residuals"
+        axes.text(0.5, 0.5, words, ha="center", va="center", transform=axes.transAxes, fontsize=TEXT)
+    rms = np.sqrt(np.nanmean(np.concatenate([r for *_, r in found]) ** 2)) if found else np.nan
+    for k, record, r in found:
+        sigma = (record.sigma or result.errors or {}).get(name, rms)
+        band = np.broadcast_to(2 * np.asarray(sigma), record.t.shape)
+        axes.fill_between(_times(record, record.t), -band, band, color=BAND, lw=0, zorder=0.5)
+        axes.plot(_times(record, record.t), r, **_mark(result, k))
+    axes.axhline(0.0, color=QUIET, lw=0.8)
+    _finish(axes, "residual")
 
 
-def draw_sensitivities(result: Fit, axes: Axes, curves: Sequence[Trajectory] | None = None) -> None:
-    """How much the outputs change, all together, per 1 % of each parameter, over time.
-
-    The root of the sum of squares over the outputs, each over its largest value if sizes are very different.
-    Logarithmic where one parameter acts much more than another.
-    """
-    curves = fine_curves(result) if curves is None else curves
-    axes.set_title("sensitivity: effect of 1 % of each parameter", fontsize=10)
-    axes.set_xlabel("t, s")
-    if not curves:
-        axes.set_xticks([])
-        _say(axes, "the states diverge with the last values:\nno sensitivities")
-        return
-    unlike = _scales(result)[1]
-    effects = [_effects(result, curve) for curve in curves]
-    largest = np.max([effect.max(axis=0) for effect in effects], axis=0)
-    top = float(largest.max())
-    acting = largest[largest > 0]
-    logarithmic = bool(acting.size and top > UNLIKE * acting.min())
-    for k, (curve, effect) in enumerate(zip(curves, effects, strict=True)):
-        # just below the frame: a curve that falls below the floor leaves the picture
-        drawn = np.maximum(effect, FLOOR / 2 * top) if logarithmic else effect
-        for i in np.flatnonzero(effect.any(axis=0)).tolist():
-            axes.plot(curve.t, drawn[:, i], color=_color(i), **_line(k, drawn[:, i]))
-    axes.set_ylabel("change of outputs" + (" / largest value" if unlike else "") + "\n(root sum of squares)")
-    if logarithmic:
-        axes.set_yscale("log")
-        axes.set_ylim(FLOOR * top, 2 * top)
-        axes.grid(alpha=0.3)
-    else:
-        _plain_numbers(axes)
-    if not acting.size:
-        axes.set_xticks([])
-        _say(axes, "no output depends on any parameter")
-    words = _effect_words(result, largest, logarithmic)
-    _legend(axes, _colored(words, shown=largest > 0) + _record_keys(result, marks=False))
+def draw_input(result: Fit, name: str, axes: Axes) -> None:
+    """A measured input of each record over time."""
+    for k, record in enumerate(result.records):
+        axes.plot(_times(record, record.t), record.inputs[name], **_line(result, k, len(record)))
+    _finish(axes, f"input {name}")
 
 
-def draw_iterations(result: Fit, axes: Axes) -> None:
-    """Parameters after each iteration, relative to the last value; those not determined are left out."""
-    steps = np.arange(len(result.history))
-    known = ~np.isnan(result.values)
-    words, far = [], 1.0
-    for i, name in enumerate(result.parameters):
-        values, word = _relative(result.history[:, i], name)
-        words.append(word if known[i] else f"{name}: not determined")
-        if known[i]:
-            far = max(far, float(np.nanmax(np.abs(values), initial=0.0)))
-            axes.plot(steps, values, "o-", color=_color(i), ms=4, lw=1.2)
-    if known.any():
-        axes.axhline(1.0, color="0.6", lw=0.8)
-    _plain_numbers(axes)
-    wide = far > UNLIKE
-    if wide:
-        _linear_near_the_end(axes, far)
-    axes.set_xlim(-0.3, max(1, len(steps) - 1) + 0.3)
-    axes.locator_params(axis="x", integer=True)
-    axes.set(xlabel="iteration", ylabel="value / last value" + ("\n(logarithmic beyond ±2)" if wide else ""))
+def draw_parameters(result: Fit, axes: Axes) -> None:
+    """Parameters with their 95 % intervals, below how the search ended."""
+    estimate = result.estimate
+    std = np.full(len(result.parameters), np.nan) if estimate.std is None else estimate.std
+    half = (estimate.coverage_factor or np.nan) * std
+    words = ["no interval" if np.isfinite(value) else "not determined" for value in result.values]
+    draw_intervals(axes, [*zip(result.parameters, result.values.tolist(), half.tolist(), words, strict=True)])
     state = "converged" if result.converged else "not converged"
-    axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=10)
-    if not known.any():
-        _say(axes, "no parameter by itself is determined\nby these data")
-    _legend(axes, _colored(words, mark="o", shown=known))
+    axes.set_title(f"{result.method}: {state} after {counted(result.iterations, 'iteration')}", fontsize=TEXT)
 
 
-def _named(result: Fit, sizes: FloatArray) -> list[tuple[str, float]]:
-    return list(zip(result.model.outputs, sizes.tolist(), strict=True))
+def _legend(result: Fit, above: SubFigure) -> None:
+    """What marks, lines and the band are, above all axes; records by their marks and lines."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    names = record_names([record.name for record in result.records])
+    stated = result.errors or any(record.sigma for record in result.records)
+    band = "residual = model − measured, ± " + ("2σ" if stated else "2 rms")
+    looks = [{**_mark(result, k), **_line(result, k, 2)} for k in range(len(names))]
+    keys: list[Artist] = [
+        Line2D([], [], label=name, **style) for name, style in zip(names, looks, strict=True)
+    ]
+    title = f"points: measured, lines: model; {band}"
+    if len(names) == 1:
+        points, line = _mark(result, 0), _line(result, 0, 2)
+        keys = [Line2D([], [], label="measured", **points), Line2D([], [], label="model", **line)]
+        keys.append(Patch(color=BAND, label=band))
+        title = ""
+    elif len(names) > MANY:
+        keys[MANY:] = [Line2D([], [], ls="", label=f"and {len(names) - MANY} more records")]
+    longest = max(len(str(key.get_label())) for key in keys)
+    columns = max(1, min(4, 150 // (longest + 10)))
+    style = {"frameon": False, "fontsize": TEXT, "title_fontsize": TEXT}
+    above.legend(loc="outside upper center", ncols=columns, handles=keys, title=title, **style)
 
 
-def _largest(result: Fit) -> FloatArray:
-    """Largest measured value of each output; of the model where nothing was measured."""
-    sizes = np.zeros(len(result.model.outputs))
-    for j, name in enumerate(result.model.outputs):
-        measured = [np.abs(record.outputs[name]) for record in result.records if name in record.outputs]
-        found = measured or [np.abs(run.y[:, j]) for run in result.simulations]
-        sizes[j] = max((np.nanmax(part, initial=0.0) for part in found), default=0.0)
-    return sizes
+def _times(record: Record, t: FloatArray) -> FloatArray:
+    return np.asarray(record.axis.scale * t)
 
 
-def _scales(result: Fit) -> tuple[FloatArray, bool]:
-    """What outputs are drawn over: their largest values where these are very different, and whether."""
-    sizes = _largest(result)
-    unlike = _unlike(sizes)
-    return np.where((sizes > 0) & unlike, sizes, 1.0), unlike
+def _mark(result: Fit, k: int) -> dict[str, Any]:
+    """Points of a record; of a single one in grey, so that the line of the model is seen on them."""
+    number = len(result.records[k])
+    size = 5.0 if number <= 60 else 3.0 if number <= 400 else 2.0
+    color = DARK if len(result.records) == 1 else look(k)["color"]
+    return {"linestyle": "", "marker": MARKERS[k % len(MARKERS)], "color": color, "ms": size, "alpha": 0.6}
 
 
-def _residuals(result: Fit) -> Iterator[tuple[int, int, FloatArray]]:
-    """Record, output, and model minus measured of every measured series."""
-    for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False)):
-        for j, name in enumerate(result.model.outputs):
-            if name in record.outputs:
-                yield k, j, run.y[:, j] - record.outputs[name]
+def _line(result: Fit, k: int, number: int) -> dict[str, Any]:
+    """Line of a record; a single value is a dash, as a line through it would not show."""
+    style = look(k) if len(result.records) > 1 else {"color": BLUE, "linestyle": "-"}
+    return {**style, "lw": 1.3, "alpha": 1.0, **({"marker": "_", "ms": 22.0} if number == 1 else {})}
 
 
-def _residual_sizes(result: Fit) -> tuple[FloatArray, FloatArray, bool]:
-    """Rms of the residuals of each output, what they are drawn over, and whether that is the rms."""
-    squares, counts = np.zeros((2, len(result.model.outputs)))
-    for _, j, r in _residuals(result):
-        squares[j] += np.nansum(r**2)
-        counts[j] += np.count_nonzero(~np.isnan(r))
-    rms = np.sqrt(squares / np.maximum(counts, 1))
-    largest = _largest(result)
-    real = rms > ROUNDING * largest
-    unlike = _unlike(rms[real]) or _unlike(largest)
-    return rms, np.where(real & unlike, rms, np.where((largest > 0) & unlike, largest, 1.0)), unlike
-
-
-def _unlike(sizes: FloatArray) -> bool:
-    some = sizes[sizes > 0]
-    return bool(some.size and some.max() > UNLIKE * some.min())
-
-
-def _effects(result: Fit, curve: Trajectory) -> FloatArray:
-    """Change of all outputs together by 1 % of each parameter, by 0.01 where it is 0, (n, n_p)."""
-    size = np.abs(result.estimate.solution)
-    steps = 0.01 * np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.norm(curve.y_theta / _scales(result)[0][:, None] * steps, axis=1))
-
-
-def _effect_words(result: Fit, largest: FloatArray, logarithmic: bool) -> list[str]:
-    words, known = [], ~np.isnan(result.values)
-    for i, name in enumerate(result.parameters):
-        notes = [] if known[i] else ["not determined"]
-        if result.estimate.solution[i] == 0:
-            notes.append("by 0.01")
-        if largest[i] == 0:
-            notes.append("no effect")
-        elif logarithmic and largest[i] < FLOOR * largest.max():
-            notes.append(f"at most {largest[i]:.1g}")
-        words.append(f"{name} ({', '.join(notes)})" if notes else name)
-    return words
-
-
-def _relative(history: FloatArray, name: str) -> tuple[FloatArray, str]:
-    """Values over the last one, at most `FAR`; over the largest where the last one is 0."""
-    last, word = float(history[-1]), name
-    if last == 0:
-        last = float(np.nanmax(np.abs(history))) or 1.0
-        word = f"{name} / {last:.3g} (ends at 0)"
-    with np.errstate(over="ignore"):
-        values: FloatArray = history / last
-    if np.nanmax(np.abs(values)) > FAR:
-        word += f" (cut at ±{FAR:.0e})".replace("e+0", "e")
-    return np.clip(values, -FAR, FAR), word
-
-
-def _linear_near_the_end(axes: Axes, far: float) -> None:
-    """A symmetric logarithmic axis, linear up to twice the last value."""
-    axes.set_yscale("symlog", linthresh=2.0, linscale=1.5)
-    most = int(np.ceil(np.log10(far)))
-    powers = range(2 if most > 3 else 1, most + 1, 2 if most > 3 else 1)
-    places = {-2.0: "−2", -1.0: "−1", 0.0: "0", 1.0: "1", 2.0: "2"}
-    for n in powers:
-        places |= {10.0**n: f"$10^{{{n}}}$", -(10.0**n): f"$-10^{{{n}}}$"}
-    axes.set_yticks(list(places), list(places.values()))
+def _finish(axes: Axes, name: str) -> None:
+    """Name with its unit, powers of ten but no offsets, and room where all values are nearly the same."""
+    axes.set_ylabel(f"{name}, \nmodel unit", fontsize=TEXT)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4), useMathText=True, useOffset=False)
+    axes.tick_params(labelsize=TEXT)
+    plain(axes)
     low, high = axes.dataLim.intervaly
-    axes.set_ylim(1.5 * low if low < -1 else low - 0.3, 1.5 * high if high > 1 else high + 0.3)
+    size = max(abs(low), abs(high))
+    if np.isfinite(size) and size > 0 and high - low < 1e-6 * size:
+        axes.set_ylim((low + high) / 2 - 0.1 * size, (low + high) / 2 + 0.1 * size)
 
 
 def _fine(result: Fit, k: int) -> Trajectory:
@@ -297,70 +194,6 @@ def _refined(record: Record) -> Record:
     return Record(t, inputs={name: np.interp(t, record.t, u) for name, u in record.inputs.items()})
 
 
-def _color(i: int) -> str:
-    return COLORS[i % len(COLORS)]
-
-
-def _mark(k: int) -> str:
-    return MARKS[k % len(MARKS)]
-
-
-def _size(record: Record) -> float:
-    return 4.0 if len(record) <= 60 else 3.0 if len(record) <= 400 else 2.0
-
-
-def _line(k: int, values: FloatArray) -> dict[str, Any]:
-    """Style of the lines of one record; a single value is a dash, as a line through it would not show."""
-    mark = "_" if len(values) == 1 else None
-    return {"ls": STYLES[k % len(STYLES)], "lw": 1.2, "marker": mark, "ms": 22.0}
-
-
-def _plain_numbers(axes: Axes) -> None:
-    """Powers of ten but no offsets at the axis, and room where all values are nearly the same."""
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True, useOffset=False)
-    axes.grid(alpha=0.3)
-    low, high = axes.dataLim.intervaly
-    size = max(abs(low), abs(high))
-    if np.isfinite(size) and size > 0 and high - low < 1e-6 * size:
-        axes.set_ylim((low + high) / 2 - 0.1 * size, (low + high) / 2 + 0.1 * size)
-
-
-def _colored(
-    words: Sequence[str], line: str = "-", mark: str = "", shown: BoolArray | None = None
-) -> list[Artist]:
-    """Keys of colors, one for each word, without line and mark where nothing is `shown`."""
-
-    def style(i: int) -> dict[str, Any]:
-        seen = shown is None or bool(shown[i])
-        return {"ls": line if seen else "", "marker": mark if seen else "", "color": _color(i)}
-
-    return _keys(words, style, "more")
-
-
-def _record_keys(result: Fit, *, lines: bool = True, marks: bool = True) -> list[Artist]:
-    """Keys of marks and line styles, one for each of several records."""
-    names = record_names([record.name for record in result.records])
-    if len(names) < 2:
-        return []
-
-    def style(k: int) -> dict[str, Any]:
-        return {"ls": STYLES[k] if lines else "", "marker": _mark(k) if marks else "", "color": "0.25"}
-
-    return _keys(names, style, "more records")
-
-
-def _keys(words: Sequence[str], style: Callable[[int], dict[str, Any]], rest: str) -> list[Artist]:
-    """At most `MANY`, and how many more there are."""
-    from matplotlib.lines import Line2D
-
-    keys: list[Artist] = [
-        Line2D([], [], ms=4.0, lw=1.2, label=word, **style(i)) for i, word in enumerate(words[:MANY])
-    ]
-    if len(words) > MANY:
-        keys.append(Line2D([], [], ls="", label=f"and {len(words) - MANY} {rest}"))
-    return keys
-
-
 def record_names(names: Sequence[str]) -> list[str]:
     """Short names of records that tell them apart: ends of paths, numbers where they are the same.
 
@@ -379,36 +212,3 @@ def record_names(names: Sequence[str]) -> list[str]:
         if len(set(short)) == len(short):
             return short
     return list(names)
-
-
-def _legend(axes: Axes, keys: list[Artist]) -> None:
-    """Below the axes and their label, in as many columns as fit."""
-    from matplotlib.transforms import ScaledTranslation
-
-    figure = axes.get_figure(root=True)
-    if not keys or figure is None:
-        return
-    longest = max(len(str(key.get_label())) for key in keys)
-    width = axes.get_position().width * figure.get_figwidth() * 72
-    rows = max(1, -(-len(keys) // max(1, int(1.15 * width / (5.0 * longest + 38)))))
-    axes.legend(
-        handles=keys,
-        loc="upper center",
-        bbox_to_anchor=(0.5, 0.0),
-        bbox_transform=axes.transAxes + ScaledTranslation(0, -34 / 72, figure.dpi_scale_trans),
-        borderaxespad=0.0,
-        frameon=False,
-        fontsize=9,
-        ncols=-(-len(keys) // rows),
-        columnspacing=1.4,
-    )
-
-
-def _short(size: float) -> str:
-    return f"{size:.3g}" if 0.01 <= size < 1e4 or size == 0 else f"{size:.1e}"
-
-
-def _say(axes: Axes, text: str) -> None:
-    """Words in an empty panel, which needs no numbers at its axis."""
-    axes.set_yticks([])
-    axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes, color="0.4")

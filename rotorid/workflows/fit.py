@@ -100,7 +100,7 @@ class RecordFit(Parts):
         return {"": self.fit}
 
     def figure(self) -> Figure:
-        """Record and model, residuals, sensitivities, iterations."""
+        """Each signal with the model and its residuals, the inputs, the parameters."""
         from rotorid.timedomain.plots import figure_fit
 
         return figure_fit(self.fit)

@@ -78,7 +78,7 @@ class Coefficients(Parts):
         return super().to_frame() if self.design is None else self.design.to_frame()
 
     def figure(self) -> Figure:
-        """Amplitudes, phases or shapes, residuals and correlations."""
+        """Amplitudes, deviations and phases, or shapes; parameters and correlations."""
         from rotorid.harmonic.plots import figure_identification
 
         if self.identification is None:

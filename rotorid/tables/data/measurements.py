@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from balancing.data.conventions import polar
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
+from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
 from rotorid.tables.reader import units
@@ -92,7 +94,8 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
             signals[name] = np.zeros(len(table), dtype=complex) if name in equations.inputs else nothing
     errors = None if file is None else file.errors
     varying = {name: table.numbers(name) for name in equations.varying}
-    rows = Experiments(names, frequency, signals, free, errors, varying=varying)
+    axis, shown = _shown(table, signals)
+    rows = Experiments(names, frequency, signals, free, errors, varying=varying, axis=axis, units=shown)
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations)
     return rows
@@ -147,6 +150,16 @@ def _frequency(table: Table) -> FloatArray:
     values = table.numbers(stem)
     table.must_be(stem, values >= 0, "a frequency of 0 or more")
     return values
+
+
+def _shown(table: Table, signals: Iterable[str]) -> tuple[Shown, dict[str, Shown]]:
+    """The axis of the frequencies, and the units of the signals that have one."""
+    stem = next(stem for stem in FREQUENCIES if stem in table)
+    columns = [(name, table.fields.get(f"{name}_{part}")) for name in signals for part in ("amplitude", "re")]
+    own = {name: column.unit for name, column in columns if column and column.unit}
+    units = {name: Shown(vibration_unit_words(u.name), u.scale) for name, u in own.items() if u.name}
+    unit = table.fields[stem].unit
+    return speed_axis(stem, unit.name if unit else "rad_s"), units
 
 
 def _amplitude(table: Table, name: str, *, unclear: bool) -> ComplexArray | None:

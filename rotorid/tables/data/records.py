@@ -12,6 +12,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
+from rotorid.base.unit_words import Shown
 from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
 from rotorid.tables.reader.grid import Cell, Grid
 from rotorid.tables.reader.problems import Problems, TableWarning
@@ -88,12 +89,14 @@ def read_record(
     t = table.numbers("t")
     if not allow_missing:
         _warn_of_gaps(table)
+    unit = table.fields["t"].unit or TIME["s"]
     return Record(
         t,
         {name: table.numbers(name) for name in model.outputs if name in table},
         {name: table.numbers(name) for name in model.inputs},
         _sigma(table, model, sigma),
         str(path),
+        Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale),
     )
 
 

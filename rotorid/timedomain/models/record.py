@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.unit_words import Shown
 
 if TYPE_CHECKING:
     from rotorid.timedomain.models.ode_model import OdeModel
+
+SECONDS = Shown("time, s")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,8 @@ class Record:
         Standard deviations of outputs by name, a number or shape (n,); None: unknown.
     name
         For messages.
+    axis
+        How people see the times.
 
     Raises
     ------
@@ -44,6 +49,7 @@ class Record:
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     sigma: Mapping[str, float | FloatArray] | None = None
     name: str = "the record"
+    axis: Shown = SECONDS
 
     def __post_init__(self) -> None:
         t = _column(self.t, f"{self.name}: the times")
@@ -120,7 +126,7 @@ def from_t0(model: OdeModel, record: Record) -> Record:
     }
     outputs = {name: longer(column, np.nan) for name, column in record.outputs.items()}
     inputs = {name: longer(column, column[0]) for name, column in record.inputs.items()}
-    return Record(longer(record.t, model.t0), outputs, inputs, sigma, record.name)
+    return replace(record, t=longer(record.t, model.t0), outputs=outputs, inputs=inputs, sigma=sigma)
 
 
 def _column(value: ArrayLike, what: str) -> FloatArray:

@@ -1,9 +1,10 @@
-"""Pictures of fits to time records: they show what the result holds."""
+"""Pictures of fits to time records: one panel a signal, and they show what the result holds."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from documents import check_hygiene
 from matplotlib.figure import Figure
 
 from rotorid.samples import sample_data
@@ -11,71 +12,165 @@ from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
-from rotorid.timedomain.plots import (
-    draw_iterations,
-    draw_records,
-    draw_residuals,
-    draw_sensitivities,
-    figure_fit,
-)
+from rotorid.timedomain.plots import draw_parameters, draw_residuals, draw_signal, figure_fit
 
-FOLDER = sample_data() / "fit" / "quasilinearization"
+FOLDER = sample_data() / "fit"
+T = np.linspace(0, 3, 31)
+PARAMETERS = ("",)
+
+
+def result_of(name, record="record.csv", **options):
+    model = read_ode_model(FOLDER / name / "model.toml")
+    return fit(model, read_record(FOLDER / name / record, model), **options)
 
 
 @pytest.fixture(scope="module")
 def result():
-    model = read_ode_model(FOLDER / "model.toml")
-    return fit(model, read_record(FOLDER / "record_noisy.csv", model))
+    return result_of("quasilinearization", "record_noisy.csv")
 
 
-def test_everything_is_drawn(result):
+def driven(count, **options):
+    """A fit to so many records with an input."""
+    model = ode_model({"x": "-a*x + u"}, initial={"x": 0.0}, estimate={"a": 0.7}, inputs=["u"])
+    wave = 0.01 * np.sin(40 * T)
+    records = [
+        Record(
+            T, {"x": k * (1 - np.exp(-T)) + wave}, {"u": np.full(31, k)}, name=f"runs/run_{k}.csv", **options
+        )
+        for k in range(1, count + 1)
+    ]
+    return fit(model, records)
+
+
+def drawn(result):
     figure = figure_fit(result)
-    assert len(figure.axes) == 4
-    assert all(axes.lines and axes.get_title() for axes in figure.axes)
-    figure.canvas.draw()
+    check_hygiene(figure, unitless=PARAMETERS)
+    above, below = figure.subfigs
+    return above, below.axes[0]
+
+
+def words(above):
+    return [text.get_text() for text in above.legends[0].get_texts()]
+
+
+def test_every_signal_has_a_panel_with_its_residuals_below(result):
+    above, parameters = drawn(result)
+    names = [ax.get_ylabel().split(",")[0] for ax in above.axes]
+    assert names == ["y1", "residual", "y2", "residual"]
+    assert all("model unit" in ax.get_ylabel() for ax in above.axes)
+    assert [ax.get_xlabel() for ax in above.axes] == ["", "", "", "time, s"]
+    assert "converged after" in parameters.get_title()
+    assert words(above) == ["measured", "model", "residual = model − measured, ± 2 rms"]
 
 
 def test_points_are_the_record_and_lines_pass_through_the_model(result):
     axes = Figure().add_subplot()
-    draw_records(result, axes)
-    points, line = axes.lines[0], axes.lines[1]
-    np.testing.assert_array_equal(points.get_ydata(), result.records[0].outputs["y1"])
+    draw_signal(result, "y2", axes)
+    points, line = axes.lines
+    np.testing.assert_array_equal(points.get_ydata(), result.records[0].outputs["y2"])
     t, y = line.get_data()
     assert len(t) > 600
-    np.testing.assert_allclose(np.interp(result.records[0].t, t, y), result.simulations[0].y[:, 0], atol=1e-8)
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["y1", "y2"]
+    np.testing.assert_allclose(np.interp(result.records[0].t, t, y), result.simulations[0].y[:, 1], atol=1e-8)
 
 
-def test_residuals_sensitivities_and_iterations(result):
+def band(axes):
+    """Largest height of the grey band."""
+    return axes.collections[0].get_paths()[0].vertices[:, 1].max()
+
+
+def test_residuals_stand_in_a_band_of_two_standard_deviations(result):
+    gap = result.simulations[0].y[:, 1] - result.records[0].outputs["y2"]
     axes = Figure().add_subplot()
-    draw_residuals(result, axes)
-    record, run = result.records[0], result.simulations[0]
-    np.testing.assert_array_equal(axes.lines[1].get_ydata(), run.y[:, 1] - record.outputs["y2"])
-    axes = Figure().add_subplot()
-    draw_sensitivities(result, axes)
-    effect = 0.01 * abs(result.values[0]) * np.hypot(*run.y_theta[:, :, 0].T)
-    t, drawn = axes.lines[0].get_data()
-    np.testing.assert_allclose(drawn[np.isin(t, run.t)], effect, rtol=1e-6, atol=1e-12)
-    axes = Figure().add_subplot()
-    draw_iterations(result, axes)
-    assert len(axes.lines[0].get_ydata()) == result.iterations + 1
-    assert axes.lines[0].get_ydata()[-1] == 1.0
+    draw_residuals(result, "y2", axes)
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), gap)
+    assert band(axes) == pytest.approx(2 * np.sqrt(np.mean(gap**2)))
+    stated = replace(result, records=(replace(result.records[0], sigma={"y1": 0.02, "y2": 0.03}),))
+    for found, size in ((stated, 0.06), (replace(result, errors={"y1": 0.5, "y2": 0.7}), 1.4)):
+        axes = Figure().add_subplot()
+        draw_residuals(found, "y2", axes)
+        assert band(axes) == pytest.approx(size)
+        assert words(figure_fit(found).subfigs[0])[-1].endswith("± 2σ")
 
 
-def test_inputs_missing_samples_and_several_records():
-    model = ode_model({"x": "-a*x + u"}, initial={"x": 0.0}, estimate={"a": 0.7}, inputs=["u"])
-    t = np.linspace(0, 5, 21)
-    x = 1 - np.exp(-t)
-    x[4] = np.nan
-    one = Record(t, {"x": x}, {"u": np.ones(21)})
-    two = Record(t, {"x": 2 * x}, {"u": np.full(21, 2.0)})
-    figure = figure_fit(fit(model, [one, two]))
-    figure.canvas.draw()
-    assert len(figure.axes[0].lines) == 4
+def test_parameters_have_their_intervals_in_percent_of_their_values(result):
+    axes = Figure().add_subplot()
+    draw_parameters(result, axes)
+    ends = [bar[2][0].get_segments()[0][:, 0] for bar in axes.containers]
+    values = result.values[:, None]
+    np.testing.assert_allclose(ends, 100 * (result.estimate.ci95 - values) / np.abs(values))
+
+
+def test_what_is_not_determined_says_so():
+    model = ode_model({"x": "-(a + b)*x"}, initial={"x": "x0"}, estimate={"a": 0.3, "b": 0.4, "x0": 0.8})
+    axes = drawn(fit(model, Record(T, {"x": np.exp(-T) + 0.01 * np.cos(9 * T)})))[1]
+    assert [text.get_text() for text in axes.texts][:2] == ["not determined"] * 2
+    assert [label.get_text() for label in axes.get_yticklabels()][:2] == ["a", "b"]
+
+
+def test_several_records_differ_by_mark_line_and_colour_in_every_panel():
+    above, _ = drawn(driven(3))
+    assert words(above) == ["run_1.csv", "run_2.csv", "run_3.csv"]
+    assert "points: measured, lines: model" in above.legends[0].get_title().get_text()
+    signal, residual, entered = above.axes
+    keys = above.legends[0].legend_handles
+    for get in ("get_color", "get_marker"):
+        seen = [getattr(key, get)() for key in keys]
+        assert len(set(seen)) == 3
+        assert seen == [getattr(line, get)() for line in signal.lines[:3]]
+        assert seen == [getattr(line, get)() for line in residual.lines[:3]]
+    assert [line.get_linestyle() for line in signal.lines[3:]] == [key.get_linestyle() for key in keys]
+    assert len({line.get_linestyle() for line in signal.lines[3:]}) == 3
+    assert entered.get_ylabel().startswith("input u")
+    assert [line.get_ydata()[0] for line in entered.lines] == [1, 2, 3]
+
+
+def test_times_stand_in_the_unit_of_the_record(tmp_path):
+    lines = (FOLDER / "quasilinearization" / "record.csv").read_text(encoding="utf-8").splitlines()
+    rows = [lines[0].replace("t_s", "t_ms"), *lines[1:]]
+    (tmp_path / "record.csv").write_text("\n".join(rows), encoding="utf-8")
+    model = read_ode_model(FOLDER / "quasilinearization" / "model.toml")
+    record = read_record(tmp_path / "record.csv", model)
+    assert record.t[1] == pytest.approx(0.1047197551e-3)
+    above, _ = drawn(fit(model, record))
+    assert above.axes[-1].get_xlabel() == "time, ms"
+    assert above.axes[0].lines[0].get_xdata()[1] == pytest.approx(0.1047197551)
+
+
+def test_more_signals_stand_in_two_columns():
+    above, _ = drawn(result_of("three_masses"))
+    assert [ax.get_ylabel().split(",")[0] for ax in above.axes[:4]] == ["y1", "v1", "residual", "residual"]
+    assert len(above.axes) == 12
+    assert [ax.get_xlabel() for ax in above.axes[-2:]] == ["time, s"] * 2
+    outputs = {f"x{i}": f"{i + 1}*s" for i in range(5)}
+    model = ode_model({"s": "-a*s"}, initial={"s": 1.0}, outputs=outputs, estimate={"a": 0.8})
+    above, _ = drawn(fit(model, Record(T, {f"x{i}": (i + 1) * np.exp(-T) for i in range(5)})))
+    assert len(above.axes) == 10
+    assert sum(ax.get_xlabel() == "time, s" for ax in above.axes) == 2
+
+
+def test_many_records_are_counted():
+    assert words(drawn(driven(10))[0])[-1] == "and 2 more records"
 
 
 def test_a_result_without_trajectories_says_so(result):
-    figure = figure_fit(replace(result, simulations=()))
-    figure.canvas.draw()
-    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
-    assert sum("diverge" in text for text in texts) == 2
+    above, _ = drawn(replace(result, simulations=()))
+    texts = [text.get_text() for ax in above.axes for text in ax.texts]
+    assert texts == ["the states diverge: no residuals"] * 2
+
+
+def test_an_output_that_was_not_measured_has_its_line():
+    model = ode_model({"x": "-a*x"}, initial={"x": 1.0}, outputs={"x": "x", "z": "2*x"}, estimate={"a": 0.8})
+    above, _ = drawn(fit(model, Record(T, {"x": np.exp(-T) + 0.01 * np.cos(9 * T)})))
+    assert [len(ax.lines) for ax in above.axes[2:]] == [1, 1]
+    assert above.axes[3].texts[0].get_text() == "nothing measured"
+
+
+def test_a_single_sample_has_plain_axes():
+    model = ode_model({"x": "-a*x"}, initial={"x": "2 + sign(a)"}, estimate={"a": 0.5})
+    result = fit(model, Record(np.array([2.0]), {"x": np.array([2.0])}))
+    near = replace(result.simulations[0], y=np.array([[2.0 + 1e-10]]))
+    axes = drawn(replace(result, simulations=(near,)))[0].axes[0]
+    low, high = axes.get_ylim()
+    assert low < 1.9
+    assert high > 2.1
+    assert axes.yaxis.get_offset_text().get_text() == ""
