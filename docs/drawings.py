@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from balancing.data.conventions import Labels
-from rotorid.report.conventions_explained import phase_figure, rotor_figure
+from rotorid.report.conventions_explained import phase_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -149,20 +149,50 @@ def _arc(
     _text(ax, radius + 0.14, sum(ends) / 2, words, color=color)
 
 
-def _ends(view: str, rotation: str) -> Figure:
-    """The sheet's drawing of the rotor, seen from one end."""
-    return rotor_figure(Labels(rotation=rotation, view=view))  # type: ignore[arg-type]
+def _phase(phase: str) -> Figure:
+    """The sheet's drawing of a reading and its pulses."""
+    figure = phase_figure(Labels(phase=phase))  # type: ignore[arg-type]
+    for text in figure.axes[0].texts:
+        text.set_fontsize(9.0)
+        text.set_bbox({"fc": "white", "ec": "none", "pad": 1.0})
+    return figure
+
+
+def _counted(left: tuple[str, int, int], right: tuple[str, int, int]) -> Figure:
+    """Two ends of a rotor: words, and how rotation and angles turn on the paper, 1 counter-clockwise."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 3.3))
+    for i, (words, rotation, angles) in enumerate((left, right)):
+        ax = figure.add_axes((i / 2, 0.0, 0.5, 0.86))
+        _end(ax, (-1.75, 1.75), (-1.4, 1.4))
+        ax.plot(1.0, 0.0, marker=(3, 0, 90), color="black", ms=10)
+        for degrees, beside in ((0, "mark, 0°"), (90, "90°"), (180, "180°"), (270, "270°")):
+            way = np.radians(degrees * angles)
+            _ray(ax, way, (0.95, 1.0))
+            _text(ax, 1.38 if degrees == 0 else 1.2, way, beside)
+        weight = np.radians(60.0) * angles
+        _ray(ax, 0.0, (0.0, 0.9), color="0.4", ls="--")
+        _ray(ax, weight, (0.0, 0.8), color=ORANGE)
+        _dot(ax, 0.84, weight)
+        _arc(ax, 0.5, (0.0, weight), "60°", color=ORANGE)
+        around = np.pi + np.radians([-55.0, 55.0]) * rotation
+        _arc(ax, 0.78, (around[0], around[1]))
+        _text(ax, 0.4, np.pi, "rotation")
+        figure.text((i + 0.5) / 2, 0.88, words, ha="center", va="bottom")
+    return figure
 
 
 DRAWINGS: dict[str, Callable[[], Figure]] = {
     "turning": turning,
-    "lag": lambda: phase_figure(Labels(phase="lag")),
-    "lead": lambda: phase_figure(Labels(phase="lead")),
+    "lag": lambda: _phase("lag"),
+    "lead": lambda: _phase("lead"),
     "amplitudes": amplitudes,
-    "with-rotation": lambda: rotor_figure(Labels(angles="with rotation")),
-    "against-rotation": lambda: rotor_figure(Labels(angles="against rotation")),
-    "drive-end": lambda: _ends("drive end", "clockwise"),
-    "free-end": lambda: _ends("free end", "counter-clockwise"),
+    "angles": lambda: _counted(("with the rotation", 1, 1), ("against the rotation", 1, -1)),
+    "ends": lambda: _counted(
+        ("seen from the drive end:\nthe rotor turns clockwise", -1, -1),
+        ("seen from the free end:\nthe rotor turns counter-clockwise", 1, 1),
+    ),
     "spots": spots,
 }
 """Drawings by name."""

@@ -1,6 +1,6 @@
 """Figures made while the pages are built, inside the page itself.
 
-`{drawn} NAME` is what a command of `docs/figures.py` draws, `{drawing} NAME …` drawings of `docs/drawings.py`.
+`{drawn} NAME` is what a command of `docs/figures.py` draws, `{drawing} NAME …` what `docs/drawings.py` draws.
 """
 
 from __future__ import annotations

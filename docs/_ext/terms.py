@@ -46,9 +46,24 @@ def link_terms(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     if docname == GLOSSARY or not known:
         return
     found, linked = finder(list(known)), set(_linked(doctree))
+    _join(doctree)
     for text in list(doctree.findall(nodes.Text)):
         if not _left_alone(text):
             _link(app, docname, text, found, known, linked)
+
+
+def _join(doctree: nodes.document) -> None:
+    """Make one text of texts that follow each other: a line that was broken in the source is two."""
+    for node in list(doctree.findall(nodes.Element)):
+        joined: list[nodes.Node] = []
+        for child in node.children:
+            if joined and isinstance(child, nodes.Text) and isinstance(joined[-1], nodes.Text):
+                joined[-1] = nodes.Text(joined[-1].astext() + child.astext())
+            else:
+                joined.append(child)
+        if len(joined) < len(node.children):
+            node.children = []
+            node.extend(joined)
 
 
 def _linked(doctree: nodes.document) -> list[str]:
@@ -88,7 +103,9 @@ def _link(
         parts += [nodes.Text(whole[end : match.start()]), reference]
         end = match.end()
     if parts:
-        text.parent.replace(text, [*parts, nodes.Text(whole[end:])])
+        parent = text.parent
+        place = next(i for i, child in enumerate(parent.children) if child is text)
+        parent[place : place + 1] = [*parts, nodes.Text(whole[end:])]
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -23,8 +24,11 @@ def workplace(tmp_path, monkeypatch):
     return tmp_path
 
 
+USERS = {"balancing", "rotor", "identification"}
+
+
 def test_there_is_a_page_for_each_of_the_three_users():
-    assert {page.stem for page in STARTS} >= {"balancing", "rotor", "identification"}
+    assert {page.stem for page in STARTS} == {*USERS, "installation"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
@@ -40,7 +44,7 @@ def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplac
         len(commands(block)) if block.kind == "console" else block.kind == "python" for block in blocks(page)
     )
     if page in STARTS or page in QUESTIONS:
-        assert ran >= (5 if page in STARTS else 2)
+        assert ran >= (5 if page.stem in USERS else 2)
         for block in blocks(page):
             for command, _ in commands(block) if block.kind == "console" else ():
                 for target in re.findall(
@@ -87,6 +91,16 @@ def test_a_wrong_number_on_a_page_is_found(tmp_path, workplace, cli, capsys):
     page.write_text(text.replace("135.2404       1291.45", "135.2405       1291.45"), encoding="utf-8")
     with pytest.raises(AssertionError, match=r"not printed: 1 135\.2405"):
         run_page(page, workplace, cli, capsys)
+
+
+def test_the_installation_is_that_of_the_package():
+    page = (DOCS / "getting_started" / "installation.md").read_text(encoding="utf-8")
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert f"in '{project['requires-python']}'" in page
+    assert f"{project['name']}-{project['version']}-py3-none-any.whl" in page
+    assert project["scripts"].keys() == {"rotorid"}
+    for name in re.findall(r"--constraint[s= ]+(\S+)", page):
+        assert (DOCS.parent / name.strip('"`')).exists(), name
 
 
 def test_every_file_that_a_page_shows_to_be_written_lies_beside_its_command():

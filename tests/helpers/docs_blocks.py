@@ -109,7 +109,7 @@ def run_page(page: Path, folder: Path, cli, capsys, renewals: dict[str, str] | N
 
     Blocks with a caption are files; console blocks are compared with what is printed; python blocks of a page
     share their names, and a text block with the caption "prints" says what the one before it prints. Tables
-    below **Sheet `name`** are typed into the workbook. With `renewals` nothing is compared: it takes old and new
+    below **Sheet `name`** are typed into the workbook. With `renewals` nothing fails: it takes old and new
     console blocks.
     """
     names: dict[str, object] = {"__name__": "docs"}
@@ -124,7 +124,8 @@ def run_page(page: Path, folder: Path, cli, capsys, renewals: dict[str, str] | N
                 outcome = cli(*words)
                 wrong = first_difference(expected, outcome.out + outcome.err)
                 refused = any(line.startswith("rotorid: ") for line in expected)
-                shown += [f"$ {command}", *renewed(expected, outcome.out + outcome.err)]
+                now = expected if wrong is None else renewed(expected, outcome.out + outcome.err)
+                shown += [f"$ {command}", *now]
                 ran += 1
                 if renewals is not None:
                     continue
