@@ -1,4 +1,7 @@
-"""Style of all pictures: colours, line styles, axes."""
+"""Style of all pictures: colours, line styles, axes.
+
+A picture is at most `WIDTH` wide and no letter of it smaller than `TEXT`: then it stands in a page as it is.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,8 @@ COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#00
 BLUE, VERMILION = COLORS[:2]
 STYLES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+WIDTH, TEXT = 7.0, 9.0
+"""Inches, of the widest picture; points, of the smallest letters."""
 GRID, QUIET, DARK = "#e4e7eb", "#6b7480", "#4a5360"
 BOX = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8}
 """Behind words that stand on curves."""
@@ -26,7 +31,7 @@ WARNING = "#8a3d00"
 _ACROSS = ("data", "axes fraction")
 
 
-def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
+def new_axes(size: tuple[float, float] = (WIDTH, 4.2)) -> Axes:
     """Make axes of a new figure, size in inches."""
     from matplotlib import pyplot as plt
 
@@ -34,12 +39,22 @@ def new_axes(size: tuple[float, float] = (10, 5)) -> Axes:
     return ax
 
 
-def on_figure(draw: Callable[[Axes], object], width: float = 9.0, height: float = 5.0) -> Figure:
-    """A new figure, size in inches, with what a function draws on its axes; it needs no screen."""
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure, size in inches; it needs no screen."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    draw(figure.add_subplot())
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def on_figure(
+    draw: Callable[[Axes], object],
+    width: float = WIDTH,
+    height: float = 4.2,
+    **options: Any,  # noqa: ANN401  of matplotlib
+) -> Figure:
+    """A new figure, size in inches, with what a function draws on its axes; options as for `add_subplot`."""
+    figure = new_figure(height, width)
+    draw(figure.add_subplot(**options))
     return figure
 
 
@@ -57,7 +72,7 @@ def note(
     **options: Any,  # noqa: ANN401  of matplotlib
 ) -> None:
     """Small words at a place of the data, moved by so many points; options as for `annotate`."""
-    ax.annotate(text, at, xytext=shift, textcoords="offset points", **{"fontsize": "small", **options})
+    ax.annotate(text, at, xytext=shift, textcoords="offset points", **{"fontsize": TEXT, **options})
 
 
 def legend_above(
@@ -73,7 +88,7 @@ def legend_above(
         bbox_to_anchor=(0.5, height),
         ncols=columns,
         frameon=False,
-        fontsize="small",
+        fontsize=TEXT,
         markerscale=marker_scale,
         **options,
     )
@@ -81,7 +96,7 @@ def legend_above(
 
 def legend_beside(ax: Axes) -> None:
     """A legend that hides nothing, right of the axes."""
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize="small")
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=TEXT)
 
 
 def plain(ax: Axes) -> None:
@@ -112,15 +127,15 @@ def shade_operating(ax: Axes, operating: tuple[float, float] | None) -> None:
 def rpm_above(ax: Axes) -> None:
     """A second scale, revolutions per minute, above one in rad/s."""
     top = ax.secondary_xaxis("top", functions=(times(RPM), times(1 / RPM)))
-    top.set_xlabel("speed, rpm", fontsize="small")
-    top.tick_params(labelsize="small")
+    top.set_xlabel("speed, rpm", fontsize=TEXT)
+    top.tick_params(labelsize=TEXT)
 
 
 def scale_beside(ax: Axes, unit: float, label: str) -> None:
     """A second scale right of the first: of values in this unit."""
     right = ax.secondary_yaxis("right", functions=(times(1 / unit), times(unit)))
-    right.set_ylabel(label, fontsize="small")
-    right.tick_params(labelsize="small")
+    right.set_ylabel(label, fontsize=TEXT)
+    right.tick_params(labelsize=TEXT)
 
 
 def times(factor: float) -> Callable[[ArrayLike], ArrayLike]:

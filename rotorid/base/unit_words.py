@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+_SPEEDS = {"rpm": ("rpm", 60 / math.tau), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
 _BASES = {
     "m": "m",
     "mm": "mm",
@@ -37,3 +40,13 @@ def weight_unit_words(unit: str) -> str:
     ('g·mm', 'g')
     """
     return unit.replace("_", "·")
+
+
+def speed_words(speed: float, unit: str) -> str:
+    """A speed in rad/s as text in the unit of the job.
+
+    >>> speed_words(314.159265, "rpm"), speed_words(314.159265, "Hz")
+    ('3000 rpm', '50 Hz')
+    """
+    word, scale = _SPEEDS[unit]
+    return f"{speed * scale:.6g} {word}"

@@ -47,3 +47,32 @@ def test_pytest_sees_the_fixtures_and_not_the_cases():
 def test_a_table_that_cannot_be_is_refused(values):
     with pytest.raises(AssertionError):
         each_of("a, b", values)
+
+
+def test_the_hygiene_of_pictures_can_fail():
+    from documents import check_hygiene
+    from matplotlib.figure import Figure
+
+    def picture(width=7.0, name="sag, mm", letters=9.0, legends=1, title="weights, g"):
+        figure = Figure((width, 4), layout="constrained")
+        for ax in figure.subplots(2, 1, sharex=True)[:legends]:
+            ax.plot([1, 2], label="curve")
+            ax.legend()
+        for ax in figure.axes:
+            ax.set_ylabel(name)
+        figure.axes[1].set_xlabel("node")
+        figure.axes[0].text(0.5, 1.5, "word", fontsize=letters)
+        figure.axes[0].secondary_xaxis("top").set_xlabel("speed, rpm")
+        figure.add_subplot(3, 1, 3, projection="polar").set_title(title)
+        return figure
+
+    check_hygiene(picture(), unitless=["node"])
+    for broken in ({"width": 7.5}, {"name": "sag"}, {"letters": 8.9}, {"legends": 2}, {"title": "weights"}):
+        with pytest.raises(AssertionError, match=r"in wide|no unit|letters|legends"):
+            check_hygiene(picture(**broken), unitless=["node"])
+    with pytest.raises(AssertionError, match="no unit"):
+        check_hygiene(picture())
+    cut = picture()
+    cut.text(0.9, 0.5, "far too long to stand here")
+    with pytest.raises(AssertionError, match="cut off"):
+        check_hygiene(cut, unitless=["node"])
