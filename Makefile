@@ -20,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Compiled modules are kept: every test that starts the program needs them.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-full test-latest test-lowest mutants fuzz golden golden-exact lint docs format bench build constraints clean
+.PHONY: demo test test-full test-latest test-lowest mutants fuzz golden golden-exact lint docs pages format bench build constraints clean
 .DELETE_ON_ERROR:
 
 # $(call environment,FOLDER): made there, or brought up to date
@@ -87,6 +87,10 @@ lint: $(VENV)/.dev
 docs: $(VENV)/.dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
+
+# Literal outputs on the pages, after a change that is meant to change them; then look at `git diff docs`.
+pages: $(VENV)/.dev
+	ROTORID_RENEW_PAGES=1 $(BIN)/python -m pytest -q tests/docs/test_pages.py -k every_block_of_a_page
 
 format: $(VENV)/.dev
 	$(BIN)/ruff format .

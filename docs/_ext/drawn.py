@@ -1,6 +1,7 @@
-"""Pictures that commands draw while the pages are built, inside the page itself.
+"""Figures made while the pages are built, inside the page itself.
 
-`{drawn} NAME`: one of `docs/figures.py`; `{gallery} GROUP`: all of a group with their commands and sentences.
+`{drawn} NAME` is what a command of `docs/figures.py` draws, `{gallery} GROUP` all of a group with their commands and
+sentences; `{drawing} NAME …` is what `docs/drawings.py` draws.
 """
 
 from __future__ import annotations
@@ -71,8 +72,31 @@ def figure(name: str, caption: str) -> nodes.raw:
     return nodes.raw(text, text, format="html")
 
 
+class Drawing(SphinxDirective):
+    """One drawing, or several side by side, in their own size; the text below says what is to be seen."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        """The drawings with their caption."""
+        from drawings import DRAWINGS, svg
+
+        names = self.arguments[0].split()
+        unknown = [name for name in names if name not in DRAWINGS]
+        caption = html.escape(" ".join(self.content), quote=True)
+        if unknown or not caption:
+            raise self.error(f"docs/drawings.py draws {', '.join(DRAWINGS)}, and each needs a text")
+        coded = (base64.b64encode(svg(name)).decode("ascii") for name in names)
+        images = "".join(f'<img alt="{caption}" src="data:image/svg+xml;base64,{each}">' for each in coded)
+        text = f'<figure class="drawing">{images}<figcaption>{caption}</figcaption></figure>'
+        return [nodes.raw(text, text, format="html")]
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("drawn", Drawn)
     app.add_directive("gallery", Gallery)
+    app.add_directive("drawing", Drawing)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

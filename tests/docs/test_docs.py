@@ -16,10 +16,12 @@ for _folder in (DOCS / "_ext", DOCS):
     sys.path.insert(0, str(_folder))
 
 import commands as command_pages  # noqa: E402 - of docs/_ext
+import drawings  # noqa: E402
 import figures  # noqa: E402
 import mathml  # noqa: E402
 import names  # noqa: E402
 import results  # noqa: E402
+import terms  # noqa: E402
 
 PACKAGES = (
     "fem",
@@ -172,6 +174,49 @@ def test_a_figure_is_the_same_every_time():
     first, second = figures.picture("modes"), figures.picture("modes")
     assert first == second
     assert first.startswith(b"<?xml")
+
+
+def test_drawings_are_on_a_page_and_the_same_every_time(built):
+    sources = "".join(path.read_text(encoding="utf-8") for path in DOCS.rglob("*.md"))
+    shown = " ".join(re.findall(r"^```{drawing} (.*)$", sources, re.MULTILINE)).split()
+    assert set(shown) == set(drawings.DRAWINGS)
+    made = sum(path.read_text("utf-8").count("<img alt=") for path in built.rglob("*.html"))
+    assert made == len(shown) + len(figures.FIGURES)
+    assert drawings.svg("turning") == drawings.svg("turning")
+
+
+def test_the_first_use_of_a_term_leads_to_the_glossary(built):
+    labels = set(re.findall(r'<dt id="(term-[^"]+)"', page(built, "glossary")))
+    assert len(labels) >= 60
+    linked = {}
+    for path in built.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        found = re.findall(r'<a class="[^"]*\bterm\b[^"]*" href="[^"]*glossary\.html#([^"]+)"', text)
+        assert len(found) == len(set(found)), path.name
+        assert set(found) <= labels, path.name
+        linked[path.relative_to(built).with_suffix("").as_posix()] = set(found)
+        # no paragraph has a term of which the page has no link
+        said = " ".join(re.findall(r"<p>(.*?)</p>", text, re.DOTALL))
+        plain = re.sub(r"<(code|a|cite)\b.*?</\1>", "·", said, flags=re.DOTALL)
+        for term in ("influence coefficient", "critical speed", "condition number", "trial weight"):
+            label = f"term-{term.replace(' ', '-')}"
+            if path.stem != "glossary" and terms.finder([term]).search(html.unescape(plain)):
+                assert label in text, f"{path.name}: {term}"
+    assert {"term-condition-number", "term-trial-weight"} <= linked["getting_started/balancing"]
+    assert "term-Guyan" in linked["getting_started/rotor"]
+    assert "term-key-phasor" in linked["conventions"]
+
+
+def test_terms_are_whole_words_in_any_number_and_the_longest_first():
+    found = terms.finder(["rank", "residual", "permissible residual unbalance", "1×", "95 % interval"])
+    text = "Ranks, frank; no permissible\nresidual unbalance, residuals 1× and 95 % intervals"
+    assert [match[0] for match in found.finditer(text)] == [
+        "Ranks",
+        "permissible\nresidual unbalance",
+        "residuals",
+        "1×",
+        "95 % intervals",
+    ]
 
 
 def test_the_validation_page_has_every_row(built):

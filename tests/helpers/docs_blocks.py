@@ -1,11 +1,18 @@
-"""The code blocks of a documentation page, run as a reader would run them, from top to bottom."""
+"""The code blocks of a documentation page, run as a reader would run them, from top to bottom.
 
+Literal outputs are compared; with ROTORID_RENEW_PAGES=1 (`make pages`) they are written anew instead.
+"""
+
+import difflib
 import re
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+import openpyxl
+
 FENCE = re.compile(r"^```(.*)\n((?::\w+:.*\n)*)((?:(?!```).*\n)*)```$", re.MULTILINE)
+SHEET = re.compile(r"^\*\*Sheet `(\w+)`\*\*.*\n(?:.+\n)*\n((?:\|.*\n)+)", re.MULTILINE)
 SKIPPED = ("...", "…")
 
 
@@ -27,7 +34,11 @@ def blocks(page: Path) -> list[Block]:
         caption = re.search(r"^:caption: (.*)$", match[2], re.MULTILINE)
         line = text.count("\n", 0, match.start()) + 1
         found.append(Block(match[1].strip(), caption[1].strip() if caption else "", match[3], line))
-    return found
+    found += [
+        Block("sheet", match[1], match[2], text.count("\n", 0, match.start()) + 1)
+        for match in SHEET.finditer(text)
+    ]
+    return sorted(found, key=lambda block: block.line)
 
 
 def commands(block: Block) -> list[tuple[str, list[str]]]:
@@ -59,26 +70,72 @@ def first_difference(expected: list[str], printed: str) -> str | None:
     return None
 
 
-def run_page(page: Path, folder: Path, cli, capsys) -> int:
+def renewed(expected: list[str], printed: str) -> list[str]:
+    """What a page shows of an output now: all of it, or for each of its lines the most similar one."""
+    lines = [line.rstrip() for line in printed.strip("\n").splitlines()]
+    if not any(line.strip() in SKIPPED for line in expected):
+        return lines if expected else []
+    out: list[str] = []
+    position = 0
+    for line in expected:
+        near = difflib.get_close_matches(line, lines[position:], n=1, cutoff=0.6) if line.strip() else []
+        if line.strip() not in SKIPPED and near:
+            found = lines.index(near[0], position)
+            out += ["..."] * any(lines[position:found]) + [lines[found]]
+            position = found + 1
+    return [*out, *["..."] * any(lines[position:])]
+
+
+def type_sheet(book: Path, name: str, table: str) -> None:
+    """Type a table of a page into a sheet: numbers as numbers, new headers over the old ones."""
+    workbook = openpyxl.load_workbook(book)
+    sheet = workbook[name]
+    rows = [[cell.strip() for cell in line.strip("| ").split("|")] for line in table.splitlines()]
+    head, cells = rows[0], rows[2:]
+    known = [cell.value for cell in sheet[1]]
+    places = [known.index(word) + 1 if word in known else i for i, word in enumerate(head, 1)]
+    below = {sheet.cell(row, 1).value: row for row in range(2, sheet.max_row + 1)}
+    for column, word in zip(places, head, strict=True):
+        sheet.cell(1, column).value = word
+    for i, values in enumerate(cells, 2):
+        for column, value in zip(places, values, strict=True):
+            number = re.fullmatch(r"-?\d+(\.\d+)?", value)
+            sheet.cell(below.get(values[0], i), column).value = float(value) if number else value
+    workbook.save(book)
+
+
+def run_page(page: Path, folder: Path, cli, capsys, renewals: dict[str, str] | None = None) -> int:
     """Run a page's blocks within a folder (the current one); returns how many commands and scripts ran.
 
-    Blocks with a caption are files; console blocks are compared with what is printed; python blocks of a
-    page share their names, and a text block with the caption "prints" says what the one before it prints.
+    Blocks with a caption are files; console blocks are compared with what is printed; python blocks of a page
+    share their names, and a text block with the caption "prints" says what the one before it prints. Tables
+    below **Sheet `name`** are typed into the workbook. With `renewals` nothing fails: it takes old and new
+    console blocks.
     """
     names: dict[str, object] = {"__name__": "docs"}
     ran, printed = 0, ""
     for block in blocks(page):
         where = f"{page.name}, line {block.line}"
         if block.kind == "console":
+            shown: list[str] = []
             for command, expected in commands(block):
                 program, *words = shlex.split(command)
                 assert program == "rotorid", f"{where}: {command}"
                 outcome = cli(*words)
                 wrong = first_difference(expected, outcome.out + outcome.err)
                 refused = any(line.startswith("rotorid: ") for line in expected)
+                now = expected if wrong is None else renewed(expected, outcome.out + outcome.err)
+                shown += [f"$ {command}", *now]
+                ran += 1
+                if renewals is not None:
+                    continue
                 assert outcome.code == (2 if refused else 0), f"{where}: {command}\n{outcome.err}"
                 assert wrong is None, f"{where}: {command}\nnot printed: {wrong}\n{outcome.out}{outcome.err}"
-                ran += 1
+            if renewals is not None:
+                renewals[block.text] = "\n".join(shown) + "\n"
+        elif block.kind == "sheet":
+            [book] = folder.glob("*.xlsx")
+            type_sheet(book, block.caption, block.text)
         elif block.kind == "python":
             capsys.readouterr()
             exec(compile("\n" * block.line + block.text, str(page), "exec"), names)
