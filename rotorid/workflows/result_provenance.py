@@ -8,14 +8,14 @@ import hashlib
 import inspect
 import logging
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from rotorid.base.answer import Answer, together
+from rotorid.base.answer import Answer, Answered, together
 from rotorid.workflows.input_checks import changed, checked, plain
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ log = logging.getLogger("rotorid.workflows")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Outcome(ABC):
+class Outcome(Answered):
     """What a workflow gives.
 
     Attributes
@@ -45,15 +45,6 @@ class Outcome(ABC):
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-
-    @property
-    def answer(self) -> Answer:
-        """What is told first, and the tables behind it."""
-        return Answer("", self.summary())  # until every outcome has its own
-
-    def summary(self) -> str:
-        """The answer, at most 24 lines."""
-        return self.answer.brief()
 
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
@@ -90,11 +81,7 @@ class Parts(Outcome):
     @property
     def answer(self) -> Answer:
         """Those of the parts, one after the other."""
-        return together(
-            part.answer if hasattr(part, "answer") else Answer("", part.summary())  # until every part has
-            for part in self.parts.values()
-            if part is not None
-        )
+        return together(part.answer for part in self.parts.values() if part is not None)
 
     def to_frame(self) -> pd.DataFrame:
         """The table of the first."""
