@@ -1,7 +1,7 @@
 """Figures made while the pages are built, inside the page itself.
 
-`{drawn} NAME` is what a command of `docs/figures.py` draws, `{gallery} GROUP` all of a group with their commands
-and sentences; `{drawing} NAME …` is what `docs/drawings.py` draws.
+`{drawn} NAME` is what a command of `docs/figures.py` draws, `{gallery} GROUP` all of a group with their
+commands and sentences; `{drawing} NAME …` is what `docs/drawings.py` draws.
 """
 
 from __future__ import annotations
