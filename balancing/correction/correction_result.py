@@ -34,7 +34,7 @@ from balancing.data.result_columns import (
 )
 from balancing.data.trials import ReadingErrors
 from balancing.solvers.error_propagation import region_radius
-from rotorid.base.answer import Answer, Answered
+from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import cell, plain
 from rotorid.base.result import Column, frame, rows, text
@@ -408,7 +408,8 @@ class Correction(Answered):
     def _weights_text(self) -> str:
         unit, mass = self.labels.weight_in, self.labels.weight(self.weights)[0]
         columns = [
-            Column("plane", [f"{p} (remove)" if p in self.remove else p for p in self.planes], str),
+            Column("plane", self.planes, str),
+            *self._work_columns(),
             Column(unit, mass, figures),
             Column("angle", self.places(self.planes, self.weights), degrees),
             *self._width_columns(unit),
@@ -425,7 +426,13 @@ class Correction(Answered):
             also = [f"{words} in plane {plane!r}" for plane, words in stays.items()]
             lines += [f"If {run!r} stays mounted, also {listing(also, 'and')}."] if also else []
         lines += [f"Limits that bind: {'; '.join(self.active)}."] if self.active else []
-        return "\n".join([text(columns), *lines])
+        return "\n".join([text(columns, width=COLUMNS), *lines])
+
+    def _work_columns(self) -> list[Column]:
+        """What to do in each plane, beside its name: a long name is cut, this never."""
+        if not set(self.planes) & set(self.remove):
+            return []
+        return [Column("", ["(remove)" if p in self.remove else "(add)" for p in self.planes], str)]
 
     def _width_columns(self, unit: str) -> list[Column]:
         if not self.coverage_factor:

@@ -247,7 +247,7 @@ class PieceSums:
         lowest = np.floor((z.imag - radius) / h)
         starts, counts = [], []
         x0 = np.clip(z.real - radius - pad, -pad, width)
-        x1 = np.clip(z.real + radius + pad, -pad, width)
+        x1 = np.clip(z.real + radius + pad, -pad, width + pad)
         for line in (lowest, lowest + 1, lowest + 2):
             start = np.searchsorted(keys, line * 2 * width + x0, side="left")
             end = np.searchsorted(keys, line * 2 * width + x1, side="right")

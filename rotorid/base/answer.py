@@ -138,10 +138,17 @@ def _wrapped(lines: Iterable[str]) -> list[str]:
 
 
 def _first(lines: list[str], room: int) -> tuple[list[str], str]:
-    """As many lines as there is room for, and words for the others."""
+    """As many lines as there is room for, and words for the others.
+
+    A block that does not fit is left out whole, where others stand before it: half a table of weights looks
+    like all of them.
+    """
     if len(lines) <= room:
         return lines, ""
-    return lines[:room], counted(len(lines) - room, "more line")
+    room = max(room, 0)
+    ends = [k for k, line in enumerate(lines[: room + 1]) if not line]
+    shown = lines[: ends[-1] if ends else room]
+    return shown, counted(sum(map(bool, lines[len(shown) :])), "more line")
 
 
 def _fitting(remarks: Sequence[list[str]], room: int) -> tuple[list[str], int]:

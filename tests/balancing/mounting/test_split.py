@@ -75,6 +75,17 @@ def test_equal_to_trying_everything(seed):
     assert not found.mounting.amounts[~holes.free].any()
 
 
+@pytest.mark.parametrize(
+    ("count", "pieces", "target"), [(5, [15, 19], 10.7434 - 318j), (7, [4, 13], 6.7175 - 330j)]
+)
+def test_the_sum_farthest_along_a_row_is_not_lost_to_rounding(count, pieces, target):
+    # it was, and what is worse was called the nearest (proven)
+    holes = from_list(equal_holes(count), pieces)
+    weight = target.real * np.exp(-1j * np.radians(target.imag))
+    found = split(weight, holes)
+    assert abs(found.error) == pytest.approx(exhaustive(weight, holes, None)[0], abs=1e-9)
+
+
 @pytest.mark.parametrize("reach", [0.5, 1.0, 5.0])
 def test_a_scarce_stock_out_of_reach_equals_trying_everything(reach):
     angles = np.sort(np.random.default_rng(3).uniform(0, 2 * np.pi, 7))

@@ -4,7 +4,7 @@ import warnings
 
 import pytest
 
-from rotorid.base.answer import kinds
+from rotorid.base.answer import Answer, kinds
 from rotorid.samples import sample_data
 
 SAMPLES = sample_data()
@@ -102,3 +102,38 @@ def test_warnings_come_last_one_of_each_kind_and_numerical_ones_first(cli, monke
         "rotorid: nothing can be done",
     ]
     assert kinds(["a 1", "b", "a 2."]) == ["a 1 (and 1 more of this kind)", "b"]
+
+
+def weights_and_signs(text):
+    """Names, work and angles in the table of weights."""
+    return [line.split() for line in text.splitlines() if line.startswith("  ") and "°  ±" in line]
+
+
+def test_a_long_name_hides_no_plane_where_material_is_removed(cli, tmp_path):
+    long = "a plane of which the name goes on and on to the very end of the line"
+    for name in ("runs.csv", "weights.csv", "job.toml"):
+        text = (SAMPLES / "turbo_job" / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text.replace("left", long), encoding="utf-8")
+    with (tmp_path / "job.toml").open("a", encoding="utf-8") as job:
+        job.write(f'[planes."{long}"]\nremove = true\n')
+    rows = weights_and_signs(cli("balance", tmp_path / "job.toml").out)
+    assert [("(remove)" in row, "(add)" in row) for row in rows] == [
+        (True, False),
+        (False, True),
+        (False, True),
+    ]
+    assert len(rows) == 3
+
+
+def test_half_a_table_of_weights_is_never_shown():
+    block = "\n".join(f"  plane {p}  {p} g" for p in range(8))
+    told = Answer("Fail.\n" * 9, f"Largest: 1\nand 2\n\n{block}", ("a warning " * 30,)).brief()
+    assert "Largest: 1\nand 2\n\n" in told
+    assert "plane" not in told
+    assert "8 more lines: --table." in told
+    assert len(told.splitlines()) <= 24
+
+
+@pytest.mark.parametrize("room", [-3, 0, 1])
+def test_no_room_counts_every_line(room):
+    shown = Answer("Judged.\n" * (20 - room), "one\ntwo\nthree").brief().splitlines()
