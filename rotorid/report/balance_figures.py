@@ -86,7 +86,7 @@ def residual_figure(result: Correction) -> Figure:
     from rotorid.base.plot_style import legend_below, new_figure
 
     small = left_is_small(*sizes_of(result, None))
-    figure = new_figure(4.2 if small else 3.2, 5.8)
+    figure = new_figure(3.6 if small else 2.8, 5.8)
     ax, *closer = figure.subplots(1 + small, sharex=True, squeeze=False)[:, 0]
     amplitudes(result, ax, closer=closer[0] if small else None)
     legend_below(figure, [ax])
