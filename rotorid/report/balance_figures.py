@@ -74,7 +74,6 @@ def plane_figure(
             tolerance=tolerance,
             loose=loose,
             forbidden=arcs,
-            clockwise=labels.drawn_sign < 0,
         )
         ax.set(xlim=(-reach, reach), ylim=(-_TALL, _TALL))
     return figure
