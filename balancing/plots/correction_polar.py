@@ -17,7 +17,7 @@ from balancing.plots.amplitude_bars import amplitudes, left_is_small, sizes_of, 
 from balancing.solvers.error_propagation import region_edge
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import COLORS, MARKERS, QUIET, STYLES, TEXT, legend_below, new_figure
-from rotorid.base.text import capital, figures
+from rotorid.base.text import capital, cut, figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from balancing.data.conventions import Labels
     from balancing.data.trials import Trials
 
+_NAME = 24
+"""Letters of a name in the legend."""
 _NOTHING = 1e-9
 """Share of the vibration before that is nothing to a reader."""
 
@@ -76,8 +78,10 @@ def corrections(c: Correction, ax: Axes | None = None, trials: Trials | None = N
     if c.plane_covariance is not None:
         regions = region_edge(c.weights, c.plane_covariance, c.dof, 180)
     mass, angle = c.labels.weight(c.weights)
+    at = c.places(c.planes, c.weights)
     for p, plane in enumerate(c.planes):
-        label = f"{plane}: {figures(mass[p])} {c.labels.weight_in} at {angle[p]:.1f}°"
+        label = f"{cut(plane, _NAME)}: {figures(mass[p])} {c.labels.weight_in} at {angle[p]:.1f}°"
+        label += f", or remove at {at[p]:.1f}°" if plane in c.remove else ""
         tip = np.deg2rad([angle[p], angle[p]]), [0, mass[p]]
         polar.plot(*tip, **of_plane(p), lw=2.0, markevery=[1], ms=6, zorder=4, label=label)
         if regions is not None:

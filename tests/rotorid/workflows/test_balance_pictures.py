@@ -330,3 +330,12 @@ def test_forbidden_arcs_are_hatched_where_the_job_counts_them(tmp_path):
         assert wedge.get_hatch()
         assert any("hatched arcs" in t.get_text() for t in figure.axes[0].texts)
         assert not [patch for patch in figure.axes[1].patches if isinstance(patch, Wedge)]
+
+
+def test_material_removed_is_named_at_the_place_to_work_on_and_long_names_are_cut(turbo):
+    c = turbo[0].result
+    planes = ("a name that is far too long for the legend of a picture", *c.planes[1:])
+    gone = replace(c, planes=planes, remove=(planes[0],))
+    labels = [line.get_label() for line in overview(gone).axes[0].lines]
+    assert "a name that is far too …: 423.0 g·mm at 168.9°, or remove at 348.9°" in labels
+    assert sum("remove" in label for label in labels) == 1
