@@ -116,7 +116,7 @@ class AnswerTable(SphinxDirective):
         """The table."""
         for name in ANSWERS:
             self.env.note_dependency(str(OUTPUTS / f"{name}.txt"))
-        return [table(("command", "lines", "widest"), [answer_row(name) for name in ANSWERS])]
+        return [table(("command", "lines", "width"), [answer_row(name) for name in ANSWERS])]
 
 
 def answer_row(name: str) -> tuple[str, str, str]:
