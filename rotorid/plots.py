@@ -45,12 +45,8 @@ def _rotors() -> Pictures:
         fem.Modes: plots.draw_modes,
         fem.Response: plots.draw_response,
         fem.InfluenceCoefficients: plots.draw_influence,
-        fem.Campbell: lambda found, ax: plots.draw_campbell(
-            found, ax, criticals=found.criticals, unstable=[(w.first, w.last) for w in found.windows]
-        ),
-        fem.SpeedMap: lambda found, ax: plots.draw_speed_map(
-            found.stiffness, found.speeds, ax, supports=found.own
-        ),
+        fem.Campbell: plots.draw_campbell,
+        fem.SpeedMap: plots.draw_speed_map,
         fem.StaticDeflection: plots.draw_deflection,
     }
 

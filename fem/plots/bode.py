@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fem.model.sensors import label
 from fem.plots.drawing import draw_rotor
-from fem.windows import Window, within
+from fem.windows import Window, ranges, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -138,7 +138,7 @@ def draw_bode(
         drawn = _look(k, len(labels), omega[shown], peaks)
         below.plot(omega[shown] * RPM, _with_gaps(phase, seen)[shown], **drawn)
     shade_operating(below, operating)
-    shade_unstable(below, _ranges(windows))
+    shade_unstable(below, ranges(windows))
     plain(below)
     below.margins(x=0.01)
     below.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
@@ -227,10 +227,6 @@ def draw_polar(
     return ax
 
 
-def _ranges(windows: Sequence[Window]) -> list[tuple[float, float]]:
-    return [(window.first, window.last) for window in windows]
-
-
 def _with_gaps(values: FloatArray, there: BoolArray) -> FloatArray:
     """Values of the places that are there, with NaN at the others."""
     out = np.full(there.shape, np.nan)
@@ -278,7 +274,7 @@ def _over_speed(
         drawn = _look(k, len(labels), speeds[order], peaks)
         ax.plot(speeds[order] * RPM, curve[order], label=named, **drawn)
     shade_operating(ax, operating)
-    shade_unstable(ax, _ranges(windows))
+    shade_unstable(ax, ranges(windows))
     positive = curves[curves > 0]
     if positive.size and positive.max() > 30 * positive.min():
         ax.set_yscale("log")

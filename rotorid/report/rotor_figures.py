@@ -82,8 +82,7 @@ def map_picture(chart: SpeedMap, operating: tuple[float, float] | None) -> Drawi
     def draw(figure: Figure) -> None:
         from fem.plots import draw_speed_map
 
-        axes = figure.add_subplot()
-        draw_speed_map(chart.stiffness, chart.speeds, axes, supports=chart.own, operating=operating)
+        draw_speed_map(chart, figure.add_subplot(), operating)
 
     caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
     return sketch(4.2, draw, caption)

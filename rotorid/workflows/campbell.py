@@ -57,8 +57,7 @@ class CampbellDiagram(Parts):
         """The Campbell diagram over the logarithmic decrements."""
         from fem.plots import campbell_figure
 
-        unstable = [(window.first, window.last) for window in self.whirl.windows]
-        return campbell_figure(self.whirl, self.whirl.criticals, operating=self.operating, unstable=unstable)
+        return campbell_figure(self.whirl, self.operating)
 
 
 @workflow

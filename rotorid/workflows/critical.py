@@ -90,12 +90,7 @@ class CriticalSpeeds(Parts):
         if self.chart is None:
             return on_figure(lambda ax: draw_modes(self.modes, ax))
         chart = self.chart
-        return on_figure(
-            lambda ax: draw_speed_map(
-                chart.stiffness, chart.speeds, ax, supports=chart.own, operating=self.operating
-            ),
-            height=5.0,
-        )
+        return on_figure(lambda ax: draw_speed_map(chart, ax, self.operating), height=5.0)
 
     def sheet(self) -> bytes:
         """To print: one HTML file."""
