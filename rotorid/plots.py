@@ -16,7 +16,8 @@ def plot(result: object, ax: Any = None, **options: Any) -> Any:  # noqa: ANN401
     result
         Of `fem`, `balancing` or rotorid: modes, a Campbell diagram, a correction, a fit, …
     ax
-        Axes of matplotlib to draw on; None: those of a new figure, or a new figure with all pictures.
+        Axes of matplotlib to draw on; None: those of a new figure. Identifications and fits take none:
+        they get a new figure with all pictures.
     options
         For the function that draws: the picture of a response takes `nodes`.
 
@@ -86,10 +87,10 @@ def _reduction() -> Pictures:
 
 
 def _harmonic() -> Pictures:
-    from rotorid.harmonic.plots import plot_identification
+    from rotorid.harmonic.plots import figure_identification
     from rotorid.harmonic.result import Identification
 
-    return {Identification: plot_identification}
+    return {Identification: lambda found, ax: figure_identification(found)}
 
 
 def _timedomain() -> Pictures:

@@ -19,7 +19,6 @@ from rotorid.base.plot_style import (
     MARKERS,
     STYLES,
     TEXT,
-    WIDTH,
     legend_above,
     look,
     new_axes,
@@ -82,14 +81,14 @@ def draw_bode(
     speeds: ArrayLike,
     readings: ArrayLike,
     labels: Sequence[str],
-    axes: tuple[Axes, Axes] | None = None,
+    axes: Sequence[Axes] | None = None,
     *,
     peaks: Sequence[Peaks] = (),
     factors: bool = True,
     operating: tuple[float, float] | None = None,
     windows: Sequence[Window] = (),
 ) -> tuple[Axes, Axes]:
-    """Draw amplitude and phase of readings over speed.
+    """Draw amplitude and phase of readings over speed; return both axes.
 
     Parameters
     ----------
@@ -109,19 +108,9 @@ def draw_bode(
         Range of operating speeds, rad/s, shaded.
     windows
         Ranges without a steady response: hatched, and nothing is drawn there.
-
-    Returns
-    -------
-    tuple of matplotlib.axes.Axes
-        The axes drawn into.
     """
     if axes is None:
-        from matplotlib import pyplot as plt
-
-        _, (above, below) = plt.subplots(
-            2, figsize=(WIDTH, 5.8), sharex=True, layout="constrained", height_ratios=(3, 2)
-        )
-        axes = above, below
+        axes = new_figure(5.8).subplots(2, sharex=True, height_ratios=(3, 2))
     above, below = axes
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     _over_speed(
@@ -148,9 +137,9 @@ def draw_bode(
     for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
         place, across = (speed * RPM, 0.0), ("data", "axes fraction")
         note(above, text, place, (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
-        for ax in axes:
+        for ax in (above, below):
             ax.axvline(speed * RPM, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
-    return axes
+    return above, below
 
 
 def _together(peaks: Sequence[Peaks], factors: bool, width: float) -> list[tuple[float, str]]:
@@ -197,10 +186,7 @@ def draw_polar(
     windows
         Ranges without a steady response, which are left out.
     """
-    if ax is None:
-        from matplotlib import pyplot as plt
-
-        _, ax = plt.subplots(figsize=(WIDTH, 6.6), layout="constrained", subplot_kw={"projection": "polar"})
+    ax = new_figure(6.6).add_subplot(projection="polar") if ax is None else ax
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     steady = ~within(tuple(windows), omega)
     omega, Z = omega[steady], Z[steady]

@@ -54,7 +54,7 @@ def draw_readings(
         response.speeds,
         response.readings(sensors),
         _labels(sensors),
-        (axes[0], axes[1]),
+        axes,
         peaks=peaks,
         factors=factors,
         operating=operating,

@@ -6,12 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotorid.base.plot_style import DARK, MARKERS, WIDTH, legend_above, look, new_axes, plain, scale_beside
+from rotorid.base.plot_style import (
+    DARK,
+    MARKERS,
+    WIDTH,
+    legend_above,
+    look,
+    new_axes,
+    plain,
+    plain_numbers,
+    scale_beside,
+)
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axes._base import _AxesBase
 
     from fem.speed_map import SpeedMap
 
@@ -51,15 +60,6 @@ def draw_speed_map(
     ax.grid(which="minor", color="#f0f2f5", linewidth=0.5)
     scale_beside(ax, RPM, "critical speed, rad/s")
     for scale in (ax, *ax.child_axes):
-        _plain_numbers(scale)
+        plain_numbers(scale)
     legend_above(ax)
     return ax
-
-
-def _plain_numbers(ax: _AxesBase) -> None:
-    """2000 instead of 2 × 10³ on the axis of speeds."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))

@@ -15,6 +15,7 @@ from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axes._base import _AxesBase
     from matplotlib.figure import Figure
 
 # Okabe and Ito: told apart by every eye.
@@ -107,6 +108,16 @@ def plain(ax: Axes) -> None:
     ax.grid(color=GRID, linewidth=0.8)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
+
+
+def plain_numbers(ax: _AxesBase) -> None:
+    """1, 2, 5, 10 instead of powers of ten on a logarithmic vertical axis."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = ax.get_ylim()
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 500 * low else (1.0,)))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def shade_unstable(

@@ -167,10 +167,6 @@ class Identification(Answered, Uncertain):
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
         return frame(parameter_columns(self.parameters, self))
 
-    def residual_frame(self) -> pd.DataFrame:
-        """One row per experiment and equation (or output): real and imaginary part of the residual."""
-        return frame(_residual_columns(self))
-
     @property
     def answer(self) -> Answer:
         """What is determined and how well the model fits, the values, and what it leaves of each reading."""

@@ -20,6 +20,7 @@ from rotorid.base.plot_style import (
     WIDTH,
     legend_above,
     new_axes,
+    new_figure,
     note,
     plain,
 )
@@ -177,18 +178,14 @@ def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[
     axes
         For the frequency errors and for the shapes; default new ones, one above the other.
     """
-    if axes is None:
-        from matplotlib import pyplot as plt
-
-        _, axes = plt.subplots(2, figsize=(WIDTH, 6), sharex=True, layout="constrained")
     names = [row.name for row in methods.rows]
     errors, mac = ([getattr(row, what) for row in methods.rows] for what in ("relative_error", "mac"))
-    return _compared(methods, names, np.array(errors), np.array(mac), (axes[0], axes[1]))
+    return _compared(methods, names, np.array(errors), np.array(mac), axes)
 
 
-def plot_trade_off(choices: TradeOff, axes: Sequence[Axes]) -> tuple[Axes, Axes]:
+def plot_trade_off(choices: TradeOff, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     """Draw what other masses at the same nodes lose, as `plot_methods` draws methods."""
-    return _compared(choices, choices.names, choices.relative_error, choices.mac, (axes[0], axes[1]))
+    return _compared(choices, choices.names, choices.relative_error, choices.mac, axes)
 
 
 def _compared(
@@ -196,10 +193,10 @@ def _compared(
     names: Sequence[str],
     errors: FloatArray,
     mac: FloatArray,
-    axes: tuple[Axes, Axes],
+    axes: Sequence[Axes] | None,
 ) -> tuple[Axes, Axes]:
     """Bars of frequency errors and of 1 − MAC, shapes (rows, n) each, both on linear scales with their 0."""
-    above, below = axes
+    above, below = new_figure(6.0).subplots(2, sharex=True) if axes is None else axes
     n = min(len(rows.nodes), MOST_MODES)
     errors, losses = 100 * errors[:, :n], np.maximum(1 - mac[:, :n], 0.0)
     _bars(above, errors, names, [[_percent(e) for e in row] for row in errors])

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.answer import COLUMNS, Answer
-from rotorid.base.result import Column, text
-from rotorid.base.rpm import RPM, phase_deg, rpm_text
-from rotorid.base.text import counted, figures, listing
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import counted, listing
 from rotorid.workflows.input_checks import file_of, rotor_source
 from rotorid.workflows.option_values import (
     Band,
@@ -151,29 +151,21 @@ class RotorResponse(Outcome):
 
     def _readings(self) -> str:
         """The largest reading of each sensor."""
-        names, sizes, speeds = zip(*self._largest_readings(), strict=True)
-        columns = (
-            Column("sensor", names, str),
-            Column("µm", [size and 1e6 * size for size in sizes], figures, "largest reading, µm"),
-            Column("rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, "at rpm"),
-        )
-        return text(columns)
+        import numpy as np
+
+        from fem.response_result import largest_text
+
+        sizes, finer = 1e6 * np.abs(self.finer.readings(self.sensors)), self.finer
+        return largest_text("sensor", self.labels, "reading, µm", sizes, finer.speeds, finer.steady)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and sensor."""
-        import numpy as np
-        import pandas as pd
+        from fem.response_result import polar
 
         Z = self.response.readings(self.sensors)
         S, C = Z.shape
-        return pd.DataFrame(
-            {
-                "speed_rad_s": np.repeat(self.response.speeds, C),
-                "sensor": self.labels * S,
-                "amplitude_m": np.abs(Z).ravel(),
-                "phase_deg": phase_deg(Z).ravel(),
-            }
-        )
+        speed = Column("speed_rad_s", self.response.speeds.repeat(C))
+        return frame((speed, Column("sensor", self.labels * S), *polar("amplitude_m", "phase_deg", Z)))
 
     def figure(self, view: View = "bode") -> Figure:
         """Amplitude and phase over speed, polar curves, or orbits.
