@@ -97,10 +97,9 @@ def bode_picture(
     """Amplitude and phase over speed, marked where each sensor has its peaks."""
 
     def draw(figure: Figure) -> None:
-        from fem.plots.readings import draw_readings
+        from fem.plots import bode_figure
 
-        axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        draw_readings(response, places, peaks, axes, operating=operating, factors=False)
+        bode_figure(response, places, peaks, operating=operating, factors=False, figure=figure)
 
     caption = "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading."
     return sketch(5.0, draw, caption)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fem import Peak, Peaks, Response, Rotor
     from fem.model.sensors import SensorLike
     from fem.response import Unbalance
-    from rotorid.base.arrays import FloatArray
+    from rotorid.base.arrays import AnyArray
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
@@ -90,13 +90,14 @@ class RotorResponse(Outcome):
         """As JSON types, without the provenance: what is largest, and the peaks, with the speeds between."""
         document = self.response.to_dict(self.sensors)
         warnings = document.pop("warnings")
-        at_support = [self._largest(force) for force in self.finer.bearing_forces().largest.T]
+        at_support = self._largest(self.finer.bearing_forces().largest)
+        readings = self._largest(self.finer.readings(self.sensors))
         return {
             **document,
             "orbits": self._orbits(),
             "largest": [
                 {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
-                for name, size, speed in self._largest_readings()
+                for name, (size, speed) in zip(self.labels, readings, strict=True)
             ],
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
@@ -204,17 +205,14 @@ class RotorResponse(Outcome):
 
         return [str(label(place)) for place in self.sensors]
 
-    def _largest_readings(self) -> list[tuple[str, float | None, float | None]]:
-        """Each sensor, its largest reading, m, and the speed of it, rad/s."""
-        sizes = abs(self.finer.readings(self.sensors)).T
-        return [(name, *self._largest(size)) for name, size in zip(self.labels, sizes, strict=True)]
-
-    def _largest(self, size: FloatArray) -> tuple[float | None, float | None]:
-        """The largest of a size over speed where a steady response exists, and its speed, rad/s."""
+    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
+        """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
         from fem.response_result import largest_at
 
-        k = largest_at(size, self.finer.steady)
-        return (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k]))
+        where = ((size, largest_at(size, self.finer.steady)) for size in abs(values).T)
+        return [
+            (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k])) for size, k in where
+        ]
 
     def _speed_of_orbits(self) -> int:
         from fem.response_result import largest_at
