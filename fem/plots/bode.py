@@ -19,10 +19,12 @@ from rotorid.base.plot_style import (
     MARKERS,
     STYLES,
     TEXT,
+    WIDTH,
     legend_above,
     look,
     new_axes,
     new_figure,
+    new_pair,
     note,
     plain,
     rad_s_above,
@@ -109,9 +111,7 @@ def draw_bode(
     windows
         Ranges without a steady response: hatched, and nothing is drawn there.
     """
-    if axes is None:
-        axes = new_figure(5.8).subplots(2, sharex=True, height_ratios=(3, 2))
-    above, below = axes
+    above, below = new_pair(5.8) if axes is None else axes
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     _over_speed(
         above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak", windows, operating=operating, peaks=peaks
@@ -186,7 +186,7 @@ def draw_polar(
     windows
         Ranges without a steady response, which are left out.
     """
-    ax = new_figure(6.6).add_subplot(projection="polar") if ax is None else ax
+    ax = new_axes((WIDTH, 6.6), projection="polar") if ax is None else ax
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     steady = ~within(tuple(windows), omega)
     omega, Z = omega[steady], Z[steady]

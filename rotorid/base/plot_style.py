@@ -33,12 +33,21 @@ ABOVE_SCALE = 4.2
 """Room, in letters, between axes and a legend above their second scale."""
 
 
-def new_axes(size: tuple[float, float] = (WIDTH, 4.2)) -> Axes:
-    """Make axes of a new figure, size in inches."""
+def new_axes(size: tuple[float, float] = (WIDTH, 4.2), **options: Any) -> Axes:  # noqa: ANN401  of matplotlib
+    """Make axes of a new figure, size in inches; options as for `add_subplot`."""
     from matplotlib import pyplot as plt
 
-    _, ax = plt.subplots(figsize=size, layout="constrained")
+    _, ax = plt.subplots(figsize=size, layout="constrained", subplot_kw=options)
     return ax
+
+
+def new_pair(height: float, ratios: tuple[int, int] = (3, 2)) -> tuple[Axes, Axes]:
+    """Make axes above others with the same horizontal axis, of a new figure, height in inches."""
+    from matplotlib import pyplot as plt
+
+    size: dict[str, Any] = {"figsize": (WIDTH, height), "height_ratios": ratios}
+    _, (above, below) = plt.subplots(2, sharex=True, layout="constrained", **size)
+    return above, below
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:

@@ -20,7 +20,7 @@ from rotorid.base.plot_style import (
     WIDTH,
     legend_above,
     new_axes,
-    new_figure,
+    new_pair,
     note,
     plain,
 )
@@ -196,7 +196,7 @@ def _compared(
     axes: Sequence[Axes] | None,
 ) -> tuple[Axes, Axes]:
     """Bars of frequency errors and of 1 − MAC, shapes (rows, n) each, both on linear scales with their 0."""
-    above, below = new_figure(6.0).subplots(2, sharex=True) if axes is None else axes
+    above, below = new_pair(6.0, (1, 1)) if axes is None else axes
     n = min(len(rows.nodes), MOST_MODES)
     errors, losses = 100 * errors[:, :n], np.maximum(1 - mac[:, :n], 0.0)
     _bars(above, errors, names, [[_percent(e) for e in row] for row in errors])

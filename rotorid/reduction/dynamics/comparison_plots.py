@@ -39,11 +39,11 @@ def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axe
     -------
     The axes of the response.
     """
-    from rotorid.base.plot_style import ABOVE_SCALE, legend_above, new_figure, plain, rad_s_above
+    from rotorid.base.plot_style import ABOVE_SCALE, legend_above, new_pair, plain, rad_s_above
 
     each = (running.full, running.small, running.small - running.full)
     full, small, difference = (np.abs(values).max(axis=(1, 2)) for values in each)
-    above, below = new_figure(5.6).subplots(2, sharex=True, height_ratios=(3, 2)) if ax is None else ax
+    above, below = new_pair(5.6) if ax is None else ax
     moving = running.speeds > 0
     speeds = running.speeds[moving] * RPM
     above.plot(speeds, full[moving], color=FULL, linewidth=2.4, label="full rotor")
