@@ -30,14 +30,7 @@ def draw_speed_map(
 ) -> Axes:
     """Draw critical speeds over the stiffness of the supports, both logarithmic.
 
-    Parameters
-    ----------
-    chart
-        What to draw; speeds that are not positive are left out.
-    ax
-        Axes to draw into; new ones if None.
-    operating
-        Range of operating speeds, rad/s, shaded.
+    Speeds that are not positive are left out; the range of operating speeds, rad/s, is shaded.
     """
     ax = new_axes((WIDTH, 5)) if ax is None else ax
     k = chart.stiffness

@@ -141,9 +141,7 @@ class Amplitudes:
     doubt: tuple[float, float] | None
 
 
-def prepare(
-    rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray, exact: bool = False
-) -> Receptance:
+def prepare(rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray) -> Receptance:
     """Modes and series for deflections at unknowns `rows` under real load vectors rotating at each speed.
 
     Parameters
@@ -156,8 +154,6 @@ def prepare(
         Shape (size, b).
     speeds
         rad/s, shape (S,): the range in which it is to be used.
-    exact
-        Solve the banded system at every speed instead of at the few where the fast way loses digits.
 
     Raises
     ------
@@ -176,7 +172,7 @@ def prepare(
     pencil = one_plane(rotor, A, 1, reference)
     spectra = [_modes_for(pencil, top)]
     both = np.concatenate((rows, held))
-    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
+    forward = _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
     backward = None
     beta = _uniform(rotor)
     if at.planes == 2 and forward is not None and held.size:

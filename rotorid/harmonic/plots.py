@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rotorid.harmonic.result import FoundCombination, Identification
+    from rotorid.harmonic.result import Identification
+    from rotorid.regression.undetermined_combinations import FoundCombination
 
 Curve = tuple[FloatArray, dict[str, ComplexArray]]
 

@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """Draw all choices of places: largest frequency error over 1 − smallest MAC, both logarithmic.
 
-    Parameters
-    ----------
-    placement
-        What to draw; choices that give no physical model are left out.
-    ax
-        Where; default new axes. A colour bar for the condition number is added to its figure.
+    Choices that give no physical model are left out. A colour bar for the condition number is added.
     """
     from matplotlib.colors import LogNorm
 

@@ -52,14 +52,8 @@ DARK, LINE = "#2f3640", "#6b7480"
 def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     """Draw the shapes of the n-mass model (points) over the rotor's (lines) and the rotor itself.
 
-    Without a rotor the measured shapes stand beside those of the model, place by place.
-
-    Parameters
-    ----------
-    reduction
-        What to draw; of many modes the first six.
-    ax
-        Where; default new axes.
+    Without a rotor the measured shapes stand beside those of the model, place by place. Of many modes the
+    first six are drawn.
     """
     from fem.plots import draw_rotor
     from fem.plots.mode_shapes import smooth_shapes
@@ -171,12 +165,7 @@ def _masses_above(reduction: Reduction, rotor: fem.Rotor, axes: Axes) -> int:
 def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     """Draw what methods of reduction lose: frequency errors with their sign, and 1 − MAC, as bars.
 
-    Parameters
-    ----------
-    methods
-        What to draw; of many modes the first six.
-    axes
-        For the frequency errors and for the shapes; default new ones, one above the other.
+    Two axes, for the errors and for the shapes; of many modes the first six are drawn.
     """
     names = [row.name for row in methods.rows]
     errors, mac = ([getattr(row, what) for row in methods.rows] for what in ("relative_error", "mac"))

@@ -28,16 +28,7 @@ DASHED = (0, (4, 2))
 def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axes:
     """Draw the unbalance response of full rotor and small model over speed, and below it their difference.
 
-    Parameters
-    ----------
-    running
-        What to draw: the largest influence coefficient at each speed.
-    ax
-        Two axes, for the response and for the difference; default new ones.
-
-    Returns
-    -------
-    The axes of the response.
+    Of the response the largest influence coefficient at each speed; its axes are returned.
     """
     from rotorid.base.plot_style import ABOVE_SCALE, legend_above, new_pair, plain, rad_s_above
 
@@ -100,15 +91,7 @@ def _bands(running: ResponseCost, ax: Axes) -> None:
 
 
 def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
-    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows.
-
-    Parameters
-    ----------
-    cost
-        What to draw.
-    ax
-        Where; default new axes.
-    """
+    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows."""
     from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, new_axes, plain, rad_s_above
 
     axes = new_axes((WIDTH, 4.2)) if ax is None else ax
