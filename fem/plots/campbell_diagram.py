@@ -65,8 +65,8 @@ def draw_campbell(
     """Draw whirl frequencies over speed, with the 1× line; unstable speeds are hatched.
 
     Forward whirl is a solid line with filled triangles that point up, backward whirl a dashed one with open
-    triangles that point down, neither (a straight line) a dotted one: told apart in black and white too. The range
-    of operating speeds, rad/s, is shaded.
+    triangles that point down, neither (a straight line) a dotted one: told apart in black and white too. The
+    range of operating speeds, rad/s, is shaded.
     """
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     top = _highest(campbell)
