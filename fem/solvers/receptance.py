@@ -141,7 +141,9 @@ class Amplitudes:
     doubt: tuple[float, float] | None
 
 
-def prepare(rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray) -> Receptance:
+def prepare(
+    rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, speeds: FloatArray, exact: bool = False
+) -> Receptance:
     """Modes and series for deflections at unknowns `rows` under real load vectors rotating at each speed.
 
     Parameters
@@ -154,6 +156,8 @@ def prepare(rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, spee
         Shape (size, b).
     speeds
         rad/s, shape (S,): the range in which it is to be used.
+    exact
+        Solve the banded system at every speed instead of at the few where the fast way loses digits.
 
     Raises
     ------
@@ -172,7 +176,7 @@ def prepare(rotor: Rotor, A: Matrices, rows: IndexArray, loads: FloatArray, spee
     pencil = one_plane(rotor, A, 1, reference)
     spectra = [_modes_for(pencil, top)]
     both = np.concatenate((rows, held))
-    forward = _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
+    forward = None if exact else _series(pencil, spectra[0], both, np.hstack((loads, _units(A, held))), top)
     backward = None
     beta = _uniform(rotor)
     if at.planes == 2 and forward is not None and held.size:
