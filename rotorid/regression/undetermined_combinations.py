@@ -36,7 +36,15 @@ class FoundCombination:
 
 @dataclass(frozen=True)
 class Combination(FoundCombination):
-    """A linear one; `coefficients`: shape (n,), one per parameter."""
+    """A linear one.
+
+    Attributes
+    ----------
+    words, value, std
+        As in `FoundCombination`.
+    coefficients
+        Shape (n,), one per parameter.
+    """
 
     coefficients: FloatArray
 
