@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import Answer, Answered
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -42,27 +41,6 @@ class CriticalOptions:
     operating: Band | None = None
 
 
-@dataclass(frozen=True)
-class Separation(Answered):
-    """Critical speeds beside the operating range, all in rad/s."""
-
-    speeds: Sequence[float]
-    operating: tuple[float, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Distances as JSON types."""
-        from fem.api684_separation import separation
-
-        return separation(self.speeds, self.operating)
-
-    @property
-    def answer(self) -> Answer:
-        """In words."""
-        from fem.api684_separation import separation_answer
-
-        return separation_answer(self.to_dict())
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CriticalSpeeds(Parts):
     """Modes, and what was asked for beside them."""
@@ -75,6 +53,8 @@ class CriticalSpeeds(Parts):
     @property
     def parts(self) -> Mapping[str, Any]:
         """The modes, and what was asked for beside them."""
+        from fem.api684_separation import Separation
+
         apart = self.operating and Separation(self.modes.frequencies.tolist(), self.operating)
         return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
 
@@ -90,12 +70,7 @@ class CriticalSpeeds(Parts):
         if self.chart is None:
             return on_figure(lambda ax: draw_modes(self.modes, ax))
         chart = self.chart
-        return on_figure(
-            lambda ax: draw_speed_map(
-                chart.stiffness, chart.speeds, ax, supports=chart.own, operating=self.operating
-            ),
-            height=5.0,
-        )
+        return on_figure(lambda ax: draw_speed_map(chart, ax, self.operating), height=5.0)
 
     def sheet(self) -> bytes:
         """To print: one HTML file."""
