@@ -151,7 +151,7 @@ class Split:
                 f"{self.bound * labels.weight_scale:.2g} {labels.weight_in} exists."
             )
         if not self.pieces:
-            return Answer(f"{capital(self.lines(labels)[0])}, {wanted}.", "\n".join(lines))
+            return Answer(f"{capital(self.lines(labels)[0])}, for {wanted}.", "\n".join(lines))
         return Answer(f"Mount {what}: {made} together, for {wanted}; {error}.", "\n".join(lines))
 
 
