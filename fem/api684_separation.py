@@ -26,17 +26,27 @@ def separation(criticals: Iterable[float], operating: tuple[float, float]) -> di
     return {"range_rad_s": [low, high], "critical_speeds": rows}
 
 
-def separation_answer(operating: Mapping[str, Any]) -> Answer:
-    """The result of `separation` for an engineer."""
+def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
+    """What keeps one from saying that nothing is in an operating range: speeds that were not searched."""
+    if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
+        return ""
+    return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"
+
+
+def separation_answer(operating: Mapping[str, Any], doubt: str = "") -> Answer:
+    """The result of `separation` for an engineer; a doubt keeps it from calling the range free."""
     low, high = operating["range_rad_s"]
     within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
     rows = sorted(operating["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+    away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
+    more = "how far each is from the operating range"
     inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
     if inside:
         return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+    if doubt:
+        said = f"NOT KNOWN whether a critical speed lies in {within}: {doubt}."
+        return Answer(said, tables=(table(away),) if away else (), more=more)
     if not rows:
         return Answer(f"No critical speed was found beside {within}.")
     near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
-    away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
-    more = "how far each is from the operating range"
     return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)

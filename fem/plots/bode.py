@@ -21,6 +21,7 @@ from rotorid.base.plot_style import (
     TEXT,
     WIDTH,
     legend_above,
+    legend_below,
     look,
     new_axes,
     new_figure,
@@ -70,12 +71,38 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
 
 
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
-    """The size of each influence coefficient over speed, below the rotor with its planes and sensors."""
-    figure = new_figure(6.6)
-    above, below = figure.subplots(2, height_ratios=(2, 3))
-    draw_rotor(rotor, above, planes=influence.planes, sensors=influence.sensors)
-    draw_influence(influence, below)
+    """Size and phase of the influence coefficients over speed, a row for each sensor, below the rotor."""
+    C, planes = len(influence.sensors), [f"plane {plane}" for plane in influence.planes]
+    figure = new_figure(2.4 + 2.1 * C)
+    grid = figure.add_gridspec(1 + C, 2, height_ratios=(2.1, *[2.1] * C))
+    draw_rotor(rotor, figure.add_subplot(grid[0, :]), planes=influence.planes, sensors=influence.sensors)
+    rows = [[figure.add_subplot(grid[1 + c, k]) for k in (0, 1)] for c in range(C)]
+    order, given = np.argsort(influence.speeds, kind="stable"), tuple(influence.windows)
+    speeds = influence.speeds[order]
+    steady = ~within(given, speeds)
+    for c, (sizes, phases) in enumerate(rows):
+        W = influence.W[order, c]
+        _over_speed(sizes, speeds, np.abs(W), planes, f"{label(influence.sensors[c])}\nµm per g·mm", given)
+        for k, curve in enumerate(W.T):
+            seen = steady & (np.abs(curve) > 0)
+            phase = _with_gaps(np.degrees(_lag(curve[seen])), seen)
+            phases.plot(speeds * RPM, phase, **_look(k, len(planes), speeds, ()))
+        shade_unstable(phases, _ranges(given))
+        plain(phases)
+        phases.margins(x=0.01)
+        phases.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
+        phases.yaxis.set_major_locator(_right_angles(phases))
+        sizes.get_legend().remove()
+        for ax in rows[c] if c < C - 1 else ():
+            ax.set_xlabel("")
+    legend_below(figure, (rows[0][0],), 3)
     return figure
+
+
+def _lag(reading: ComplexArray) -> FloatArray:
+    """Phase without jumps, rad, the middle of the curve between -2π and 0: a lag, as engineers read it."""
+    phase = np.unwrap(np.angle(reading))
+    return phase - 2 * np.pi * np.ceil(np.median(phase) / (2 * np.pi)) if phase.size else phase
 
 
 def draw_bode(
@@ -130,10 +157,7 @@ def draw_bode(
     steady = ~within(tuple(windows), omega)
     for k, reading in enumerate(Z.T):
         seen = steady & (np.abs(reading) > 0)
-        phase = np.degrees(np.unwrap(np.angle(reading[seen])))
-        if phase.size:
-            # The middle of the curve between -360 and 0: a lag, as engineers read it.
-            phase -= 360 * np.ceil(np.median(phase) / 360)
+        phase = np.degrees(_lag(reading[seen]))
         shown = seen | ~steady
         drawn = _look(k, len(labels), omega[shown], peaks)
         below.plot(omega[shown] * RPM, _with_gaps(phase, seen)[shown], **drawn)

@@ -44,10 +44,11 @@ class CriticalOptions:
 
 @dataclass(frozen=True)
 class Separation(Answered):
-    """Critical speeds beside the operating range, all in rad/s."""
+    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
 
     speeds: Sequence[float]
     operating: tuple[float, float]
+    doubt: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Distances as JSON types."""
@@ -60,22 +61,27 @@ class Separation(Answered):
         """In words."""
         from fem.api684_separation import separation_answer
 
-        return separation_answer(self.to_dict())
+        return separation_answer(self.to_dict(), self.doubt)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CriticalSpeeds(Parts):
-    """Modes, and what was asked for beside them."""
+    """Modes, what was asked for beside them, and whether there may be more above the last one."""
 
     modes: Modes
     mesh: MeshCheck | None
     chart: SpeedMap | None
     operating: tuple[float, float] | None
+    more: bool
 
     @property
     def parts(self) -> Mapping[str, Any]:
         """The modes, and what was asked for beside them."""
-        apart = self.operating and Separation(self.modes.frequencies.tolist(), self.operating)
+        from fem.api684_separation import unsearched
+
+        speeds = self.modes.frequencies.tolist()
+        doubt = unsearched(0.0, max(speeds, default=0.0), self.operating) if self.more else ""
+        apart = self.operating and Separation(speeds, self.operating, doubt and f"{doubt} (-n)")
         return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
 
     def to_frame(self) -> pd.DataFrame:
@@ -142,6 +148,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         mesh=mesh,
         chart=chart,
         operating=operating,
+        more=int((modes.frequencies > 0).sum()) >= (options.number or 3),
         provenance=provenance(files, options),
     )
 

@@ -18,6 +18,7 @@ from fem.plots import (
     draw_orbits,
     draw_polar,
     draw_speed_map,
+    influence_figure,
     new_axes,
     orbits_figure,
     polar_figure,
@@ -582,3 +583,23 @@ def test_ticks_of_the_phase_are_few_and_at_parts_of_a_right_angle(span, step):
     assert len(ticks) <= 9
     assert set(np.diff(ticks)) == {float(step)}
     assert all(tick % step == 0 for tick in ticks)
+
+
+def test_influence_has_a_row_for_each_sensor_with_size_and_phase():
+    rotor, speeds = rotor23(2e4), np.linspace(50, 700, 40)
+    W = fem.influence(rotor, [7, 12], [2, 22], speeds)
+    figure = influence_figure(W, rotor)
+    sizes, phases = figure.axes[1::2], figure.axes[2::2]
+    assert [ax.get_ylabel().split("\n")[0] for ax in sizes] == ["2", "22"]
+    for c, (size, phase) in enumerate(zip(sizes, phases, strict=True)):
+        for p in (0, 1):
+            steady = ~np.isnan(size.get_lines()[p].get_ydata())
+            np.testing.assert_allclose(size.get_lines()[p].get_ydata()[steady], np.abs(W.W[steady, c, p]))
+            lag = np.radians(phase.get_lines()[p].get_ydata()[steady])
+            np.testing.assert_allclose(np.exp(1j * lag), np.exp(1j * np.angle(W.W[steady, c, p])), atol=1e-12)
+            assert -2 * np.pi <= np.median(lag) <= 0
+        styles = {(line.get_color(), line.get_linestyle()) for line in size.get_lines()}
+        assert len(styles) == 2
+    [legend] = figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["plane 7", "plane 12"]
+    figure.canvas.draw()
