@@ -32,6 +32,7 @@ from rotorid.base.plot_style import (
     shade_unstable,
 )
 from rotorid.base.rpm import RPM
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from fem.api684_peaks import Peak, Peaks
     from fem.model.rotor import Rotor
     from fem.response_result import InfluenceCoefficients, Response
+
+
+_ROWS = 5
 
 
 def draw_response(
@@ -71,8 +75,11 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
 
 
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
-    """Size and phase of the influence coefficients over speed, a row for each sensor, below the rotor."""
-    C, planes = len(influence.sensors), [f"plane {plane}" for plane in influence.planes]
+    """Size and phase of the influence coefficients over speed below the rotor: a row for each sensor.
+
+    Of many sensors the first `_ROWS` have one; how many have none stands in the legend.
+    """
+    C, planes = min(len(influence.sensors), _ROWS), [f"plane {plane}" for plane in influence.planes]
     figure = new_figure(2.4 + 2.1 * C)
     grid = figure.add_gridspec(1 + C, 2, height_ratios=(2.1, *[2.1] * C))
     draw_rotor(rotor, figure.add_subplot(grid[0, :]), planes=influence.planes, sensors=influence.sensors)
@@ -95,7 +102,9 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
         sizes.get_legend().remove()
         for ax in rows[c] if c < C - 1 else ():
             ax.set_xlabel("")
-    legend_below(figure, (rows[0][0],), 3)
+    left = len(influence.sensors) - C
+    more: dict[str, Any] = {"title": f"{counted(left, 'more sensor')}: only in the table"} if left else {}
+    legend_below(figure, (rows[0][0],), 3, **more)
     return figure
 
 

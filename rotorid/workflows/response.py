@@ -145,12 +145,17 @@ class RotorResponse(Outcome):
         doubt = unsearched(self.finer.speeds[0], self.finer.speeds[-1], self.operating)
         if self.operating is None or not (known or close or doubt):
             asked = f"at {speed_range(self.response.speeds)}, {counted(len(self.sensors), 'reading')}"
-            return f"{said}{counted(len(chief), 'peak') if chief else 'No peak'} {asked}."
+            few = "" if self.response.steady.any() else "No steady response"
+            few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
+            return f"{said}{counted(len(chief), 'peak') if chief else few} {asked}."
         low, high = self.operating
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
         near = [rpm_text(peak.speed) for peak in known if not peak.enough]
         if near:
-            return f"{said}NOT far enough {beside}: critical speed {listing(near, 'and')}."
+            return (
+                f"{said}NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} "
+                f"{listing(near, 'and')}."
+            )
         far = f"{counted(len(known), 'critical speed')} far enough {beside}."
         if close:
             doubt = f"no amplification factor at {listing(close, 'and')}" + (doubt and f"; {doubt}")

@@ -602,4 +602,7 @@ def test_influence_has_a_row_for_each_sensor_with_size_and_phase():
         assert len(styles) == 2
     [legend] = figure.legends
     assert [text.get_text() for text in legend.get_texts()][:2] == ["plane 7", "plane 12"]
+    many = influence_figure(fem.influence(rotor, [7], range(1, 9), speeds), rotor)
+    assert len(many.axes) == 11
+    assert many.legends[0].get_title().get_text() == "3 more sensors: only in the table"
     figure.canvas.draw()

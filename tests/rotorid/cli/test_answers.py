@@ -55,6 +55,10 @@ FIT = (SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinear
             ["NOT far enough from the operating range, 4800 to 6500 rpm (API 684): critical speed 4"],
         ),
         (
+            (*RESPONSE, "--speeds", "3000,4000rpm"),
+            ["Too few speeds to find a peak: at 2 speeds from 3000 to 4000 rpm "],
+        ),
+        (
             ("reduce", ROTOR, "--nodes", "2,3,4", "--modes", 1),
             ["3 equivalent masses from the first mode, formula (50), together ",
              "NO physical model, a mass is not positive; condition number "],
