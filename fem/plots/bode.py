@@ -89,7 +89,9 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
     steady = ~within(given, speeds)
     for c, (sizes, phases) in enumerate(rows):
         W = influence.W[order, c]
-        _over_speed(sizes, speeds, np.abs(W), planes, f"{label(influence.sensors[c])}\nµm per g·mm", given)
+        _over_speed(
+            sizes, speeds, np.abs(W), planes, f"sensor {label(influence.sensors[c])}\nµm per g·mm", given
+        )
         for k, curve in enumerate(W.T):
             seen = steady & (np.abs(curve) > 0)
             phase = _with_gaps(np.degrees(_lag(curve[seen])), seen)
@@ -110,8 +112,13 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
 
 def _lag(reading: ComplexArray) -> FloatArray:
     """Phase without jumps, rad, the middle of the curve between -2π and 0: a lag, as engineers read it."""
+    if not reading.size:
+        return np.zeros(0)
     phase = np.unwrap(np.angle(reading))
-    return phase - 2 * np.pi * np.ceil(np.median(phase) / (2 * np.pi)) if phase.size else phase
+    turned = reading * np.exp(-1j * phase[0])
+    if (abs(turned.imag) <= 1e-9 * abs(turned)).all():  # no damping: half a turn, which is called a lag
+        phase = phase[0] - np.pi * (turned.real < 0)
+    return np.asarray(phase - 2 * np.pi * np.ceil(np.round(np.median(phase) / (2 * np.pi), 4)))
 
 
 def draw_bode(
