@@ -217,8 +217,7 @@ def _kind(check: bool) -> str:
 
 
 def _vibration(row: dict[str, Any], labels: Labels, *, limited: bool) -> list[str]:
-    speed = labels.speed_words(row["speed_rpm"] / RPM).partition(" ")[0]
-    cells = [speed, figures(row["largest"], 3), figures(row["rms"], 3)]
+    cells = [labels.speed_number(row["speed_rpm"] / RPM), figures(row["largest"], 3), figures(row["rms"], 3)]
     if limited:
         share = row["of_limit"]
         cells.append("" if share is None else f"{figures(100 * share, 3)} %{'' if share <= 1 else ' !'}")

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import RPM
-from rotorid.base.unit_words import vibration_unit_words, weight_unit_words
+from rotorid.base.unit_words import SPEEDS, vibration_unit_words, weight_unit_words
 
 Phase = Literal["lead", "lag"]
 Angles = Literal["with rotation", "against rotation"]
@@ -25,7 +24,6 @@ Rotation = Literal["clockwise", "counter-clockwise"]
 View = Literal["drive end", "free end"]
 PHASES = ("lead", "lag")
 ANGLES = ("with rotation", "against rotation")
-_SPEEDS = {"rpm": (RPM, "rpm"), "Hz": (1 / math.tau, "Hz"), "rad_s": (1.0, "rad/s")}
 Angle = TypeVar("Angle", float, FloatArray)
 
 
@@ -142,12 +140,15 @@ class Labels:
     @property
     def speed_in(self) -> str:
         """The unit of the speeds as people write it: "rad/s"."""
-        return _SPEEDS[self.speed_unit][1]
+        return SPEEDS[self.speed_unit][0]
 
     def speed_words(self, speed: float) -> str:
         """A speed, given in rad/s, in the unit of the readings: "1220 rpm"."""
-        scale, unit = _SPEEDS[self.speed_unit]
-        return f"{speed * scale:.6g} {unit}"
+        return f"{self.speed_number(speed)} {self.speed_in}"
+
+    def speed_number(self, speed: float) -> str:
+        """The same without the unit."""
+        return f"{speed * SPEEDS[self.speed_unit][1]:.6g}"
 
     def amplitude_words(self, size: float) -> str:
         """An amplitude, given in SI."""

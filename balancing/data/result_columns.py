@@ -65,14 +65,10 @@ def mounted_rows(labels: Labels, planes: Sequence[str], weights: ComplexArray) -
 
 def reading_columns(labels: Labels, speeds: FloatArray, sensors: Sequence[str]) -> tuple[Column, Column]:
     """speed_rpm and sensor of readings (S, C), one row a reading, speed by speed; speeds in rad/s."""
-    turns = [rpm(speed) for speed in speeds]
-
-    def shown(speed_rpm: float) -> str:
-        return labels.speed_words(speed_rpm / RPM).partition(" ")[0]
-
+    turns = np.repeat([rpm(speed) for speed in speeds], len(sensors))
     return (
-        Column("speed_rpm", np.repeat(turns, len(sensors)), shown, labels.speed_in),
-        Column("sensor", tuple(sensors) * len(turns), str),
+        Column("speed_rpm", turns, lambda turn: labels.speed_number(turn / RPM), labels.speed_in),
+        Column("sensor", tuple(sensors) * len(speeds), str),
     )
 
 

@@ -144,7 +144,7 @@ class Split:
         lines = [f"  {words}" for words in self.in_holes(labels)]
         if self.best is not None:
             less = f"an error of {percent(self.best.relative_error)} %"
-            lines.append(f"{self.best.pieces} pieces would leave {less} (--best).")
+            lines.append(f"{counted(self.best.pieces, 'piece')} would leave {less} (--best).")
         if not self.proven:
             lines.append(
                 f"These holes have more combinations than can be tried: nothing better than an error of "

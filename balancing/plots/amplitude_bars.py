@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from balancing.data.result_columns import INVISIBLE
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import TEXT, plain
-from rotorid.base.unit_words import speed_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +22,8 @@ _CLOSER = 0.3
 """Share of the largest amplitude below which what is left is drawn a second time, larger."""
 _NAMED = 40
 """Readings that have room for the names of their sensors."""
+_LONG = 28
+"""Letters of a name of which only the first and last are shown."""
 
 
 def amplitudes(
@@ -33,12 +35,22 @@ def amplitudes(
     """
     speeds, sensors = (c.speeds, c.sensors) if check is None else (check.speeds, check.sensors)
     sizes, reach = sizes_of(c, check)
-    after = "predicted" if reach is None else "predicted, with 95 % of a check run"
-    limit = None
+    ends = None if reach is None else (np.maximum(sizes[1] - reach, 0.0), sizes[1] + reach)
+    limit = np.full(len(sizes[0]), np.inf)
     if check is None and c.limits is not None:
         limit = c.limits.residual.ravel() * c.labels.vibration_scale
-    at = _places(len(speeds), len(sensors))
-    before_and_after(ax, at, sizes, reach=reach, limit=limit, after=after, closer=closer)
+    limited, at = np.isfinite(limit), _places(len(speeds), len(sensors))
+    for axes, first in ((ax, 0), (closer, 1)):
+        if axes is None:
+            continue
+        _draw_readings(axes, at, sizes, ends)
+        if limited.any():
+            where = at[limited]
+            axes.hlines(limit[limited], where - 0.45, where + 0.45, color="black", lw=2.2, label="limit")
+        top = 1.08 * max(float(np.max(values, initial=0.0)) for values in (*sizes[first:], *(ends or ())))
+        axes.set_ylim(0, top or 1.0)
+        plain(axes)
+        axes.grid(visible=False, axis="x")
     _name_readings(closer or ax, ax, speeds, sensors, c.labels)
     ax.set_ylabel(f"vibration{unit(c.labels)}")
     if closer is not None:
@@ -58,80 +70,28 @@ def sizes_of(c: Correction, check: CheckComparison | None) -> tuple[list[FloatAr
 
 
 def left_is_small(sizes: Sequence[FloatArray], reach: FloatArray | None) -> bool:
-    """Whether what is left cannot be read beside what was before; as `before_and_after`."""
+    """Whether what is left cannot be read beside what was before."""
     left = max(float(np.max(values)) for values in (*sizes[1:], sizes[1] + (0.0 if reach is None else reach)))
-    return 0 < left < _CLOSER * float(np.max(sizes[0]))
-
-
-def before_and_after(
-    ax: Axes,
-    at: FloatArray,
-    sizes: Sequence[FloatArray],
-    *,
-    reach: FloatArray | None,
-    limit: FloatArray | None,
-    after: str,
-    lying: bool = False,
-    closer: Axes | None = None,
-) -> None:
-    """Draw amplitudes before (bars) and after (dots with 95 %), and their limits (thick lines).
-
-    Parameters
-    ----------
-    ax
-        Along whose x (`lying`: y) the readings stand.
-    at
-        Place of each reading, (N,).
-    sizes
-        Before, after and (stars) achieved, (N,) each; the last may be missing.
-    reach
-        Half widths of 95 % intervals, (N,); None: not known.
-    limit
-        Largest amplitude of each reading, (N,), not finite for none; None: none has one.
-    after
-        What the dots are, in words.
-    lying
-        Whether the bars lie.
-    closer
-        Axes that show what is left on a larger scale.
-    """
-    ends = None if reach is None else (np.maximum(sizes[1] - reach, 0.0), sizes[1] + reach)
-    for axes, first in ((ax, 0), (closer, 1)):
-        if axes is None:
-            continue
-        _draw_readings(axes, at, sizes, ends, after, lying)
-        if limit is not None and np.isfinite(limit).any():
-            where = at[np.isfinite(limit)]
-            lines = axes.vlines if lying else axes.hlines
-            lines(limit[np.isfinite(limit)], where - 0.45, where + 0.45, color="black", lw=2.2, label="limit")
-        top = 1.08 * max(float(np.max(values, initial=0.0)) for values in (*sizes[first:], *(ends or ())))
-        (axes.set_xlim if lying else axes.set_ylim)(0, top or 1.0)
-        plain(axes)
-        axes.grid(visible=False, axis="y" if lying else "x")
+    before = float(np.max(sizes[0]))
+    return INVISIBLE * before < left < _CLOSER * before
 
 
 def _draw_readings(
-    ax: Axes,
-    at: FloatArray,
-    sizes: Sequence[FloatArray],
-    ends: tuple[FloatArray, FloatArray] | None,
-    after: str,
-    lying: bool,
+    ax: Axes, at: FloatArray, sizes: Sequence[FloatArray], ends: tuple[FloatArray, FloatArray] | None
 ) -> None:
-    """Bars, dots with their 95 %, and stars of `before_and_after` on one scale."""
+    """Bars, dots with their 95 %, and stars on one scale."""
     old, new, *achieved = sizes
-    (ax.barh if lying else ax.bar)(at, old, 0.8, color="0.86", edgecolor="0.5", lw=0.6, label="before")
+    ax.bar(at, old, 0.8, color="0.86", edgecolor="0.5", lw=0.6, label="before")
     beside = at - 0.17 * len(achieved)  # dots and stars hide each other otherwise
     if ends is not None:
-        (ax.hlines if lying else ax.vlines)(beside, *ends, color="black", lw=1.2)
+        ax.vlines(beside, *ends, color="black", lw=1.2)
+    after = "predicted" if ends is None else "predicted, with 95 % of a check run"
     worse = (new if ends is None else ends[1]) >= old
     for those, face, label in ((~worse, "black", after), (worse, "white", "perhaps no better than before")):
-        pair = (new[those], beside[those]) if lying else (beside[those], new[those])
         if those.any():
-            ax.plot(*pair, "o", color="black", mfc=face, ms=4.5, label=label)
+            ax.plot(beside[those], new[those], "o", color="black", mfc=face, ms=4.5, label=label)
     for values in achieved:
-        pair = (values, at + 0.2) if lying else (at + 0.2, values)
-        ax.plot(*pair, "*", color="black", ms=8, mec="white", mew=0.5, label="achieved")
+        ax.plot(at + 0.2, values, "*", color="black", ms=8, mec="white", mew=0.5, label="achieved")
 
 
 def _places(S: int, C: int) -> FloatArray:
@@ -148,15 +108,16 @@ def _name_readings(
     below.set_xlabel("sensor", fontsize=TEXT)
     below.set_xlim(-0.7, float(x[-1]) + 0.7)
     if S * C <= _NAMED:
-        below.set_xticks(x, list(sensors) * S, rotation=90, fontsize=TEXT)
+        names = [name if len(name) < _LONG else f"{name[:16]}…{name[-8:]}" for name in sensors] * S
+        below.set_xticks(x, names, rotation=90, fontsize=TEXT, parse_math=False)
     else:
         below.set_xticks([])
     every = -(-S // 12)
-    words = [speed_words(float(v), labels.speed_unit).split() for v in speeds[::every]]
+    numbers = [labels.speed_number(speed) for speed in speeds[::every]]
     upper = above.secondary_xaxis("top")
-    upper.set_xticks(x.reshape(S, C).mean(axis=1)[::every], [number for number, _ in words], fontsize=TEXT)
+    upper.set_xticks(x.reshape(S, C).mean(axis=1)[::every], numbers, fontsize=TEXT)
     upper.tick_params(length=0)
-    upper.set_xlabel(f"speed, {words[0][1]}", fontsize=TEXT)
+    upper.set_xlabel(f"speed, {labels.speed_in}", fontsize=TEXT)
     upper.spines["top"].set_visible(False)
 
 

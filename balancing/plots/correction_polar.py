@@ -18,7 +18,6 @@ from balancing.solvers.error_propagation import region_edge
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.plot_style import COLORS, MARKERS, QUIET, STYLES, TEXT, legend_below, new_figure
 from rotorid.base.text import capital, figures
-from rotorid.base.unit_words import speed_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,7 +168,7 @@ def vectors(c: Correction, ax: Axes | None = None, trials: Trials | None = None)
     polar.plot(*_vectors(c.labels.vibration, c.after[s, k]), "o", color="black", ms=5, zorder=4)
     polar.set_rlim(bottom=0)
     _quiet_radii(polar, np.rad2deg(theta[1:]), size[1:])
-    where = f"{c.sensors[k]} at {speed_words(float(c.speeds[s]), c.labels.speed_unit)}{unit(c.labels)}"
+    where = f"{c.sensors[k]} at {c.labels.speed_words(c.speeds[s])}{unit(c.labels)}"
     polar.set_title(f"{where}\nphase as {c.labels.phase}", fontsize="medium", pad=10)
     return polar
 

@@ -1,14 +1,14 @@
 """Correction planes as discs: holes, what goes into them, drawn to scale. Nothing is shown or saved here.
 
-A disc is seen from the end from which the rotor turns counter-clockwise, or, with `clockwise`, from the other
-end. Angles are written as the job counts them. Where material is removed everything that is mounted or taken
-away stands at the angle of the equivalent added weight + 180°.
+A disc is seen from the end from which the rotor turns counter-clockwise, or from the one that the job states.
+Angles are written as the job counts them. Where material is removed everything that is mounted or taken away
+stands at the angle of the equivalent added weight + 180°.
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from balancing.correction.correction_result import Correction
     from balancing.mounting.mount_result import Mounted
 
 _HOLES, _NUMBERS, _TICKS, _TEXTS, _SIDE, _EDGE = 0.84, 0.61, 1.06, 1.1, 1.85, 1.55
@@ -50,7 +49,6 @@ def disc(  # noqa: PLR0913
     loose: Sequence[complex] = (),
     words: Sequence[str] = (),
     forbidden: Sequence[tuple[float, float]] = (),
-    clockwise: bool = False,
 ) -> Axes:
     """Draw one plane: rotation, mark, numbered holes, weights (area by mass), and what they are to make.
 
@@ -78,12 +76,10 @@ def disc(  # noqa: PLR0913
         What they are; default: how heavy, and at which angle.
     forbidden
         First angle and width, rad with the rotation, of arcs where no weight can stand (hatched).
-    clockwise
-        Whether the disc is seen from the end from which the rotor turns clockwise.
     """
     from matplotlib.patches import Circle
 
-    turn = -1.0 if remove else 1.0
+    turn, clockwise = -1.0 if remove else 1.0, labels.drawn_sign < 0
     put, said = [], []
     if holes is not None and mounting is not None:
         for h in np.flatnonzero(mounting.amounts):
@@ -137,49 +133,26 @@ def _draw_forbidden(ax: Axes, arcs: Sequence[tuple[float, float]], turn: float, 
         ax.add_patch(Wedge((0, 0), 1.0, *ends, width=0.32, zorder=1, **look))
 
 
-def discs(
-    correction: Correction,
-    holes: Mapping[str, Holes] | None = None,
-    mountings: Mapping[str, Mounting] | None = None,
-    *,
-    tolerances: Mapping[str, float] | None = None,
-    clockwise: bool = False,
-) -> Figure:
-    """A new figure with all planes of a correction side by side.
-
-    Parameters
-    ----------
-    correction
-        Its `remove` names the planes where material is taken away.
-    holes, mountings
-        By plane; planes without holes show the weight where it stands.
-    tolerances
-        Permissible residual by plane, kg or kg·m.
-    clockwise
-        See `disc`.
-    """
-    holes, mountings, tolerances = holes or {}, mountings or {}, tolerances or {}
-    planes = correction.planes
-    columns = min(len(planes), 2)
-    rows = -(-len(planes) // columns)
+def mounted_discs(m: Mounted) -> Figure:
+    """A new figure of all planes and their holes; planes without show the weight where it stands."""
+    c = m.correction
+    columns = min(len(c.planes), 2)
+    rows = -(-len(c.planes) // columns)
     fig = new_figure(3.75 * rows + 0.5, 3.5 * max(columns, 1.3))
-    forbidden = [()] * len(planes) if correction.limits is None else correction.limits.forbidden
-    for p, plane in enumerate(planes):
-        wanted = complex(correction.weights[p])
+    for p, plane in enumerate(c.planes):
+        wanted, mounting = complex(c.weights[p]), m.found.mountings[p]
         disc(
             fig.add_subplot(rows, columns, p + 1),
             plane,
-            holes.get(plane),
-            mountings.get(plane),
-            correction.labels,
-            remove=plane in correction.remove,
+            m.holes[p],
+            mounting,
+            c.labels,
+            remove=plane in c.remove,
             weight=wanted,
-            tolerance=tolerances.get(plane),
-            loose=() if plane in mountings or wanted == 0 else (wanted,),
-            forbidden=forbidden[p],
-            clockwise=clockwise,
+            loose=() if mounting is not None or wanted == 0 else (wanted,),
+            forbidden=() if c.limits is None else c.limits.forbidden[p],
         )
-    fig.suptitle(seen_from(correction.labels, clockwise), fontsize=TEXT)
+    fig.suptitle(seen_from(c.labels), fontsize=TEXT)
     return fig
 
 
@@ -204,20 +177,9 @@ def placed(
     return fig
 
 
-def mounted_discs(m: Mounted) -> Figure:
-    """A new figure of what is mounted in the holes of all planes, drawn as the job counts."""
-    planes = m.correction.planes
-    return discs(
-        m.correction,
-        {p: h for p, h in zip(planes, m.holes, strict=True) if h is not None},
-        {p: k for p, k in zip(planes, m.found.mountings, strict=True) if k is not None},
-        clockwise=m.correction.labels.drawn_sign < 0,
-    )
-
-
-def seen_from(labels: Labels, clockwise: bool = False) -> str:
+def seen_from(labels: Labels) -> str:
     """From which end the discs are seen and how angles count, in words."""
-    way = "clockwise" if clockwise else "counter-clockwise"
+    way = "clockwise" if labels.drawn_sign < 0 else "counter-clockwise"
     return (
         f"Seen from the end from which the rotor turns {way};\n"
         f"angles from the mark (triangle) {labels.side} the rotation"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-_SPEEDS = {"rpm": ("rpm", 60 / math.tau), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
+SPEEDS = {"rpm": ("rpm", 60 / math.tau), "rad_s": ("rad/s", 1.0), "Hz": ("Hz", 1 / math.tau)}
+"""Words and scales of speeds by the units of files."""
 _BASES = {
     "m": "m",
     "mm": "mm",
@@ -57,15 +58,5 @@ def speed_axis(name: str, unit: str) -> Shown:
     >>> speed_axis("speed", "rpm").word
     'speed, rpm'
     """
-    word, scale = _SPEEDS[unit]
+    word, scale = SPEEDS[unit]
     return Shown(f"{name}, {word}", scale)
-
-
-def speed_words(speed: float, unit: str) -> str:
-    """A speed in rad/s as text in the unit of the job.
-
-    >>> speed_words(314.159265, "rpm"), speed_words(314.159265, "Hz")
-    ('3000 rpm', '50 Hz')
-    """
-    word, scale = _SPEEDS[unit]
-    return f"{speed * scale:.6g} {word}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from rotorid.base.rpm import RPM
 from rotorid.base.text import sentence
 from rotorid.report import conventions_explained
 from rotorid.report.balance_data import sheet_data
-from rotorid.report.balance_figures import ROWS_SHOWN, plane_figure, residual_figure
+from rotorid.report.balance_figures import plane_figure, residual_figure
 from rotorid.report.number_tables import every_warning
 from rotorid.report.page import inline_svg, render_report
 from rotorid.tables.reader import units
@@ -74,6 +75,9 @@ def balance_report(
     places = {s: known[s] for s in result.sensors if s in known}
     key_phasor = job.key_phasor if places or job.key_phasor else None
     runs = sheet["runs"]
+    shown = result
+    if mounted is not None:
+        shown = replace(result, after=mounted.after, after_covariance=mounted.after_covariance)
     text: dict[str, Any] = {
         "vibration": labels.vibration_in,
         "weight": labels.weight_in,
@@ -106,11 +110,10 @@ def balance_report(
         ),
         discs=_discs(result, job, mounted, verdict, text["seen"]),
         residual_figure=inline_svg(
-            residual_figure(sheet["residuals"], text["vibration"], labels.speed_unit),
+            residual_figure(shown),
             "Vibration before and predicted after",
         ),
         trade_off_figure="" if curve is None else inline_svg(overview(curve), "Residual over total weight"),
-        rows_shown=ROWS_SHOWN,
         influence_planes=influence.planes,
         several_readings=any(len(row["values"]) > 1 for run in runs for row in run["readings"]),
         forbidden=result.limits is not None and any(result.limits.forbidden),

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rotorid.base.rpm import RPM
-from rotorid.base.unit_words import speed_words
 from rotorid.report.conventions_explained import plain
 
 if TYPE_CHECKING:
@@ -19,8 +13,6 @@ if TYPE_CHECKING:
     from balancing.mounting.holes import Holes
     from balancing.mounting.mount_result import Mounted
 
-ROWS_SHOWN = 60
-"""Readings in one figure; beyond that the largest ones are shown."""
 _WIDTH, _REACH, _TALL = 3.4, (1.95, 2.15), 1.42
 """Of a picture of a plane: inches on paper; half its width (of two, of more planes) and height in radii."""
 
@@ -82,83 +74,19 @@ def plane_figure(
             tolerance=tolerance,
             loose=loose,
             forbidden=arcs,
-            clockwise=labels.drawn_sign < 0,
         )
         ax.set(xlim=(-reach, reach), ylim=(-_TALL, _TALL))
     return figure
 
 
-def residual_figure(rows: Sequence[dict[str, Any]], unit: str, speed_unit: str = "rpm") -> Figure:
-    """Draw readings before (bars) and after (dots with 95 %), and limits (thick lines), one below the other.
+def residual_figure(result: Correction) -> Figure:
+    """Draw readings before and after; what is left a second time, larger, where it is small."""
+    from balancing.plots.amplitude_bars import amplitudes, left_is_small, sizes_of
+    from rotorid.base.plot_style import legend_below, new_figure
 
-    Parameters
-    ----------
-    rows
-        `residuals` of `rotorid.report.balance_data.sheet_data`; of more than `ROWS_SHOWN` the largest.
-    unit
-        Of the amplitudes, in words.
-    speed_unit
-        Of the speeds, as in a column's name.
-    """
-    from matplotlib.figure import Figure
-
-    from balancing.plots.amplitude_bars import before_and_after, left_is_small
-
-    if len(rows) > ROWS_SHOWN:
-        largest = sorted(range(len(rows)), key=lambda i: -max(rows[i]["before"], rows[i]["after"]))
-        rows = [rows[i] for i in sorted(largest[:ROWS_SHOWN])]
-    figure = Figure(figsize=(5.8, 1.0 + 0.145 * len(rows)), layout="constrained")
-    ax = figure.add_subplot()
-    speeds = [row["speed_rpm"] for row in rows]
-    step = [0.0] + [0.5 * (b != a) for a, b in pairwise(speeds)]
-    y = np.arange(len(rows)) + np.cumsum(step)
-    old, new = (np.array([row[key] for row in rows]) for key in ("before", "after"))
-    reach = np.array([row["within_95"] for row in rows], dtype=float)
-    known = bool(np.isfinite(reach).all())
-    label = "predicted with 95 % of a check run" if known else "predicted"
-    closer = None
-    if left_is_small((old, new), reach if known else None):
-        parts = figure.add_gridspec(1, 2, width_ratios=[1.5, 1])
-        ax.set_subplotspec(parts[0])
-        closer = figure.add_subplot(parts[1], sharey=ax)
-        closer.tick_params(axis="y", length=0, labelleft=False)
-        closer.set_xlabel(f"what is left, {plain(unit)}" if unit else "what is left")
-    before_and_after(
-        ax,
-        y,
-        (old, new),
-        closer=closer,
-        reach=reach if known else None,
-        limit=np.array([row["limit"] for row in rows], dtype=float),
-        after=label,
-        lying=True,
-    )
-    ax.set_yticks(y, [_short(row["sensor"]) for row in rows], fontsize="small")
-    for speed in dict.fromkeys(speeds):
-        first = y[speeds.index(speed)]
-        words = speed_words(speed / RPM, speed_unit)
-        ax.text(1.01, first, words, transform=ax.get_yaxis_transform(), va="center")
-    ax.set_xlim(left=0)
-    ax.set_ylim(y[-1] + 0.7, -0.7)
-    ax.set_xlabel(f"amplitude, {plain(unit)}" if unit else "amplitude")
-    ax.tick_params(axis="y", length=0)
-    ax.spines[["top", "right"]].set_visible(False)
-    shown = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
-    order = [name for name in ("before", label, "perhaps no better than before", "limit") if name in shown]
-    figure.legend(
-        [shown[name] for name in order],
-        order,
-        loc="outside upper left",
-        ncols=3,
-        fontsize="small",
-        frameon=False,
-    )
+    small = left_is_small(*sizes_of(result, None))
+    figure = new_figure(3.6 if small else 2.8, 5.8)
+    ax, *closer = figure.subplots(1 + small, sharex=True, squeeze=False)[:, 0]
+    amplitudes(result, ax, closer=closer[0] if small else None)
+    legend_below(figure, [ax])
     return figure
-
-
-def _short(name: str) -> str:
-    """Beginning and end of a long name: sensors often differ in their last letters."""
-    import textwrap
-
-    lines = textwrap.wrap(name, 26)
-    return plain("\n".join([*lines[:2], "…"] if len(lines) > 3 else lines))

@@ -135,8 +135,9 @@ class Fit(Answered, Path):
         found = [own.found, f"\n  {self.method}, integrator {self.integrator}: {self.message}"]
         found.append(f"  residual rms {self.residual_rms:.4g}")
         data = np.concatenate([values for record in self.records for values in record.outputs.values()])
-        if self.reliable and np.nan_to_num(data).any():
-            left = self.residual_rms / float(np.sqrt(np.nanmean(data**2)))
+        size = float(np.sqrt(np.nanmean(data**2)))
+        if self.reliable and size > 0:
+            left = self.residual_rms / size
             said += f"\nThe model leaves {percent(left)} % of the record (rms)."
         if self.errors:
             sizes = ", ".join(f"{name} {size:.3g}" for name, size in self.errors.items())

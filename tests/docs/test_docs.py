@@ -181,7 +181,8 @@ def test_drawings_are_on_a_page_and_the_same_every_time(built):
     shown = " ".join(re.findall(r"^```{drawing} (.*)$", sources, re.MULTILINE)).split()
     assert set(shown) == set(drawings.DRAWINGS)
     made = sum(path.read_text("utf-8").count("<img alt=") for path in built.rglob("*.html"))
-    assert made == len(shown) + len(figures.FIGURES)
+    beside = sum(page.read_text("utf-8").count("```{drawn}") for page in DOCS.rglob("*.md"))
+    assert made == len(shown) + beside + len(figures.GALLERY)
     assert drawings.svg("turning") == drawings.svg("turning")
 
 

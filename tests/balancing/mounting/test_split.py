@@ -213,7 +213,7 @@ def test_out_of_reach_no_fewer_pieces_do():
     nothing = split(2.0, from_list([0.0], [0.01, 0.02]), within=1.2)
     assert (nothing.pieces, nothing.best.pieces) == (0, 1)
     assert nothing.lines(GRAMS) == ["nothing is mounted"]
-    assert "0 pieces; 1 would leave an error of 99 % (--best)" in nothing.summary(GRAMS)
+    assert "1 piece would leave an error of 99 % (--best)." in nothing.answer(GRAMS).brief()
 
 
 def test_words_follow_the_angles_of_the_job():

@@ -1,5 +1,6 @@
 """Discs: what is drawn stands where it will be mounted, as large as it is."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from matplotlib.patches import Circle
 
 from balancing.data.conventions import Labels
 from balancing.mounting.holes import equal_holes, from_list, mounting
-from balancing.plots.discs import disc, discs, seen_from
+from balancing.plots.discs import disc, mounted_discs, seen_from
 
 GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 AGAINST = Labels(weight_unit="g", weight_scale=1e3, angles="against rotation")
@@ -63,9 +64,10 @@ def test_angles_are_written_as_the_job_counts_them():
     assert same["60°"][1] > 0.9
     assert "90°" not in same, "a weight stands there, and its text"
     np.testing.assert_allclose(same["3"], mirrored["3"])
-    behind = texts(disc(axes(), "A", HOLES, MOUNTED, GRAMS, clockwise=True))
+    other = replace(GRAMS, rotation="clockwise", view="free end")
+    behind = texts(disc(axes(), "A", HOLES, MOUNTED, other))
     np.testing.assert_allclose(behind["3"], same["3"] * [1, -1], atol=1e-12)
-    assert "turns clockwise" in seen_from(GRAMS, clockwise=True)
+    assert "turns clockwise" in seen_from(other)
     assert "counter-clockwise" in seen_from(AGAINST)
     assert "against the rotation" in seen_from(AGAINST)
 
@@ -103,7 +105,8 @@ def test_all_planes_side_by_side(tmp_path):
         limits=None,
         remove=("right",),
     )
-    fig = discs(correction, {"left": HOLES}, {"left": MOUNTED}, tolerances={"right": 0.005})
+    found = SimpleNamespace(mountings=(MOUNTED, None, None, None))
+    fig = mounted_discs(SimpleNamespace(correction=correction, holes=(HOLES, None, None, None), found=found))
     titles = [ax.get_title() for ax in fig.axes]
     assert titles == ["left: add", "right: take away", "fan: add", "coupling: add"]
     assert "−20 g\n180.0°" in texts(fig.axes[1])

@@ -48,7 +48,7 @@ def test_prediction_of_what_is_mounted():
     assert m.after_covariance.shape == (*m.after.shape, 2, 2)
     assert np.linalg.norm(m.after) >= np.linalg.norm(found.after)
     text = m.summary()
-    assert "No other choice of pieces is better (proven); plane by plane" in text
+    assert "No other choice of pieces is better (proven).\nPlane by plane the nearest pieces" in text
     assert text.startswith("Mount these pieces: ")
     for holes, mounting in zip(m.holes, m.found.mountings, strict=True):
         for hole, counts in zip(holes.names, mounting.counts.sum(axis=1), strict=True):

@@ -146,6 +146,6 @@ def test_limits_lead_the_prediction(cli):
     assert text.count("limit 2: pass") == 3
     assert cli("balance", TURBO / "job.toml", "--limit", "2", "--table").out.count("limit 2: pass") == 20
     pieces = cli("balance", TURBO / "holes.toml", "--split").out
-    assert pieces.startswith("Mount these pieces: rms 28.4 → 0.666 µm pp (with any weights 0.314).\n")
+    assert pieces.startswith("Mount these pieces: rms 28.4 → 0.576 µm pp (with any weights 0.314).\n")
     assert "±" not in pieces.partition("Warning")[0]
     assert "± 32 g·mm" in cli("balance", TURBO / "holes.toml", "--split", "--table").out

@@ -10,10 +10,10 @@ from rotorid.samples import sample_data
 from rotorid.workflows.demo_samples import SAMPLES
 
 NUMBERS = {
-    "main": ["135.240", "134.203"],
-    "balancing": ["423.0  168.9°", "explained by the stated errors", "13.59  154.7°"],
-    "holes": ["No other choice of pieces is better (proven).", "1 × 20 g in hole 4 (at 45°)"],
-    "rig": ["Both planes are determined", "disk 2"],
+    "main": ["1291.45", "134.203"],
+    "balancing": ["430.0  171.5°", "explained by the stated errors", "13.59 at 154.7°"],
+    "holes": ["2 × 150.0 in hole 6; 150.0 in hole 8", "1 × 20 g in holes 4 (45°), 7 (90°)"],
+    "rig": ["disk 1    33.49  250.5°", "its angle is not determined"],
     "rotor": ["4375.19", "10932.4 rpm", "4409.93"],
     "reduction": ["134.203", "SEREP", "three_masses.toml"],
     "identification": ["999.935", "Only c and b*(1 - delta) are determined"],

@@ -4,6 +4,7 @@ import doctest
 import html
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -259,9 +260,33 @@ def test_names_are_neither_formulas_nor_markup(tmp_path):
     assert "$&lt;b&gt;$" in text
     assert "A$_1$ &lt;i&gt;" in text
     assert sheet.document["residuals"][0]["sensor"] == "A$_1$ <i>"
-    rows = sheet.document["sheet"]["residuals"]
-    ax = residual_figure(rows, "").axes[0]
-    assert ax.get_yticklabels()[0].get_text() == r"A\$_1\$ <i>"
+    name = residual_figure(report.result).axes[-1].get_xticklabels()[0]
+    assert name.get_text() == "A$_1$ <i>"
+    assert not name.get_parse_math()
+
+
+def test_the_readings_drawn_are_those_of_what_is_mounted(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        "rotorid.report.balance.residual_figure", lambda c: drawn.append(c) or residual_figure(c)
+    )
+    _, sheet, report, _ = sheet_of(DATA / "turbo_job" / "holes.toml", split=True)
+    shown = sheet.document["sheet"]["residuals"]
+    assert np.abs(drawn[0].after - report.result.after).max() > 0
+    plain, closer = residual_figure(drawn[0]).axes
+    assert [bar.get_height() for bar in plain.patches] == pytest.approx([row["before"] for row in shown])
+    dots = np.concatenate([line.get_xydata() for line in closer.lines])
+    assert dots[np.argsort(dots[:, 0]), 1] == pytest.approx([row["after"] for row in shown])
+    band = np.array(closer.collections[0].get_segments())[:, 1, 1]
+    assert band == pytest.approx([row["after"] + row["within_95"] for row in shown])
+
+
+def test_rounding_is_not_drawn_larger_and_long_names_are_short():
+    result = sheet_of(DATA / "turbo_job" / "job.toml")[2].result
+    sensors = tuple(f"a name of thirty letters or more {k}" for k in result.sensors)
+    exact = replace(result, sensors=sensors, after=1e-14 * result.before, after_covariance=None)
+    [ax] = residual_figure(exact).axes
+    assert {len(label.get_text()) for label in ax.get_xticklabels()} == {25}
 
 
 def test_the_judgement_of_the_answer_stands_first():

@@ -1,29 +1,10 @@
-"""Figures and words of the balancing sheet: angles, phases, bars."""
+"""Figures and words of the balancing sheet: angles and phases."""
 
 import numpy as np
 import pytest
 
 from balancing.data.conventions import Labels
 from rotorid.report import conventions_explained
-from rotorid.report.balance_figures import ROWS_SHOWN, residual_figure
-
-
-def test_only_the_largest_readings_of_many_are_drawn():
-    rows = [
-        {
-            "speed_rpm": 1000.0 + k,
-            "sensor": "A",
-            "before": 1.0 + k,
-            "after": 0.5,
-            "within_95": None,
-            "limit": None,
-        }
-        for k in range(ROWS_SHOWN + 30)
-    ]
-    ax = residual_figure(rows, "µm pp").axes[0]
-    assert len(ax.get_yticks()) == ROWS_SHOWN
-    assert min(bar.get_width() for bar in ax.patches) == 31.0
-    assert len(residual_figure(rows[:3], "").axes[0].get_yticks()) == 3
 
 
 @pytest.mark.parametrize("rotation", ["clockwise", "counter-clockwise"])
@@ -150,53 +131,3 @@ def test_words_of_the_conventions():
     turned = dict(conventions_explained.words(Labels(angles="against rotation"), {"A": 30.0}, 90.0))
     assert turned["Sensors"].startswith("A at 330°")
     assert turned["Key phasor"].startswith("at 270° from x")
-
-
-def test_a_figure_of_readings_holds_before_after_their_reach_and_limits():
-    rows = [
-        {"speed_rpm": speed, "sensor": sensor, "before": before, "after": after, "within_95": reach,
-         "limit": limit}
-        for speed, sensor, before, after, reach, limit in (
-            (1000.0, "A", 10.0, 4.0, 1.0, None),
-            (1000.0, "B", 12.0, 2.0, 3.0, 6.0),
-            (3000.0, "A", 20.0, 5.0, 2.0, 7.0),
-        )
-    ]  # fmt: skip
-    figure = residual_figure(rows, "µm pp")
-    ax = figure.axes[0]
-    assert [bar.get_width() for bar in ax.patches] == [10.0, 12.0, 20.0]
-    # readings of one speed stand together, those of the next further below
-    y = [bar.get_y() + bar.get_height() / 2 for bar in ax.patches]
-    assert y == pytest.approx([0.0, 1.0, 2.5])
-    assert ax.get_yticks().tolist() == pytest.approx(y)
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["A", "B", "A"]
-    low, high = ax.get_ylim()
-    assert high < 0 < 2.5 < low
-    assert {t.get_text(): t.get_position()[1] for t in ax.texts} == pytest.approx(
-        {"1000 rpm": 0.0, "3000 rpm": 2.5}
-    )
-    assert [line.get_xdata().tolist() for line in ax.lines] == [[4.0, 2.0, 5.0]]
-    # an amplitude reaches to 0 at least
-    ends = [(segment[0][0], segment[1][0]) for segment in ax.collections[0].get_segments()]
-    assert ends == [(3.0, 5.0), (0.0, 5.0), (3.0, 7.0)]
-    limits = next(c for c in ax.collections if c.get_label() == "limit")
-    assert [segment[0][0] for segment in limits.get_segments()] == [6.0, 7.0]
-    assert [segment[:, 1].mean() for segment in limits.get_segments()] == pytest.approx([1.0, 2.5])
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == ["before", "predicted with 95 % of a check run", "limit"]
-    assert (ax.get_xlabel(), ax.get_xscale()) == ("amplitude, µm pp", "linear")
-    for row in rows:
-        row["within_95"] = row["limit"] = None
-    assert len(figure.axes) == 1
-    rows[1]["after"] = 13.0
-    grown = residual_figure(rows, "")
-    names = [text.get_text() for text in grown.legends[0].get_texts()]
-    assert names == ["before", "predicted", "perhaps no better than before"]
-    assert [line.get_mfc() for line in grown.axes[0].lines] == ["black", "white"]
-    rows[0]["after"], rows[1]["after"], rows[2]["after"] = 0.4, 0.9, 0.5  # too small to be read beside 20
-    plain, closer = residual_figure(rows, "").axes
-    assert (plain.get_xlabel(), plain.get_xscale()) == ("amplitude", "linear")
-    assert (closer.get_xlabel(), closer.get_xscale()) == ("what is left", "linear")
-    assert closer.lines[0].get_xdata().tolist() == [0.4, 0.9, 0.5]
-    assert 0.9 < closer.get_xlim()[1] < 1.1
-    assert plain.get_xlim()[1] > 20

@@ -123,11 +123,11 @@ def test_a_vector_larger_than_readings(job):
     read = job(TABLES + VECTORS.replace("amplitude = 2.0", "amplitude = 4.5"))
     (words,) = read.trials.warnings
     assert words.startswith(
-        "the slow-roll vector of sensor 'A', 4.5 um_pp, is larger than its reading in run 'trial 2' at "
-        "1000 rpm, 4 um_pp: check its unit"
+        "the slow-roll vector of sensor 'A', 4.5 µm pp, is larger than its reading in run 'trial 2' at "
+        "1000 rpm, 4 µm pp: check its unit"
     )
     (words,) = job(TABLES + VECTORS.replace("amplitude = 2.0", "amplitude = 8")).trials.warnings
-    assert "4 um_pp, and than 2 other readings: check" in words
+    assert "4 µm pp, and than 2 other readings: check" in words
 
 
 def test_a_slow_run_that_is_not_slow(job, folder):
@@ -146,7 +146,7 @@ def test_errors_are_those_of_the_measured_amplitude(job):
     assert (read.trials.errors.amplitude, read.trials.errors.phase) == (0.02, np.radians(1))
     assert read.trials.errors.floor == pytest.approx(expected, rel=1e-12)
     (words,) = read.trials.warnings
-    assert words.endswith("of the slow-roll vectors, up to 2 um_pp, they add 0.04 um_pp to the floor")
+    assert words.endswith("of the slow-roll vectors, up to 2 µm pp, they add 0.04 µm pp to the floor")
 
 
 def test_the_floor_covers_the_measured_error_on_average():
