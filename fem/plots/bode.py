@@ -101,7 +101,8 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
         phases.margins(x=0.01)
         phases.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
         phases.yaxis.set_major_locator(_right_angles(phases))
-        sizes.get_legend().remove()
+        if legend := sizes.get_legend():
+            legend.remove()
         for ax in rows[c] if c < C - 1 else ():
             ax.set_xlabel("")
     left = len(influence.sensors) - C
