@@ -128,7 +128,7 @@ class TrialWeight(Answered):
         if self.speeds is not None and self.before is not None and self.expected is not None:
             largest = largest_readings(labels, self.speeds, self.sensors, self.before, self.expected)
             lines.append(f"  largest with it{largest}")
-            head = f"Plane {self.plane}, now and with the weight,, {labels.vibration_in}"
+            head = f"Plane {self.plane}, now and with the weight, {labels.vibration_in}"
             table = (f"{head}\n{text(self._columns() or (), left=2)}",)
         return Answer(
             f"Trial weight in plane {self.plane}: {found['mass']:.4g} {labels.weight_in}{at}, {angle}.",

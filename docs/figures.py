@@ -79,16 +79,15 @@ GALLERY = (
         "discs",
         "balancing",
         f"balance {TURBO}/holes.toml --split",
-        "Which pieces go into which hole, seen from the end from which the rotor turns "
-        "counter-clockwise, and how far the weight that they make (bold) is from the wanted one "
-        "(dashed).",
+        "Ten pieces and their holes, seen from the end from which the rotor turns counter-clockwise; the "
+        "weight that they make in each plane (bold) is up to 41 g·mm off the wanted one (dashed).",
     ),
     Picture(
         "trade-off",
         "balancing",
         f"balance {TURBO}/job.toml --best-planes 2 --trade-off",
         "With two planes half the weight leaves half the vibration; the least vibration needs about "
-        "930 g·mm in all.",
+        "920 g·mm in all.",
     ),
     Picture(
         "grade",
@@ -114,9 +113,9 @@ GALLERY = (
     Picture(
         "split",
         "balancing",
-        "split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2",
-        "Which pieces go into which of the 24 holes, that hole 3 has one already, and that all of "
-        "them together are the wanted 35 g at 120°.",
+        "split 35g@120 --holes 24 --pieces 10g,20g --taken 3:10g --per-hole 2 --good-enough 2",
+        "20 g in hole 7 and in hole 11 of the 24 make the wanted 35 g at 120° but for 1 %; hole 3 has a "
+        "piece already.",
     ),
     Picture(
         "drill",
@@ -142,8 +141,8 @@ GALLERY = (
         "map",
         "rotors",
         f"critical {COMPRESSOR} -n 3 --map",
-        "At the stiffness of the bearings, about 10⁸ N/m, stiffer supports would hardly raise the "
-        "first critical speed, but the second and the third.",
+        "At the stiffness of the bearings, about 10⁸ N/m, stiffer supports would raise the "
+        "first critical speed little, the second and the third much more.",
     ),
     Picture(
         "campbell",

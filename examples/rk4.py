@@ -43,7 +43,7 @@ def main(method: str = "weighted") -> dict[str, float]:
 
 
 def scatter(trials: balancing.Trials) -> dict[str, float]:
-    """Of the readings of one run, and of the runs about Y = Y0 + W T, fitted with equal weights; um."""
+    """Of the readings of one run, and of the runs about Y = Y0 + W T, fitted with equal weights; µm."""
     Y, mean = UM * trials.readings[:, :, 0], UM * trials.mean[:, 0]  # (K, R, C), (R, C)
     K, R, C = Y.shape
     reading = np.sqrt(np.sum(np.abs(Y - mean) ** 2, axis=(0, 1)) / (2 * R * (K - 1)))
@@ -57,12 +57,12 @@ def scatter(trials: balancing.Trials) -> dict[str, float]:
     U, sizes, _ = np.linalg.svd(W)
     shares, directions = np.linalg.eigh(S)
     both = abs(np.vdot(U[:, 0], directions[:, -1]))
-    print("Readings of one run scatter by", ", ".join(f"{s:.3f}" for s in reading), "um a component.")
-    print(f"Runs scatter by {run:.2f} um a component about the same linear machine,")
+    print("Readings of one run scatter by", ", ".join(f"{s:.3f}" for s in reading), "µm a component.")
+    print(f"Runs scatter by {run:.2f} µm a component about the same linear machine,")
     print("  eigenvalues of their correlation:", ", ".join(f"{v:.2f}" for v in correlations))
     print(f"  {shares[-1] / shares.sum():.0%} of their variance stands in one direction of the sensors,")
     print(f"  at a cosine of {both:.2f} with the one in which both discs move them.")
-    print("Singular values of W:", ", ".join(f"{s:.3f}" for s in sizes), "um per g·mm.")
+    print("Singular values of W:", ", ".join(f"{s:.3f}" for s in sizes), "µm per g·mm.")
     numbers = (np.sqrt(np.mean(reading**2)), run, correlations[0], both, *sizes)
     names = ("reading_um", "run_um", "correlation", "cosine", "sum_um_per_g_mm", "couple_um_per_g_mm")
     return {name: float(value) for name, value in zip(names, numbers, strict=True)}

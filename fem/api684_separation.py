@@ -2,28 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
-from rotorid.base.answer import Answer
+from rotorid.base.answer import Answer, Answered
 from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import listing, table
 
 
-def separation(criticals: Iterable[float], operating: tuple[float, float]) -> dict[str, Any]:
-    """Which critical speeds, rad/s, lie in the operating range, and how far off the others are.
+@dataclass(frozen=True)
+class Separation(Answered):
+    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
 
-    The distance is in percent of the nearest end of the range (API 684).
-    """
-    low, high = operating
-    rows = []
-    for speed in criticals:
-        below = 100 * (low - speed) / low if low > 0 else 0.0
-        margin = 100 * (speed - high) / high if speed > high else max(0.0, below)
-        rows.append(
-            {"speed_rad_s": float(speed), "inside": low <= speed <= high, "separation_percent": float(margin)}
-        )
-    return {"range_rad_s": [low, high], "critical_speeds": rows}
+    speeds: Iterable[float]
+    operating: tuple[float, float]
+    doubt: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Which speeds lie in the range, and how far off the others are, in percent of its nearest end."""
+        low, high = self.operating
+        rows = []
+        for speed in self.speeds:
+            below = 100 * (low - speed) / low if low > 0 else 0.0
+            margin = 100 * (speed - high) / high if speed > high else max(0.0, below)
+            rows.append({"speed_rad_s": speed, "inside": low <= speed <= high, "separation_percent": margin})
+        return {"range_rad_s": [low, high], "critical_speeds": rows}
+
+    @property
+    def answer(self) -> Answer:
+        """For an engineer."""
+        low, high = self.operating
+        within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
+        rows = sorted(self.to_dict()["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+        away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
+        more = "how far each is from the operating range"
+        inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
+        if inside:
+            return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+        if self.doubt:
+            said = f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
+            return Answer(said, tables=(table(away),) if away else (), more=more)
+        if not rows:
+            return Answer(f"No critical speed was found beside {within}.")
+        near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
+        return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)
 
 
 def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
@@ -31,22 +54,3 @@ def unsearched(first: float, last: float, operating: tuple[float, float] | None)
     if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
         return ""
     return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"
-
-
-def separation_answer(operating: Mapping[str, Any], doubt: str = "") -> Answer:
-    """The result of `separation` for an engineer; a doubt keeps it from calling the range free."""
-    low, high = operating["range_rad_s"]
-    within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
-    rows = sorted(operating["critical_speeds"], key=lambda row: float(row["separation_percent"]))
-    away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
-    more = "how far each is from the operating range"
-    inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
-    if inside:
-        return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
-    if doubt:
-        said = f"NOT KNOWN whether a critical speed lies in {within}: {doubt}."
-        return Answer(said, tables=(table(away),) if away else (), more=more)
-    if not rows:
-        return Answer(f"No critical speed was found beside {within}.")
-    near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
-    return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)

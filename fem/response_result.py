@@ -228,18 +228,8 @@ class BearingForces:
 
     def summary(self) -> str:
         """The largest force on each support, as text."""
-        where = [largest_at(force, self.steady) for force in self.largest.T]
-        forces = zip(where, self.largest.T, strict=True)
-        columns = (
-            Column("support", [support.name or f"node {support.node}" for support in self.supports], str),
-            Column(
-                "N", [None if k is None else force[k] for k, force in forces], figures, "largest force, N"
-            ),
-            Column(
-                "rpm", [None if k is None else self.speeds[k] * RPM for k in where], "{:.1f}".format, "at rpm"
-            ),
-        )
-        return text(columns)
+        names = [support.name or f"node {support.node}" for support in self.supports]
+        return largest_text("support", names, "force, N", self.largest, self.speeds, self.steady)
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,6 +314,17 @@ class InfluenceCoefficients(Answered):
 def largest_at(size: FloatArray, steady: BoolArray) -> int | None:
     """Where a size is largest of all that exist, both of shape (S,); None if none does."""
     return int(np.argmax(np.where(steady, size, -1.0))) if steady.any() else None
+
+
+def largest_text(
+    what: str, names: Sequence[str], size: str, values: FloatArray, speeds: FloatArray, steady: BoolArray
+) -> str:
+    """The largest of values, shape (S, n), of each name and its speed, as a table; `size` with its unit."""
+    where = [largest_at(column, steady) for column in values.T]
+    found = [None if k is None else column[k] for k, column in zip(where, values.T, strict=True)]
+    rpm = [None if k is None else speeds[k] * RPM for k in where]
+    shown = Column("largest", found, figures, f"largest {size}")
+    return text((Column(what, names, str), shown, Column("rpm", rpm, "{:.1f}".format, "at rpm")))
 
 
 def polar(size: str, phase: str, Z: ComplexArray) -> tuple[Column, Column]:

@@ -17,7 +17,7 @@ from fem.solvers.bracketed_roots import bracketed_root
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, rows, text
+from rotorid.base.result import Column, frame, numbered, rows, text
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
@@ -94,11 +94,8 @@ class SpeedMap(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per stiffness, one column per critical speed."""
-        import pandas as pd
-
-        columns: dict[str, Any] = {"stiffness_N_per_m": self.stiffness}
-        columns |= {f"critical_speed_{k}_rad_s": row for k, row in enumerate(self.speeds.T, start=1)}
-        return pd.DataFrame(columns)
+        speeds = numbered("critical_speed_{}_rad_s", self.speeds)
+        return frame((Column("stiffness_N_per_m", self.stiffness), *speeds))
 
     @property
     def answer(self) -> Answer:

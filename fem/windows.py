@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,6 +78,11 @@ class Window:
             f"{text}mode {self.mode} ({DIRECTION_NAMES[self.direction]} whirl, {self.frequency:.6g} rad/s) "
             "grows there; amplitudes computed there are never reached"
         )
+
+
+def ranges(windows: Iterable[Window]) -> list[tuple[float, float]]:
+    """First and last speed of each, rad/s."""
+    return [(window.first, window.last) for window in windows]
 
 
 def within(windows: tuple[Window, ...], speeds: FloatArray) -> BoolArray:

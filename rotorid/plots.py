@@ -16,7 +16,8 @@ def plot(result: object, ax: Any = None, **options: Any) -> Any:  # noqa: ANN401
     result
         Of `fem`, `balancing` or rotorid: modes, a Campbell diagram, a correction, a fit, …
     ax
-        Axes of matplotlib to draw on; None: those of a new figure, or a new figure with all pictures.
+        Axes of matplotlib to draw on; None: those of a new figure. Identifications and fits take none:
+        they get a new figure with all pictures.
     options
         For the function that draws: the picture of a response takes `nodes`.
 
@@ -45,12 +46,8 @@ def _rotors() -> Pictures:
         fem.Modes: plots.draw_modes,
         fem.Response: plots.draw_response,
         fem.InfluenceCoefficients: plots.draw_influence,
-        fem.Campbell: lambda found, ax: plots.draw_campbell(
-            found, ax, criticals=found.criticals, unstable=[(w.first, w.last) for w in found.windows]
-        ),
-        fem.SpeedMap: lambda found, ax: plots.draw_speed_map(
-            found.stiffness, found.speeds, ax, supports=found.own
-        ),
+        fem.Campbell: plots.draw_campbell,
+        fem.SpeedMap: plots.draw_speed_map,
         fem.StaticDeflection: plots.draw_deflection,
     }
 
@@ -90,10 +87,10 @@ def _reduction() -> Pictures:
 
 
 def _harmonic() -> Pictures:
-    from rotorid.harmonic.plots import plot_identification
+    from rotorid.harmonic.plots import figure_identification
     from rotorid.harmonic.result import Identification
 
-    return {Identification: plot_identification}
+    return {Identification: lambda found, ax: figure_identification(found)}
 
 
 def _timedomain() -> Pictures:

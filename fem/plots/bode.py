@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from fem.model.sensors import label
 from fem.plots.drawing import draw_rotor
-from fem.windows import Window, within
+from fem.windows import Window, ranges, within
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -25,6 +25,7 @@ from rotorid.base.plot_style import (
     look,
     new_axes,
     new_figure,
+    new_pair,
     note,
     plain,
     rad_s_above,
@@ -96,7 +97,7 @@ def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
             seen = steady & (np.abs(curve) > 0)
             phase = _with_gaps(np.degrees(_lag(curve[seen])), seen)
             phases.plot(speeds * RPM, phase, **_look(k, len(planes), speeds, ()))
-        shade_unstable(phases, _ranges(given))
+        shade_unstable(phases, ranges(given))
         plain(phases)
         phases.margins(x=0.01)
         phases.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
@@ -126,14 +127,14 @@ def draw_bode(
     speeds: ArrayLike,
     readings: ArrayLike,
     labels: Sequence[str],
-    axes: tuple[Axes, Axes] | None = None,
+    axes: Sequence[Axes] | None = None,
     *,
     peaks: Sequence[Peaks] = (),
     factors: bool = True,
     operating: tuple[float, float] | None = None,
     windows: Sequence[Window] = (),
 ) -> tuple[Axes, Axes]:
-    """Draw amplitude and phase of readings over speed.
+    """Draw amplitude and phase of readings over speed; return both axes.
 
     Parameters
     ----------
@@ -153,20 +154,8 @@ def draw_bode(
         Range of operating speeds, rad/s, shaded.
     windows
         Ranges without a steady response: hatched, and nothing is drawn there.
-
-    Returns
-    -------
-    tuple of matplotlib.axes.Axes
-        The axes drawn into.
     """
-    if axes is None:
-        from matplotlib import pyplot as plt
-
-        _, (above, below) = plt.subplots(
-            2, figsize=(WIDTH, 5.8), sharex=True, layout="constrained", height_ratios=(3, 2)
-        )
-        axes = above, below
-    above, below = axes
+    above, below = new_pair(5.8) if axes is None else axes
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     _over_speed(
         above, omega, 1e6 * np.abs(Z), labels, "amplitude, µm peak", windows, operating=operating, peaks=peaks
@@ -179,7 +168,7 @@ def draw_bode(
         drawn = _look(k, len(labels), omega[shown], peaks)
         below.plot(omega[shown] * RPM, _with_gaps(phase, seen)[shown], **drawn)
     shade_operating(below, operating)
-    shade_unstable(below, _ranges(windows))
+    shade_unstable(below, ranges(windows))
     plain(below)
     below.margins(x=0.01)
     below.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
@@ -189,9 +178,9 @@ def draw_bode(
     for speed, text in _together(peaks, factors, 0.06 * (omega[-1] - omega[0])):
         place, across = (speed * RPM, 0.0), ("data", "axes fraction")
         note(above, text, place, (3, 5), xycoords=across, rotation=90, va="bottom", bbox=BOX)
-        for ax in axes:
+        for ax in (above, below):
             ax.axvline(speed * RPM, color=DARK, linewidth=0.9, linestyle=(0, (2, 2)), zorder=1)
-    return axes
+    return above, below
 
 
 def _together(peaks: Sequence[Peaks], factors: bool, width: float) -> list[tuple[float, str]]:
@@ -238,10 +227,7 @@ def draw_polar(
     windows
         Ranges without a steady response, which are left out.
     """
-    if ax is None:
-        from matplotlib import pyplot as plt
-
-        _, ax = plt.subplots(figsize=(WIDTH, 6.6), layout="constrained", subplot_kw={"projection": "polar"})
+    ax = new_axes((WIDTH, 6.6), projection="polar") if ax is None else ax
     omega, Z = np.asarray(speeds, float), np.asarray(readings, complex)
     steady = ~within(tuple(windows), omega)
     omega, Z = omega[steady], Z[steady]
@@ -266,10 +252,6 @@ def draw_polar(
     near = np.abs(np.angle(Z[..., None] * np.exp(-1j * np.radians(rays)))) < np.radians(12)
     ax.set(rlabel_position=rays[np.argmin(near.sum(axis=(0, 1)))])
     return ax
-
-
-def _ranges(windows: Sequence[Window]) -> list[tuple[float, float]]:
-    return [(window.first, window.last) for window in windows]
 
 
 def _with_gaps(values: FloatArray, there: BoolArray) -> FloatArray:
@@ -319,7 +301,7 @@ def _over_speed(
         drawn = _look(k, len(labels), speeds[order], peaks)
         ax.plot(speeds[order] * RPM, curve[order], label=named, **drawn)
     shade_operating(ax, operating)
-    shade_unstable(ax, _ranges(windows))
+    shade_unstable(ax, ranges(windows))
     positive = curves[curves > 0]
     if positive.size and positive.max() > 30 * positive.min():
         ax.set_yscale("log")

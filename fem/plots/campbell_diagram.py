@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fem.orbits import DIRECTION_NAMES
+from fem.windows import ranges
 from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import (
     ABOVE_SCALE,
@@ -45,19 +46,13 @@ _LOOKS: dict[str, dict[str, Any]] = {
 _CRITICAL: dict[str, Any] = {"marker": "o", "color": "black", "markerfacecolor": "#F0E442", "markersize": 9}
 
 
-def campbell_figure(
-    campbell: Campbell,
-    criticals: Sequence[tuple[float, float]] = (),
-    *,
-    operating: tuple[float, float] | None = None,
-    unstable: Sequence[tuple[float, float]] = (),
-) -> Figure:
+def campbell_figure(campbell: Campbell, operating: tuple[float, float] | None = None) -> Figure:
     """Make a figure of a Campbell diagram over its logarithmic decrements; unstable speeds are hatched."""
     figure = new_figure(7.4)
     above, below = figure.subplots(2, sharex=True, height_ratios=(5, 3))
-    draw_campbell(campbell, above, criticals=criticals, operating=operating, unstable=unstable)
+    draw_campbell(campbell, above, operating)
     draw_log_decrements(campbell, below)
-    shade_unstable(below, unstable)
+    shade_unstable(below, ranges(campbell.windows))
     shade_operating(below, operating)
     above.set_xlabel("")
     above.tick_params(labelbottom=False)
@@ -65,30 +60,13 @@ def campbell_figure(
 
 
 def draw_campbell(
-    campbell: Campbell,
-    ax: Axes | None = None,
-    *,
-    criticals: Sequence[tuple[float, float]] = (),
-    operating: tuple[float, float] | None = None,
-    unstable: Sequence[tuple[float, float]] = (),
+    campbell: Campbell, ax: Axes | None = None, operating: tuple[float, float] | None = None
 ) -> Axes:
-    """Draw whirl frequencies over speed, with the 1× line.
+    """Draw whirl frequencies over speed, with the 1× line; unstable speeds are hatched.
 
     Forward whirl is a solid line with filled triangles that point up, backward whirl a dashed one with open
-    triangles that point down, neither (a straight line) a dotted one: told apart in black and white too.
-
-    Parameters
-    ----------
-    campbell
-        Speeds, frequencies and directions.
-    ax
-        Axes to draw into; new ones if None.
-    criticals
-        Damped critical speeds to mark: speed in rad/s and log decrement there.
-    operating
-        Range of operating speeds, rad/s, shaded.
-    unstable
-        Ranges of speed in which a mode grows, rad/s, hatched.
+    triangles that point down, neither (a straight line) a dotted one: told apart in black and white too. The
+    range of operating speeds, rad/s, is shaded.
     """
     ax = new_axes((WIDTH, 4.8)) if ax is None else ax
     top = _highest(campbell)
@@ -96,7 +74,7 @@ def draw_campbell(
     end = min(float(campbell.speeds.max()) * RPM, top)
     ax.plot([0, end], [0, end], color="black", linewidth=1.3)
     ax.set(xlim=_range(campbell), ylim=(0, top))
-    seen = [(speed * RPM, delta) for speed, delta in criticals if speed * RPM <= end]
+    seen = [(speed * RPM, delta) for speed, delta in campbell.criticals if speed * RPM <= end]
     middle = _free(ax.get_xlim()[0], end, [speed for speed, _ in seen])
     note(ax, "1×", (middle, middle), (-4, 5), ha="right", fontsize=11)
     if seen:
@@ -104,7 +82,7 @@ def draw_campbell(
         ax.plot(places, places, linestyle="", zorder=6, **_CRITICAL)
     _label_criticals(ax, seen)
     shade_operating(ax, operating)
-    shade_unstable(ax, unstable, "unstable")
+    shade_unstable(ax, ranges(campbell.windows), "unstable")
     plain(ax)
     ax.set(xlabel="speed, rpm", ylabel="whirl frequency, rpm")
     rad_s_above(ax)
@@ -113,12 +91,11 @@ def draw_campbell(
     return ax
 
 
-def draw_log_decrements(campbell: Campbell, ax: Axes | None = None) -> Axes:
+def draw_log_decrements(campbell: Campbell, ax: Axes) -> Axes:
     """Draw logarithmic decrements over speed, with the limit of stability, as `draw_campbell` draws modes.
 
     Values above 3 are cut off.
     """
-    ax = new_axes((WIDTH, 3)) if ax is None else ax
     shown = _shown(campbell)
     delta = campbell.log_decrements[:, shown]
     _curves(ax, campbell, campbell.log_decrements)

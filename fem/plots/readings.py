@@ -16,7 +16,6 @@ from rotorid.base.plot_style import COLORS, MARKERS, QUIET, new_figure, on_figur
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from fem.api684_peaks import Peaks
@@ -29,37 +28,25 @@ def bode_figure(
     peaks: Sequence[Peaks] = (),
     *,
     operating: tuple[float, float] | None = None,
-) -> Figure:
-    """Make a figure as `draw_readings` draws it."""
-    figure = new_figure(6.0)
-    axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-    draw_readings(response, sensors, peaks, axes, operating=operating)
-    return figure
-
-
-def draw_readings(
-    response: Response,
-    sensors: Sequence[SensorLike],
-    peaks: Sequence[Peaks],
-    axes: Sequence[Axes],
-    *,
-    operating: tuple[float, float] | None = None,
     factors: bool = True,
-) -> None:
-    """Draw amplitude and phase of sensors, each marked at its peaks.
+    figure: Figure | None = None,
+) -> Figure:
+    """Make a figure of the amplitude and phase of sensors over speed, each marked at its peaks.
 
-    `factors`: amplification factors are written at the marks.
+    `factors`: amplification factors are written at the marks. `figure`: what to draw on instead of a new one.
     """
+    figure = new_figure(6.0) if figure is None else figure
     draw_bode(
         response.speeds,
         response.readings(sensors),
         _labels(sensors),
-        (axes[0], axes[1]),
+        figure.subplots(2, sharex=True, height_ratios=(3, 2)),
         peaks=peaks,
         factors=factors,
         operating=operating,
         windows=response.windows,
     )
+    return figure
 
 
 def polar_figure(response: Response, sensors: Sequence[SensorLike]) -> Figure:

@@ -2,53 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from rotorid.base.plot_style import DARK, MARKERS, WIDTH, legend_above, look, new_axes, plain, scale_beside
+from rotorid.base.plot_style import (
+    DARK,
+    MARKERS,
+    WIDTH,
+    legend_above,
+    look,
+    new_axes,
+    plain,
+    plain_numbers,
+    scale_beside,
+)
 from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axes._base import _AxesBase
+
+    from fem.speed_map import SpeedMap
 
 
 def draw_speed_map(
-    stiffness: ArrayLike,
-    speeds: ArrayLike,
-    ax: Axes | None = None,
-    *,
-    supports: Sequence[tuple[str, ArrayLike, ArrayLike]] = (),
-    operating: tuple[float, float] | None = None,
+    chart: SpeedMap, ax: Axes | None = None, operating: tuple[float, float] | None = None
 ) -> Axes:
     """Draw critical speeds over the stiffness of the supports, both logarithmic.
 
-    Parameters
-    ----------
-    stiffness
-        N/m, shape (K,).
-    speeds
-        Critical speeds, rad/s, shape (K, n); what is not positive is left out.
-    ax
-        Axes to draw into; new ones if None.
-    supports
-        What the machine has: label, stiffness in N/m and the speeds in rad/s at which it has it; no speeds
-        mean all.
-    operating
-        Range of operating speeds, rad/s, shaded.
+    Speeds that are not positive are left out; the range of operating speeds, rad/s, is shaded.
     """
     ax = new_axes((WIDTH, 5)) if ax is None else ax
-    k, omega = np.asarray(stiffness, float), np.asarray(speeds, float)
-    for mode, curve in enumerate(omega.T):
+    k = chart.stiffness
+    for mode, curve in enumerate(chart.speeds.T):
         seen = curve > 0
         ax.plot(k[seen], curve[seen] * RPM, linewidth=2, label=f"critical speed {mode + 1}", **look(mode))
     ax.set(xscale="log", yscale="log")
     low, high = ax.get_ylim()
-    for i, (label, own, at) in enumerate(supports):
-        own, at = np.atleast_1d(np.asarray(own, float)), np.atleast_1d(np.asarray(at, float))
+    for i, (label, own, at) in enumerate(chart.own):
         x, y = (own, at * RPM) if at.size else (np.repeat(own[:1], 2), np.array([low, high]))
         marker = MARKERS[i % len(MARKERS)] if at.size else ""
         ax.plot(x, y, color=DARK, linestyle=(0, (1, 1.5)), linewidth=1.3, marker=marker, markersize=5,
@@ -62,15 +53,6 @@ def draw_speed_map(
     ax.grid(which="minor", color="#f0f2f5", linewidth=0.5)
     scale_beside(ax, RPM, "critical speed, rad/s")
     for scale in (ax, *ax.child_axes):
-        _plain_numbers(scale)
+        plain_numbers(scale)
     legend_above(ax)
     return ax
-
-
-def _plain_numbers(ax: _AxesBase) -> None:
-    """2000 instead of 2 × 10³ on the axis of speeds."""
-    from matplotlib.ticker import FuncFormatter, LogLocator
-
-    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))

@@ -15,6 +15,7 @@ from rotorid.base.rpm import RPM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axes._base import _AxesBase
     from matplotlib.figure import Figure
 
 # Okabe and Ito: told apart by every eye.
@@ -32,12 +33,21 @@ ABOVE_SCALE = 4.2
 """Room, in letters, between axes and a legend above their second scale."""
 
 
-def new_axes(size: tuple[float, float] = (WIDTH, 4.2)) -> Axes:
-    """Make axes of a new figure, size in inches."""
+def new_axes(size: tuple[float, float] = (WIDTH, 4.2), **options: Any) -> Axes:  # noqa: ANN401  of matplotlib
+    """Make axes of a new figure, size in inches; options as for `add_subplot`."""
     from matplotlib import pyplot as plt
 
-    _, ax = plt.subplots(figsize=size, layout="constrained")
+    _, ax = plt.subplots(figsize=size, layout="constrained", subplot_kw=options)
     return ax
+
+
+def new_pair(height: float, ratios: tuple[int, int] = (3, 2)) -> tuple[Axes, Axes]:
+    """Make axes above others with the same horizontal axis, of a new figure, height in inches."""
+    from matplotlib import pyplot as plt
+
+    size: dict[str, Any] = {"figsize": (WIDTH, height), "height_ratios": ratios}
+    _, (above, below) = plt.subplots(2, sharex=True, layout="constrained", **size)
+    return above, below
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -107,6 +117,16 @@ def plain(ax: Axes) -> None:
     ax.grid(color=GRID, linewidth=0.8)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
+
+
+def plain_numbers(ax: _AxesBase) -> None:
+    """1, 2, 5, 10 instead of powers of ten on a logarithmic vertical axis."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = ax.get_ylim()
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 500 * low else (1.0,)))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def shade_unstable(

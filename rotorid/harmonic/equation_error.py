@@ -26,11 +26,11 @@ from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
 from rotorid.harmonic.polynomial_solutions import System
 from rotorid.harmonic.regression_rows import Rows, build_rows, row_covariance, whiten
-from rotorid.harmonic.result import FoundCombination, Identification
+from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
-from rotorid.regression.undetermined_combinations import echelon
+from rotorid.regression.undetermined_combinations import FoundCombination, echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
 

@@ -86,19 +86,14 @@ class Design(Answered):
         said = f"Measure at {listed} rad/s ({len(self.chosen)} of {len(self.candidates)} candidates)"
         if np.isfinite(self.efficiency):
             said += f": {self.efficiency:.2f} times the information of as many readings spread evenly"
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(self.guess == 0, np.nan, self.std / np.abs(self.guess))
+        std, every = (np.where(np.isfinite(each), each, np.nan) for each in (self.std, self.std_all))
         known = ["" if np.isfinite(std) else "these frequencies will not determine it" for std in self.std]
         columns = (
             Column("parameter", self.parameters, str),
             Column("guess", self.guess, "{:.6g}".format),
-            Column(
-                "std", [std if np.isfinite(std) else None for std in self.std], error_figures, "± expected"
-            ),
-            Column("%", np.where(np.isfinite(share), share, np.nan), percent),
-            Column(
-                "all", [std if np.isfinite(std) else None for std in self.std_all], error_figures, "± of all"
-            ),
+            Column("std", std, error_figures, "± expected"),
+            Column("%", std / np.where(self.guess == 0, np.nan, np.abs(self.guess)), percent),
+            Column("all", every, error_figures, "± of all"),
             Column("why", known, str, ""),
         )
         return Answer(f"{said}.", text(columns, width=COLUMNS))

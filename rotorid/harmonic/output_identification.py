@@ -15,11 +15,12 @@ from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_error import OutputError, output_error
 from rotorid.harmonic.parameter_recovery import only_determined, why_several
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
-from rotorid.harmonic.result import FoundCombination, Identification
+from rotorid.harmonic.result import Identification
 from rotorid.harmonic.starting_values import starting_values
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
+from rotorid.regression.undetermined_combinations import FoundCombination
 
 MOST_STARTS = 8
 """Solutions of the linear estimate from which to begin."""

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from rotorid.harmonic.result import FoundCombination, Identification
+    from rotorid.harmonic.result import Identification
+    from rotorid.regression.undetermined_combinations import FoundCombination
 
 Curve = tuple[FloatArray, dict[str, ComplexArray]]
 
@@ -28,28 +29,6 @@ WIDE = 10.0
 """Ratio of amplitudes above which their scale is logarithmic."""
 MODEL_UNIT = Shown("model unit")
 """Of amplitudes whose columns name no unit."""
-
-
-def plot_identification(result: Identification, ax: Axes | None = None) -> Axes | Figure:
-    """Draw measured amplitudes (points) and those of the identified model (lines) over frequency.
-
-    Free vibrations only: measured and fitted shapes instead.
-
-    Parameters
-    ----------
-    result
-        What to draw.
-    ax
-        Where; None: a new figure with the phases, the deviations and the parameters, too.
-    """
-    if ax is None:
-        return figure_identification(result)
-    if result.experiments.free.all():
-        draw_shapes(result, ax)
-    else:
-        draw_amplitudes(result, ax)
-    _legend(result, ax)
-    return ax
 
 
 def figure_identification(result: Identification) -> Figure:
@@ -77,13 +56,12 @@ def figure_identification(result: Identification) -> Figure:
     return figure
 
 
-def draw_amplitudes(result: Identification, axes: Axes, outputs: Sequence[str] | None = None) -> None:
+def draw_amplitudes(result: Identification, axes: Axes, outputs: Sequence[str]) -> None:
     """Measured and fitted amplitudes over frequency in the units of their table; ± 2σ where that is known.
 
     Logarithmic where they are very different.
     """
     units, curve = result.experiments.units, _curve(result)
-    outputs = result.model.outputs if outputs is None else outputs
     for name in outputs:
         scale = units.get(name, MODEL_UNIT).scale
         _draw_points(

@@ -16,33 +16,13 @@ from rotorid.base.text import percent, sentence
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
+from rotorid.regression.undetermined_combinations import FoundCombination
 
 if TYPE_CHECKING:
     import pandas as pd
 
 HEADINGS = {"equation-error": "linear regression (equation error)", "output-error": "output error"}
 SEVERAL = "several values: see the solutions"
-
-
-@dataclass(frozen=True)
-class FoundCombination:
-    """A combination of parameters that the data determine.
-
-    Attributes
-    ----------
-    words
-        The combination, such as "b*(1 - delta)".
-    value, std
-        Its estimate and one standard deviation, None where that is unknown.
-    """
-
-    words: str
-    value: float
-    std: float | None
-
-    def line(self) -> str:
-        """One line of text."""
-        return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +146,6 @@ class Identification(Answered, Uncertain):
     def to_frame(self) -> pd.DataFrame:
         """One row per parameter: value, std, and the 95 % interval (NaN where unknown)."""
         return frame(parameter_columns(self.parameters, self))
-
-    def residual_frame(self) -> pd.DataFrame:
-        """One row per experiment and equation (or output): real and imaginary part of the residual."""
-        return frame(_residual_columns(self))
 
     @property
     def answer(self) -> Answer:

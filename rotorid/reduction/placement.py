@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, islice
 from math import comb
@@ -137,7 +138,7 @@ def rank_nodes(
         rotor=rotor,
         warnings=(*said, *full.warnings),
     )
-    return result.with_warnings(*_warnings(result))
+    return dataclasses.replace(result, warnings=(*result.warnings, *_warnings(result)))
 
 
 def book_nodes(rotor: fem.Rotor, n: int = 3, *, speed: float | None = None) -> tuple[int, ...]:

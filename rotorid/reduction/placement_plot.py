@@ -20,16 +20,11 @@ if TYPE_CHECKING:
 def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     """Draw all choices of places: largest frequency error over 1 − smallest MAC, both logarithmic.
 
-    Parameters
-    ----------
-    placement
-        What to draw; choices that give no physical model are left out.
-    ax
-        Where; default new axes. A colour bar for the condition number is added to its figure.
+    Choices that give no physical model are left out. A colour bar for the condition number is added.
     """
     from matplotlib.colors import LogNorm
 
-    from rotorid.base.plot_style import TEXT, WIDTH, new_axes, plain
+    from rotorid.base.plot_style import TEXT, WIDTH, new_axes, plain, plain_numbers
 
     axes = new_axes((WIDTH, 5.6)) if ax is None else ax
     plain(axes)
@@ -69,8 +64,8 @@ def plot_placement(placement: Placement, ax: Axes | None = None) -> Axes:
     )
     if unlike:
         bar = axes.figure.colorbar(points, ax=axes, label="condition number of the regression", pad=0.02)
-        _plain_numbers(bar.ax)
-    _plain_numbers(axes)
+        plain_numbers(bar.ax)
+    plain_numbers(axes)
     front = np.asarray(placement.pareto, dtype=int)
     axes.step(
         x[front], y[front], where="pre", color=COLORS[1], linewidth=1.4, zorder=3,
@@ -114,13 +109,3 @@ def _named(placement: Placement, x: FloatArray, y: FloatArray, axes: Axes) -> No
             label=f"{' and '.join(words)}: {word} {nodes} ({masses} kg), "
             f"{100 * placement.error[row]:.3g} %, MAC {placement.mac[row]:.4f}",
         )
-
-
-def _plain_numbers(axes: Axes) -> None:
-    """1, 2, 5, 10 instead of powers of ten on a logarithmic vertical axis."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    low, high = axes.get_ylim()
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 500 * low else (1.0,)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -293,7 +292,3 @@ class Placement(Answered):
             f"with a MAC below {ALIKE:g}, first nodes {', '.join(map(str, self.nodes[i]))} (rank "
             f"{i + 1}, MAC {self.mac[i]:.2f} in mode {self.worst_mode[i]}). Choose by both columns"
         )
-
-    def with_warnings(self, *more: str) -> Placement:
-        """The same with further warnings."""
-        return dataclasses.replace(self, warnings=(*self.warnings, *more))

@@ -20,6 +20,7 @@ from rotorid.base.plot_style import (
     WIDTH,
     legend_above,
     new_axes,
+    new_pair,
     note,
     plain,
 )
@@ -51,14 +52,8 @@ DARK, LINE = "#2f3640", "#6b7480"
 def plot_reduction(reduction: Reduction, ax: Axes | None = None) -> Axes:
     """Draw the shapes of the n-mass model (points) over the rotor's (lines) and the rotor itself.
 
-    Without a rotor the measured shapes stand beside those of the model, place by place.
-
-    Parameters
-    ----------
-    reduction
-        What to draw; of many modes the first six.
-    ax
-        Where; default new axes.
+    Without a rotor the measured shapes stand beside those of the model, place by place. Of many modes the
+    first six are drawn.
     """
     from fem.plots import draw_rotor
     from fem.plots.mode_shapes import smooth_shapes
@@ -170,25 +165,16 @@ def _masses_above(reduction: Reduction, rotor: fem.Rotor, axes: Axes) -> int:
 def plot_methods(methods: Methods, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     """Draw what methods of reduction lose: frequency errors with their sign, and 1 − MAC, as bars.
 
-    Parameters
-    ----------
-    methods
-        What to draw; of many modes the first six.
-    axes
-        For the frequency errors and for the shapes; default new ones, one above the other.
+    Two axes, for the errors and for the shapes; of many modes the first six are drawn.
     """
-    if axes is None:
-        from matplotlib import pyplot as plt
-
-        _, axes = plt.subplots(2, figsize=(WIDTH, 6), sharex=True, layout="constrained")
     names = [row.name for row in methods.rows]
     errors, mac = ([getattr(row, what) for row in methods.rows] for what in ("relative_error", "mac"))
-    return _compared(methods, names, np.array(errors), np.array(mac), (axes[0], axes[1]))
+    return _compared(methods, names, np.array(errors), np.array(mac), axes)
 
 
-def plot_trade_off(choices: TradeOff, axes: Sequence[Axes]) -> tuple[Axes, Axes]:
+def plot_trade_off(choices: TradeOff, axes: Sequence[Axes] | None = None) -> tuple[Axes, Axes]:
     """Draw what other masses at the same nodes lose, as `plot_methods` draws methods."""
-    return _compared(choices, choices.names, choices.relative_error, choices.mac, (axes[0], axes[1]))
+    return _compared(choices, choices.names, choices.relative_error, choices.mac, axes)
 
 
 def _compared(
@@ -196,10 +182,10 @@ def _compared(
     names: Sequence[str],
     errors: FloatArray,
     mac: FloatArray,
-    axes: tuple[Axes, Axes],
+    axes: Sequence[Axes] | None,
 ) -> tuple[Axes, Axes]:
     """Bars of frequency errors and of 1 − MAC, shapes (rows, n) each, both on linear scales with their 0."""
-    above, below = axes
+    above, below = new_pair(6.0, (1, 1)) if axes is None else axes
     n = min(len(rows.nodes), MOST_MODES)
     errors, losses = 100 * errors[:, :n], np.maximum(1 - mac[:, :n], 0.0)
     _bars(above, errors, names, [[_percent(e) for e in row] for row in errors])

@@ -208,7 +208,7 @@ class Estimate(Answered, Uncertain):
     def _combination(self, row: FloatArray) -> Combination:
         cov = self.solution_covariance
         std = None if cov is None else float(np.sqrt(max(float(row @ cov @ row), 0.0)))
-        return Combination(row, combination_words(row, self.names), float(row @ self.solution), std)
+        return Combination(combination_words(row, self.names), float(row @ self.solution), std, row)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""

@@ -14,20 +14,17 @@ WORD_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
-class Combination:
-    """A linear combination of parameters that the data determine.
+class FoundCombination:
+    """A combination of parameters that the data determine.
 
     Attributes
     ----------
-    coefficients
-        Shape (n,), one per parameter.
     words
-        Such as "b − 0.5·d".
+        The combination, such as "b − 0.5·d" or "b*(1 - delta)".
     value, std
-        Its estimate and standard deviation (None: unknown).
+        Its estimate and one standard deviation, None where that is unknown.
     """
 
-    coefficients: FloatArray
     words: str
     value: float
     std: float | None
@@ -35,6 +32,21 @@ class Combination:
     def line(self) -> str:
         """One line of text: "b − 0.5·d = 3.1 ± 0.2"."""
         return f"{self.words} = {self.value:.6g}" + ("" if self.std is None else f" ± {self.std:.2g}")
+
+
+@dataclass(frozen=True)
+class Combination(FoundCombination):
+    """A linear one.
+
+    Attributes
+    ----------
+    words, value, std
+        As in `FoundCombination`.
+    coefficients
+        Shape (n,), one per parameter.
+    """
+
+    coefficients: FloatArray
 
 
 def combination_words(coefficients: FloatArray, names: Sequence[str]) -> str:

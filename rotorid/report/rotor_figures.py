@@ -82,8 +82,7 @@ def map_picture(chart: SpeedMap, operating: tuple[float, float] | None) -> Drawi
     def draw(figure: Figure) -> None:
         from fem.plots import draw_speed_map
 
-        axes = figure.add_subplot()
-        draw_speed_map(chart.stiffness, chart.speeds, axes, supports=chart.own, operating=operating)
+        draw_speed_map(chart, figure.add_subplot(), operating)
 
     caption = "Critical speeds over the stiffness of the supports; dotted: what the supports have."
     return sketch(4.2, draw, caption)
@@ -98,10 +97,9 @@ def bode_picture(
     """Amplitude and phase over speed, marked where each sensor has its peaks."""
 
     def draw(figure: Figure) -> None:
-        from fem.plots.readings import draw_readings
+        from fem.plots import bode_figure
 
-        axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
-        draw_readings(response, places, peaks, axes, operating=operating, factors=False)
+        bode_figure(response, places, peaks, operating=operating, factors=False, figure=figure)
 
     caption = "Amplitude and phase over speed; a positive phase leads. Marks: peaks of each reading."
     return sketch(5.0, draw, caption)

@@ -84,7 +84,7 @@ def _products(found: Estimate, rows: FloatArray) -> tuple[Combination, ...]:
         value = float(np.prod(np.where(powers == 0, 1.0, signs * np.abs(theta) ** powers)))
         slope = value * powers / np.where(theta == 0, 1.0, theta)
         std = None if cov is None else float(np.sqrt(max(float(slope @ cov @ slope), 0.0)))
-        out.append(Combination(powers, _words(powers, found.names), value, std))
+        out.append(Combination(_words(powers, found.names), value, std, powers))
     return tuple(out)
 
 

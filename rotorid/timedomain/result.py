@@ -120,11 +120,6 @@ class Fit(Answered, Path):
         at_bound = [name in self.at_bounds for name in self.parameters]
         return frame((*parameter_columns(self.parameters, self.estimate), Column("at_bound", at_bound)))
 
-    def history_frame(self) -> pd.DataFrame:
-        """One row per iteration: parameters and cost."""
-        values = (Column(*pair) for pair in zip(self.parameters, self.history.T, strict=True))
-        return frame((Column("iteration", range(1 + self.iterations)), *values, Column("cost", self.costs)))
-
     @property
     def answer(self) -> Answer:
         """Whether there is an answer, the values with their intervals, and what the model leaves."""

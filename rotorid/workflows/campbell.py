@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.text import counted
-from rotorid.workflows.critical import Separation
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, Speeds, band, rising_speeds
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -48,7 +47,7 @@ class CampbellDiagram(Parts):
     @property
     def parts(self) -> Mapping[str, Any]:
         """Whirl, and the critical speeds that show a peak beside the operating range."""
-        from fem.api684_separation import unsearched
+        from fem.api684_separation import Separation, unsearched
         from fem.campbell import HEAVY
 
         peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
@@ -60,8 +59,7 @@ class CampbellDiagram(Parts):
         """The Campbell diagram over the logarithmic decrements."""
         from fem.plots import campbell_figure
 
-        unstable = [(window.first, window.last) for window in self.whirl.windows]
-        return campbell_figure(self.whirl, self.whirl.criticals, operating=self.operating, unstable=unstable)
+        return campbell_figure(self.whirl, self.operating)
 
 
 @workflow

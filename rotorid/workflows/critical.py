@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.answer import Answer, Answered
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Band, band
 from rotorid.workflows.result_provenance import Parts, log_rotor, phase, provenance, workflow
@@ -42,28 +41,6 @@ class CriticalOptions:
     operating: Band | None = None
 
 
-@dataclass(frozen=True)
-class Separation(Answered):
-    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
-
-    speeds: Sequence[float]
-    operating: tuple[float, float]
-    doubt: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Distances as JSON types."""
-        from fem.api684_separation import separation
-
-        return separation(self.speeds, self.operating)
-
-    @property
-    def answer(self) -> Answer:
-        """In words."""
-        from fem.api684_separation import separation_answer
-
-        return separation_answer(self.to_dict(), self.doubt)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CriticalSpeeds(Parts):
     """Modes, what was asked for beside them, and whether there may be more above the last one."""
@@ -77,7 +54,7 @@ class CriticalSpeeds(Parts):
     @property
     def parts(self) -> Mapping[str, Any]:
         """The modes, and what was asked for beside them."""
-        from fem.api684_separation import unsearched
+        from fem.api684_separation import Separation, unsearched
 
         speeds = self.modes.frequencies.tolist()
         doubt = unsearched(0.0, max(speeds, default=0.0), self.operating) if self.more else ""
@@ -96,12 +73,7 @@ class CriticalSpeeds(Parts):
         if self.chart is None:
             return on_figure(lambda ax: draw_modes(self.modes, ax))
         chart = self.chart
-        return on_figure(
-            lambda ax: draw_speed_map(
-                chart.stiffness, chart.speeds, ax, supports=chart.own, operating=self.operating
-            ),
-            height=5.0,
-        )
+        return on_figure(lambda ax: draw_speed_map(chart, ax, self.operating), height=5.0)
 
     def sheet(self) -> bytes:
         """To print: one HTML file."""

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from rotorid.base.answer import COLUMNS, Answer
-from rotorid.base.result import Column, text
-from rotorid.base.rpm import RPM, phase_deg, rpm_text
-from rotorid.base.text import counted, figures, listing
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import counted, listing
 from rotorid.workflows.input_checks import file_of, rotor_source
 from rotorid.workflows.option_values import (
     Band,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from fem import Peak, Peaks, Response, Rotor
     from fem.model.sensors import SensorLike
     from fem.response import Unbalance
-    from rotorid.base.arrays import FloatArray
+    from rotorid.base.arrays import AnyArray
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
@@ -91,13 +91,14 @@ class RotorResponse(Outcome):
         """As JSON types, without the provenance: what is largest, and the peaks, with the speeds between."""
         document = self.response.to_dict(self.sensors)
         warnings = document.pop("warnings")
-        at_support = [self._largest(force) for force in self.finer.bearing_forces().largest.T]
+        at_support = self._largest(self.finer.bearing_forces().largest)
+        readings = self._largest(self.finer.readings(self.sensors))
         return {
             **document,
             "orbits": self._orbits(),
             "largest": [
                 {"sensor": name, "amplitude_m": size, "speed_rad_s": speed}
-                for name, size, speed in self._largest_readings()
+                for name, (size, speed) in zip(self.labels, readings, strict=True)
             ],
             "bearing_forces": {
                 **self.response.bearing_forces().to_dict(),
@@ -163,29 +164,21 @@ class RotorResponse(Outcome):
 
     def _readings(self) -> str:
         """The largest reading of each sensor."""
-        names, sizes, speeds = zip(*self._largest_readings(), strict=True)
-        columns = (
-            Column("sensor", names, str),
-            Column("µm", [size and 1e6 * size for size in sizes], figures, "largest reading, µm"),
-            Column("rpm", [speed and speed * RPM for speed in speeds], "{:.1f}".format, "at rpm"),
-        )
-        return text(columns)
+        import numpy as np
+
+        from fem.response_result import largest_text
+
+        sizes, finer = 1e6 * np.abs(self.finer.readings(self.sensors)), self.finer
+        return largest_text("sensor", self.labels, "reading, µm", sizes, finer.speeds, finer.steady)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed and sensor."""
-        import numpy as np
-        import pandas as pd
+        from fem.response_result import polar
 
         Z = self.response.readings(self.sensors)
         S, C = Z.shape
-        return pd.DataFrame(
-            {
-                "speed_rad_s": np.repeat(self.response.speeds, C),
-                "sensor": self.labels * S,
-                "amplitude_m": np.abs(Z).ravel(),
-                "phase_deg": phase_deg(Z).ravel(),
-            }
-        )
+        speed = Column("speed_rad_s", self.response.speeds.repeat(C))
+        return frame((speed, Column("sensor", self.labels * S), *polar("amplitude_m", "phase_deg", Z)))
 
     def figure(self, view: View = "bode") -> Figure:
         """Amplitude and phase over speed, polar curves, or orbits.
@@ -224,17 +217,14 @@ class RotorResponse(Outcome):
 
         return [str(label(place)) for place in self.sensors]
 
-    def _largest_readings(self) -> list[tuple[str, float | None, float | None]]:
-        """Each sensor, its largest reading, m, and the speed of it, rad/s."""
-        sizes = abs(self.finer.readings(self.sensors)).T
-        return [(name, *self._largest(size)) for name, size in zip(self.labels, sizes, strict=True)]
-
-    def _largest(self, size: FloatArray) -> tuple[float | None, float | None]:
-        """The largest of a size over speed where a steady response exists, and its speed, rad/s."""
+    def _largest(self, values: AnyArray) -> list[tuple[float | None, float | None]]:
+        """The largest size in each column of values where a steady response exists, and its speed, rad/s."""
         from fem.response_result import largest_at
 
-        k = largest_at(size, self.finer.steady)
-        return (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k]))
+        where = ((size, largest_at(size, self.finer.steady)) for size in abs(values).T)
+        return [
+            (None, None) if k is None else (float(size[k]), float(self.finer.speeds[k])) for size, k in where
+        ]
 
     def _speed_of_orbits(self) -> int:
         from fem.response_result import largest_at

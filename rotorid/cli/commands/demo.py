@@ -45,15 +45,11 @@ def demo(
     room, left = LINES - 2, len(made.commands)
     for heading, words in made.told():
         typer.echo(heading)
-        if to.table:
-            typer.echo("")
-            _run(words)
-            typer.echo("")
-            continue
         with contextlib.redirect_stdout(io.StringIO()) as text:
             _run(words)
         lines = heading.count("\n") + 1
-        said = _beginning(text.getvalue(), max(room // left - lines, 2))
+        told = text.getvalue()
+        said = ["", told] if to.table else _beginning(told, max(room // left - lines, 2))
         typer.echo("\n".join(said))
         room, left = room - lines - len(said), left - 1
     typer.echo(made.answer.whole())

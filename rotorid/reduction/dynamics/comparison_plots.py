@@ -25,49 +25,16 @@ FULL, SMALL = BLUE, VERMILION
 DASHED = (0, (4, 2))
 
 
-def plot_running(
-    running: ResponseCost,
-    ax: Axes | Sequence[Axes] | None = None,
-    *,
-    sensor: int | None = None,
-    plane: int | None = None,
-) -> Axes:
+def plot_running(running: ResponseCost, ax: Sequence[Axes] | None = None) -> Axes:
     """Draw the unbalance response of full rotor and small model over speed, and below it their difference.
 
-    Parameters
-    ----------
-    running
-        What to draw: the largest influence coefficient at each speed.
-    ax
-        Where to draw the response alone, or two axes for it and the difference; default two new ones.
-    sensor, plane
-        Draw one influence coefficient instead: the number of the reading in `running.sensors`, from 0, and
-        the plane's node.
-
-    Returns
-    -------
-    The axes of the response.
-
-    Raises
-    ------
-    ValueError
-        For a sensor or plane that does not exist, or one without the other.
+    Of the response the largest influence coefficient at each speed; its axes are returned.
     """
-    from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, plain, rad_s_above
+    from rotorid.base.plot_style import ABOVE_SCALE, legend_above, new_pair, plain, rad_s_above
 
-    full, small, difference, words = _chosen(running, sensor, plane)
-    above: Axes
-    below: Axes | None = None
-    if ax is None:
-        from matplotlib import pyplot as plt
-
-        _, (above, below) = plt.subplots(
-            2, figsize=(WIDTH, 5.6), sharex=True, layout="constrained", height_ratios=(3, 2)
-        )
-    elif isinstance(ax, Sequence):
-        above, below = ax
-    else:
-        above = ax
+    each = (running.full, running.small, running.small - running.full)
+    full, small, difference = (np.abs(values).max(axis=(1, 2)) for values in each)
+    above, below = new_pair(5.6) if ax is None else ax
     moving = running.speeds > 0
     speeds = running.speeds[moving] * RPM
     above.plot(speeds, full[moving], color=FULL, linewidth=2.4, label="full rotor")
@@ -85,20 +52,16 @@ def plot_running(
         above.set_yscale("log")
         above.set_ylim(max(sizes.min() / 2, sizes.max() * 1e-6), sizes.max() * 2)
     # 1 m per kg·m is 1 µm per g·mm.
-    above.set(ylabel=f"{words}, µm per g·mm (log)", xlabel="speed, rpm")
-    panels = [above] if below is None else [above, below]
-    for panel in panels:
+    above.set(ylabel="largest of all influence\ncoefficients, µm per g·mm (log)")
+    for panel in (above, below):
         plain(panel)
         panel.margins(x=0.01)
         _bands(running, panel)
     rad_s_above(above)
     legend_above(above, borderaxespad=ABOVE_SCALE)
-    if below is None:
-        return above
-    above.set_xlabel("")
     above.tick_params(labelbottom=False)
     with np.errstate(divide="ignore", invalid="ignore"):
-        percent = 100 * difference / np.abs(running.full).max(axis=(1, 2))
+        percent = 100 * difference / full
     below.plot(speeds, percent[moving], color=DARK, linewidth=1.6)
     # On a scale of what counts: where the small model is left out, the difference may leave the picture.
     shown = percent[moving & ~running.excluded & np.isfinite(percent)]
@@ -107,29 +70,6 @@ def plot_running(
     note(below, f"{CLOSE:g} %", (0.0, CLOSE), (4, 2), xycoords=("axes fraction", "data"), color=SMALL)
     below.set(xlabel="speed, rpm", ylabel="difference, % of the\nrotor's largest entry")
     return above
-
-
-def _chosen(
-    running: ResponseCost, sensor: int | None, plane: int | None
-) -> tuple[FloatArray, FloatArray, FloatArray, str]:
-    """Size of the response of both models and of their difference, each (S,), and what it is."""
-    full, small = np.abs(running.full), np.abs(running.small)
-    difference = np.abs(running.small - running.full)
-    if sensor is None and plane is None:
-        sizes = (values.max(axis=(1, 2)) for values in (full, small, difference))
-        return *sizes, "largest of all influence\ncoefficients"
-    if sensor is None or plane is None:
-        raise ValueError("give both a sensor and a plane, or neither")
-    if not 0 <= sensor < full.shape[1]:
-        raise ValueError(f"sensor {sensor} does not exist: they are numbered 0 to {full.shape[1] - 1}")
-    if plane not in running.nodes:
-        known = ", ".join(map(str, running.nodes))
-        raise ValueError(f"plane {plane} does not exist: the masses stand at nodes {known}")
-    from fem.model.sensors import label
-
-    p = running.nodes.index(plane)
-    words = f"reading at node {label(running.sensors[sensor])},\nunbalance at node {plane}"
-    return full[:, sensor, p], small[:, sensor, p], difference[:, sensor, p], words
 
 
 def _bands(running: ResponseCost, ax: Axes) -> None:
@@ -151,15 +91,7 @@ def _bands(running: ResponseCost, ax: Axes) -> None:
 
 
 def plot_stability(cost: StabilityCost, ax: Axes | None = None) -> Axes:
-    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows.
-
-    Parameters
-    ----------
-    cost
-        What to draw.
-    ax
-        Where; default new axes.
-    """
+    """Draw the smallest logarithmic decrement of both models over speed; below 0 a motion grows."""
     from rotorid.base.plot_style import ABOVE_SCALE, WIDTH, legend_above, new_axes, plain, rad_s_above
 
     axes = new_axes((WIDTH, 4.2)) if ax is None else ax

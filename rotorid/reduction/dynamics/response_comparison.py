@@ -12,11 +12,13 @@ from numpy.typing import ArrayLike
 import fem
 from fem.critical import critical_speeds_below
 from fem.model.sensors import SensorLike, label
+from fem.response_result import polar
 from rotorid.base.answer import COLUMNS, Answer, Answered
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.checks import checked_speeds
 from rotorid.base.json import plain
-from rotorid.base.rpm import RPM, phase_deg, rpm_text
+from rotorid.base.result import Column, frame
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import counted, sentence
 from rotorid.reduction.dynamics.instability_threshold import stability_threshold
 from rotorid.reduction.dynamics.small_rotor import SmallRotor, readings
@@ -122,21 +124,17 @@ class ResponseCost(Answered):
 
     def to_frame(self) -> pd.DataFrame:
         """One row per speed, sensor and plane."""
-        import pandas as pd
-
         S, C, P = self.full.shape
-        return pd.DataFrame(
-            {
-                "speed_rad_s": np.repeat(self.speeds, C * P),
-                "sensor": [label(sensor) for sensor in self.sensors for _ in self.nodes] * S,
-                "plane": list(self.nodes) * (S * C),
-                "full_m_per_kg_m": np.abs(self.full).ravel(),
-                "full_phase_deg": phase_deg(self.full).ravel(),
-                "small_m_per_kg_m": np.abs(self.small).ravel(),
-                "small_phase_deg": phase_deg(self.small).ravel(),
-                "relative_difference": self.relative_difference.ravel(),
-                "excluded": np.repeat(self.excluded, C * P),
-            }
+        return frame(
+            (
+                Column("speed_rad_s", np.repeat(self.speeds, C * P)),
+                Column("sensor", [label(sensor) for sensor in self.sensors for _ in self.nodes] * S),
+                Column("plane", list(self.nodes) * (S * C)),
+                *polar("full_m_per_kg_m", "full_phase_deg", self.full),
+                *polar("small_m_per_kg_m", "small_phase_deg", self.small),
+                Column("relative_difference", self.relative_difference.ravel()),
+                Column("excluded", np.repeat(self.excluded, C * P)),
+            )
         )
 
     def to_dict(self) -> dict[str, Any]:

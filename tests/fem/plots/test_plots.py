@@ -159,7 +159,7 @@ def test_drawing_tells_bearings_seals_pedestals_planes_and_sensors_apart():
         fem.draw_rotor(turbine(), planes=["whel"])
 
 
-def whirl():
+def whirl(criticals=()):
     speeds = np.linspace(0, 1000, 11)
     columns = [400 - 0.05 * speeds, 400 + 0.05 * speeds, np.where(speeds < 300, np.nan, 900.0)]
     return SimpleNamespace(
@@ -167,11 +167,13 @@ def whirl():
         frequencies=np.stack(columns, axis=1),
         log_decrements=np.stack([0.3 + 0 * speeds, 0.4 - 0.5e-3 * speeds, 2 + 0 * speeds], axis=1),
         direction=np.stack([-1 + 0 * speeds, 1 + 0 * speeds, np.where(speeds < 600, 0.0, 1.0)], axis=1),
+        criticals=criticals,
+        windows=(),
     )
 
 
 def test_a_campbell_diagram_tells_directions_apart_without_colour():
-    figure = campbell_figure(whirl(), [(380.95, 0.3), (421.05, 0.19)], operating=(600, 700))
+    figure = campbell_figure(whirl([(380.95, 0.3), (421.05, 0.19)]), operating=(600, 700))
     above, below = figure.axes[:2]
     lines = above.get_lines()
     looks = [(line.get_linestyle(), line.get_marker(), line.get_fillstyle()) for line in lines[:4]]
@@ -350,12 +352,15 @@ def test_the_static_line_and_many_modes_are_told_apart_without_colour():
     check_hygiene(plot(fem.speed_map(rotor23(1e4), n=3)).figure)
 
 
+def chart(stiffness, speeds):
+    own = [("DE", np.array([1e7, 2e7]), np.array([50, 150])), ("fixed", np.array([1e8]), np.array([]))]
+    return SimpleNamespace(stiffness=stiffness, speeds=speeds, own=own)
+
+
 def test_a_speed_map_is_logarithmic_and_holds_the_supports():
     k = np.geomspace(1e5, 1e9, 9)
     speeds = np.stack([100 * np.sqrt(k / (k + 1e7)), np.full(9, np.nan)], axis=1)
-    ax = draw_speed_map(
-        k, speeds, supports=[("DE", [1e7, 2e7], [50, 150]), ("fixed", 1e8, [])], operating=(70, 80)
-    )
+    ax = draw_speed_map(chart(k, speeds), operating=(70, 80))
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), speeds[:, 0] * 30 / np.pi)
     assert labels(ax) == ["critical speed 1", "critical speed 2", "DE", "fixed", "operating range"]
@@ -524,9 +529,7 @@ def test_a_speed_map_is_in_rpm_with_its_band_and_its_supports():
     k = np.geomspace(1e5, 1e9, 9)
     known = np.array([-1.0, 0.0, 0.5, 30.0, 60.0, 90.0, 120.0, 140.0, np.nan])
     speeds = np.stack([100 * np.sqrt(k / (k + 1e7)), known], axis=1)
-    ax = draw_speed_map(
-        k, speeds, supports=[("DE", [1e7, 2e7], [50, 150]), ("fixed", [1e8, 1e8], [])], operating=(70, 80)
-    )
+    ax = draw_speed_map(chart(k, speeds), operating=(70, 80))
     low, high = ax.get_ylim()
     first, second, machine, fixed = ax.get_lines()[:4]
     np.testing.assert_allclose(second.get_data(), (k[2:8], known[2:8] * 30 / np.pi))
@@ -561,7 +564,7 @@ def test_curves_of_a_campbell_diagram_go_on_where_the_direction_changes():
 
 
 def test_critical_speeds_beyond_the_diagram_are_left_out_and_close_ones_stand_on_either_side():
-    above = campbell_figure(whirl(), [(400.0, 0.3), (420.0, 0.2), (700.0, 0.1), (990.0, 0.1)]).axes[0]
+    above = campbell_figure(whirl([(400.0, 0.3), (420.0, 0.2), (700.0, 0.1), (990.0, 0.1)])).axes[0]
     said = {t.get_text(): t for t in above.texts if "δ" in t.get_text()}
     assert len(said) == 3  # the 1× line ends at 954 rad/s
     assert [t.xy[0] / RPM for t in said.values()] == pytest.approx([400.0, 420.0, 700.0])

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from documents import check_hygiene
-from matplotlib.figure import Figure
 
 import rotorid
 from rotorid import read_harmonic_model, read_measurements
 from rotorid.harmonic import identify
-from rotorid.harmonic.plots import figure_identification, plot_identification
+from rotorid.harmonic.plots import figure_identification
 from rotorid.samples import sample_data
 
 FOLDER = sample_data() / "identify"
@@ -42,6 +41,11 @@ def two_units(tmp_path_factory):
     return identify(file.model, read_measurements(folder / "data.csv", file))
 
 
+def first(result):
+    """The axes at the top of its figure."""
+    return figure_identification(result).subfigs[0].axes[0]
+
+
 def named(figure, start):
     """The axes whose vertical axis is called so."""
     every = [ax for part in (figure, *figure.subfigs) for ax in part.axes]
@@ -58,7 +62,7 @@ def points(ax):
 
 def test_measured_points_and_fitted_line_agree_with_the_result():
     result = result_of("task_5_1")
-    axes = plot_identification(result, Figure().add_subplot())
+    axes = first(result)
     points, line = axes.get_lines()
     np.testing.assert_allclose(points.get_ydata(), np.abs(result.experiments.signals["X"]))
     x, y = line.get_data()
@@ -66,7 +70,7 @@ def test_measured_points_and_fitted_line_agree_with_the_result():
 
 
 def test_amplitudes_stand_over_frequency_in_the_units_of_the_table(two_units):
-    figure = plot_identification(two_units)
+    figure = figure_identification(two_units)
     mm, um = named(figure, "amplitude")
     assert [ax.get_ylabel() for ax in (mm, um)] == ["amplitude, mm peak", "amplitude, µm pp"]
     for ax, name, scale in ((mm, "X", 1e3), (um, "V", 2e6)):
@@ -123,7 +127,7 @@ def test_words_stand_where_there_is_no_interval():
 def test_free_vibrations_draw_measured_and_fitted_shapes():
     for options in ({}, {"method": "output-error"}):
         result = result_of("task_7_1", **options)
-        axes = plot_identification(result, Figure().add_subplot())
+        axes = first(result)
         points, line, *_ = axes.get_lines()
         np.testing.assert_allclose(points.get_ydata(), [1, 1.3461538, 1.9230769], atol=1e-6)
         np.testing.assert_allclose(line.get_ydata(), points.get_ydata(), atol=0.01)
@@ -131,7 +135,7 @@ def test_free_vibrations_draw_measured_and_fitted_shapes():
 
 
 def test_a_model_that_predicts_nothing_draws_points_only():
-    axes = plot_identification(result_of("section_1_8"), Figure().add_subplot())
+    axes = first(result_of("section_1_8"))
     assert len(axes.get_lines()) == 2
     assert axes.get_legend().get_texts()[-1].get_text() == "points: measured"
 
@@ -139,7 +143,7 @@ def test_a_model_that_predicts_nothing_draws_points_only():
 def test_where_the_excitation_changes_the_model_is_drawn_at_the_tests(two_units):
     signals = {**two_units.experiments.signals, "F": np.array([10.0, 12.0, 10.0, 10.0], dtype=complex)}
     changed = replace(two_units, experiments=replace(two_units.experiments, signals=signals))
-    axes = plot_identification(changed, Figure().add_subplot())
+    axes = first(changed)
     large = [line for line in axes.get_lines() if line.get_markersize() > 10]
     np.testing.assert_allclose(large[0].get_ydata(), 1e3 * np.abs(two_units.predicted["X"]))
     assert "large: model" in axes.get_legend().get_texts()[-1].get_text()

@@ -294,25 +294,6 @@ def test_overlapping_bands_are_shaded_once_and_those_outside_not_at_all():
     assert ax.get_xlim()[1] < 360 * RPM
 
 
-def test_one_sensor_and_plane_can_be_chosen():
-    cost = running()
-    ax = plot_running(cost, sensor=0, plane=18)
-    np.testing.assert_allclose(ax.get_lines()[0].get_ydata(), np.abs(cost.full[1:, 0, 1]))
-    assert ax.get_ylabel().startswith("reading at node 7,\nunbalance at node 18")
-    below = ax.figure.axes[1]  # relative to the largest entry, which is four times this one
-    np.testing.assert_allclose(curves_of(below)[0].get_ydata(), 0.75 * cost.speeds[1:] / 300.0, rtol=1e-9)
-    only = plot_running(cost, ax, sensor=0, plane=18)
-    assert only is ax
-    for options, message in (
-        ({"sensor": 0}, "both a sensor and a plane"),
-        ({"sensor": 2, "plane": 7}, "numbered 0 to 1"),
-        ({"sensor": -1, "plane": 7}, "numbered 0 to 1"),
-        ({"sensor": 0, "plane": 12}, "masses stand at nodes 7, 18"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            plot_running(cost, **options)
-
-
 def stability(**changes):
     speeds = np.linspace(0.0, 400.0, 41)
     fields = {
