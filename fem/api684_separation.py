@@ -13,10 +13,11 @@ from rotorid.base.text import listing, table
 
 @dataclass(frozen=True)
 class Separation(Answered):
-    """Critical speeds beside the operating range, all in rad/s."""
+    """Critical speeds beside the operating range, all in rad/s, and why more may lie in it."""
 
     speeds: Iterable[float]
     operating: tuple[float, float]
+    doubt: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Which speeds lie in the range, and how far off the others are, in percent of its nearest end."""
@@ -34,12 +35,22 @@ class Separation(Answered):
         low, high = self.operating
         within = f"the operating range {low * RPM:.6g} to {rpm_text(high)}"
         rows = sorted(self.to_dict()["critical_speeds"], key=lambda row: float(row["separation_percent"]))
+        away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
+        more = "how far each is from the operating range"
         inside = [rpm_text(row["speed_rad_s"]) for row in rows if row["inside"]]
         if inside:
             return Answer(f"INSIDE {within}: {listing(inside, 'and')}.")
+        if self.doubt:
+            said = f"NOT KNOWN whether a critical speed lies in {within}: {self.doubt}."
+            return Answer(said, tables=(table(away),) if away else (), more=more)
         if not rows:
             return Answer(f"No critical speed was found beside {within}.")
         near = f"{rpm_text(rows[0]['speed_rad_s'])}, is {rows[0]['separation_percent']:.1f} % away"
-        away = [[rpm_text(row["speed_rad_s"]), f"{row['separation_percent']:.1f} % away"] for row in rows]
-        more = "how far each is from the operating range"
         return Answer(f"None lies in {within}; the nearest, {near}.", tables=(table(away),), more=more)
+
+
+def unsearched(first: float, last: float, operating: tuple[float, float] | None) -> str:
+    """What keeps one from saying that nothing is in an operating range: speeds that were not searched."""
+    if operating is None or (first <= operating[0] * (1 + 1e-6) and operating[1] <= last * (1 + 1e-6)):
+        return ""
+    return f"only speeds from {first * RPM:.6g} to {rpm_text(last)} were searched"

@@ -21,6 +21,7 @@ from rotorid.base.plot_style import (
     TEXT,
     WIDTH,
     legend_above,
+    legend_below,
     look,
     new_axes,
     new_figure,
@@ -32,6 +33,7 @@ from rotorid.base.plot_style import (
     shade_unstable,
 )
 from rotorid.base.rpm import RPM
+from rotorid.base.text import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +43,9 @@ if TYPE_CHECKING:
     from fem.api684_peaks import Peak, Peaks
     from fem.model.rotor import Rotor
     from fem.response_result import InfluenceCoefficients, Response
+
+
+_ROWS = 5
 
 
 def draw_response(
@@ -71,12 +76,51 @@ def draw_influence(influence: InfluenceCoefficients, ax: Axes | None) -> Axes:
 
 
 def influence_figure(influence: InfluenceCoefficients, rotor: Rotor) -> Figure:
-    """The size of each influence coefficient over speed, below the rotor with its planes and sensors."""
-    figure = new_figure(6.6)
-    above, below = figure.subplots(2, height_ratios=(2, 3))
-    draw_rotor(rotor, above, planes=influence.planes, sensors=influence.sensors)
-    draw_influence(influence, below)
+    """Size and phase of the influence coefficients over speed below the rotor: a row for each sensor.
+
+    Of many sensors the first `_ROWS` have one; how many have none stands in the legend.
+    """
+    C, planes = min(len(influence.sensors), _ROWS), [f"plane {plane}" for plane in influence.planes]
+    figure = new_figure(2.4 + 2.1 * C)
+    grid = figure.add_gridspec(1 + C, 2, height_ratios=(2.1, *[2.1] * C))
+    draw_rotor(rotor, figure.add_subplot(grid[0, :]), planes=influence.planes, sensors=influence.sensors)
+    rows = [[figure.add_subplot(grid[1 + c, k]) for k in (0, 1)] for c in range(C)]
+    order, given = np.argsort(influence.speeds, kind="stable"), tuple(influence.windows)
+    speeds = influence.speeds[order]
+    steady = ~within(given, speeds)
+    for c, (sizes, phases) in enumerate(rows):
+        W = influence.W[order, c]
+        _over_speed(
+            sizes, speeds, np.abs(W), planes, f"sensor {label(influence.sensors[c])}\nµm per g·mm", given
+        )
+        for k, curve in enumerate(W.T):
+            seen = steady & (np.abs(curve) > 0)
+            phase = _with_gaps(np.degrees(_lag(curve[seen])), seen)
+            phases.plot(speeds * RPM, phase, **_look(k, len(planes), speeds, ()))
+        shade_unstable(phases, ranges(given))
+        plain(phases)
+        phases.margins(x=0.01)
+        phases.set(xlabel="speed, rpm", ylabel="phase (lead), degrees")
+        phases.yaxis.set_major_locator(_right_angles(phases))
+        if legend := sizes.get_legend():
+            legend.remove()
+        for ax in rows[c] if c < C - 1 else ():
+            ax.set_xlabel("")
+    left = len(influence.sensors) - C
+    more: dict[str, Any] = {"title": f"{counted(left, 'more sensor')}: only in the table"} if left else {}
+    legend_below(figure, (rows[0][0],), 3, **more)
     return figure
+
+
+def _lag(reading: ComplexArray) -> FloatArray:
+    """Phase without jumps, rad, the middle of the curve between -2π and 0: a lag, as engineers read it."""
+    if not reading.size:
+        return np.zeros(0)
+    phase = np.unwrap(np.angle(reading))
+    turned = reading * np.exp(-1j * phase[0])
+    if (abs(turned.imag) <= 1e-9 * abs(turned)).all():  # no damping: half a turn, which is called a lag
+        phase = phase[0] - np.pi * (turned.real < 0)
+    return np.asarray(phase - 2 * np.pi * np.ceil(np.round(np.median(phase) / (2 * np.pi), 4)))
 
 
 def draw_bode(
@@ -119,10 +163,7 @@ def draw_bode(
     steady = ~within(tuple(windows), omega)
     for k, reading in enumerate(Z.T):
         seen = steady & (np.abs(reading) > 0)
-        phase = np.degrees(np.unwrap(np.angle(reading[seen])))
-        if phase.size:
-            # The middle of the curve between -360 and 0: a lag, as engineers read it.
-            phase -= 360 * np.ceil(np.median(phase) / 360)
+        phase = np.degrees(_lag(reading[seen]))
         shown = seen | ~steady
         drawn = _look(k, len(labels), omega[shown], peaks)
         below.plot(omega[shown] * RPM, _with_gaps(phase, seen)[shown], **drawn)

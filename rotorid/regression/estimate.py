@@ -90,12 +90,17 @@ def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str
         digits = _digits(value, std)
         numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
         share = percent(std / abs(value)) if value else ""
-        reason = why.get(name, "not determined" if np.isnan(value) else "")
+        reason = "" if np.isnan(value) else why.get(name, "")
         error = "" if np.isnan(std) else error_figures(std)
         cells = [name, numbers[0], error, share, *numbers[1:], reason]
         lines.append(["" if cell == "nan" else cell for cell in cells])
     told = [column for column in zip(*lines, strict=True) if any(column[1:])]
-    return table([list(line) for line in zip(*told, strict=True)], width=COLUMNS)
+    shown = table([list(line) for line in zip(*told, strict=True)], width=COLUMNS).splitlines()
+    blank = {k: name for k, name in enumerate(names, 1) if np.isnan(found.values[k - 1])}
+    place = max((len(shown[k].rstrip()) for k in blank), default=0)
+    for k, name in blank.items():  # the words stand beside the name, where a number would begin
+        shown[k] = f"{shown[k].rstrip():<{place}}  {why.get(name, 'not determined')}"
+    return "\n".join(shown)
 
 
 def parameter_dict(names: Sequence[str], found: Uncertain) -> dict[str, Any]:

@@ -47,11 +47,13 @@ class CampbellDiagram(Parts):
     @property
     def parts(self) -> Mapping[str, Any]:
         """Whirl, and the critical speeds that show a peak beside the operating range."""
-        from fem.api684_separation import Separation
+        from fem.api684_separation import Separation, unsearched
         from fem.campbell import HEAVY
 
         peaks = [speed for speed, damping in self.whirl.criticals if damping <= HEAVY]
-        return {"": self.whirl, "operating": self.operating and Separation(peaks, self.operating)}
+        doubt = unsearched(self.whirl.speeds[0], self.whirl.speeds[-1], self.operating)
+        doubt = doubt or ("the list may be cut, see the note" if self.whirl.cut else "")
+        return {"": self.whirl, "operating": self.operating and Separation(peaks, self.operating, doubt)}
 
     def figure(self) -> Figure:
         """The Campbell diagram over the logarithmic decrements."""

@@ -43,19 +43,22 @@ class CriticalOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CriticalSpeeds(Parts):
-    """Modes, and what was asked for beside them."""
+    """Modes, what was asked for beside them, and whether there may be more above the last one."""
 
     modes: Modes
     mesh: MeshCheck | None
     chart: SpeedMap | None
     operating: tuple[float, float] | None
+    more: bool
 
     @property
     def parts(self) -> Mapping[str, Any]:
         """The modes, and what was asked for beside them."""
-        from fem.api684_separation import Separation
+        from fem.api684_separation import Separation, unsearched
 
-        apart = self.operating and Separation(self.modes.frequencies.tolist(), self.operating)
+        speeds = self.modes.frequencies.tolist()
+        doubt = unsearched(0.0, max(speeds, default=0.0), self.operating) if self.more else ""
+        apart = self.operating and Separation(speeds, self.operating, doubt and f"{doubt} (-n)")
         return {"": self.modes, "operating": apart, "mesh_check": self.mesh, "map": self.chart}
 
     def to_frame(self) -> pd.DataFrame:
@@ -117,6 +120,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         mesh=mesh,
         chart=chart,
         operating=operating,
+        more=int((modes.frequencies > 0).sum()) >= (options.number or 3),
         provenance=provenance(files, options),
     )
 

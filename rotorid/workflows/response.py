@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 View = Literal["bode", "polar", "orbits"]
 """What a picture shows."""
+_MOST_REQUIRED = 26.0  # percent: API 684 asks for no larger margin, whatever the amplification
 _APART = 1.05  # ratio of speeds from which peaks belong to different critical speeds
 
 
@@ -135,20 +136,31 @@ class RotorResponse(Outcome):
 
     def _judgement(self, chief: Sequence[Peak]) -> str:
         """Whether it runs steadily, and whether the margins are as required."""
+        from fem.api684_separation import unsearched
         from fem.response_result import speed_range
 
         unstable = listing([window.where() for window in self.response.windows], "and")
         said = f"UNSTABLE {unstable}: there is no steady response there.\n" if unstable else ""
         known = [peak for peak in chief if peak.enough is not None]
-        if self.operating is None or not known:
+        close = [rpm_text(peak.speed) for peak in chief if peak.enough is None and _may_lack(peak)]
+        doubt = unsearched(self.finer.speeds[0], self.finer.speeds[-1], self.operating)
+        if self.operating is None or not (known or close or doubt):
             asked = f"at {speed_range(self.response.speeds)}, {counted(len(self.sensors), 'reading')}"
-            return f"{said}{counted(len(chief), 'peak') if chief else 'No peak'} {asked}."
+            few = "" if self.response.steady.any() else "No steady response"
+            few = few or ("No peak" if self.response.speeds.size > 2 else "Too few speeds to find a peak:")
+            return f"{said}{counted(len(chief), 'peak') if chief else few} {asked}."
         low, high = self.operating
         beside = f"from the operating range, {low * RPM:.6g} to {rpm_text(high)} (API 684)"
         near = [rpm_text(peak.speed) for peak in known if not peak.enough]
         if near:
-            return f"{said}NOT far enough {beside}: critical speed {listing(near, 'and')}."
-        return f"{said}{counted(len(known), 'critical speed')} far enough {beside}."
+            return (
+                f"{said}NOT far enough {beside}: critical speed{'s' * (len(near) > 1)} "
+                f"{listing(near, 'and')}."
+            )
+        far = f"{counted(len(known), 'critical speed')} far enough {beside}."
+        if close:
+            doubt = f"no amplification factor at {listing(close, 'and')}" + (doubt and f"; {doubt}")
+        return f"{said}NOT KNOWN whether all are far enough {beside}: {doubt}." if doubt else said + far
 
     def _readings(self) -> str:
         """The largest reading of each sensor."""
@@ -242,6 +254,11 @@ class RotorResponse(Outcome):
             "inclination_deg": np.degrees(ellipses.inclination).T.tolist(),
             "direction": [[names[int(way)] for way in row] for row in ellipses.direction.T],
         }
+
+
+def _may_lack(peak: Peak) -> bool:
+    """Whether an amplification factor could make its margin too small: none asks for more than this."""
+    return peak.margin is None or peak.margin < _MOST_REQUIRED
 
 
 def _peak_table(found: Sequence[tuple[str, Peak]]) -> str:

@@ -18,6 +18,7 @@ from fem.plots import (
     draw_orbits,
     draw_polar,
     draw_speed_map,
+    influence_figure,
     new_axes,
     orbits_figure,
     polar_figure,
@@ -585,3 +586,33 @@ def test_ticks_of_the_phase_are_few_and_at_parts_of_a_right_angle(span, step):
     assert len(ticks) <= 9
     assert set(np.diff(ticks)) == {float(step)}
     assert all(tick % step == 0 for tick in ticks)
+
+
+def test_influence_has_a_row_for_each_sensor_with_size_and_phase():
+    rotor, speeds = rotor23(2e4), np.linspace(50, 700, 40)
+    W = fem.influence(rotor, [7, 12], [2, 22], speeds)
+    figure = influence_figure(W, rotor)
+    sizes, phases = figure.axes[1::2], figure.axes[2::2]
+    assert [ax.get_ylabel().split("\n")[0] for ax in sizes] == ["sensor 2", "sensor 22"]
+    for c, (size, phase) in enumerate(zip(sizes, phases, strict=True)):
+        for p in (0, 1):
+            steady = ~np.isnan(size.get_lines()[p].get_ydata())
+            np.testing.assert_allclose(size.get_lines()[p].get_ydata()[steady], np.abs(W.W[steady, c, p]))
+            lag = np.radians(phase.get_lines()[p].get_ydata()[steady])
+            np.testing.assert_allclose(np.exp(1j * lag), np.exp(1j * np.angle(W.W[steady, c, p])), atol=1e-12)
+            assert -2 * np.pi <= np.median(lag) <= 1e-6
+        styles = {(line.get_color(), line.get_linestyle()) for line in size.get_lines()}
+        assert len(styles) == 2
+    [legend] = figure.legends
+    assert [text.get_text() for text in legend.get_texts()][:2] == ["plane 7", "plane 12"]
+    many = influence_figure(fem.influence(rotor, [7], range(1, 9), speeds), rotor)
+    assert len(many.axes) == 11
+    assert many.legends[0].get_title().get_text() == "3 more sensors: only in the table"
+    figure.canvas.draw()
+
+
+def test_phase_without_damping_is_zero_or_half_a_turn_of_lag():
+    rotor = uniform(6)
+    figure = influence_figure(fem.influence(rotor, [2, 5], [1, 4], np.linspace(10, 2e4, 80)), rotor)
+    lags = np.concatenate([line.get_ydata() for ax in figure.axes[2::2] for line in ax.get_lines()])
+    assert set(np.round(lags).tolist()) <= {-360, -180, 0}

@@ -24,6 +24,25 @@ FIT = (SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinear
         (
             ("critical", COMPRESSOR, "-n", 2, "--operating", "5300:6500rpm"),
             ["2 critical speeds without damping: 4066.84 and 4375.19 rpm.",
+             "NOT KNOWN whether a critical speed lies in the operating range 5300 to 6500 rpm: only speeds"],
+        ),
+        (
+            ("critical", ROTOR, "--operating", "1910:2865rpm"),
+            ["3 critical speeds without damping: 1291.45, 5163.62 and 11113.5 rpm.",
+             "None lies in the operating range 1910 to 2865 rpm; the nearest, 1291.45 rpm, is 32.4 % away."],
+        ),
+        (
+            ("campbell", ROTOR, "--speeds", "100:300:20", "-n", 2, "--operating", "200:600"),
+            ["Stable: no motion grows.", "From 954.93 to 2864.79 rpm",
+             "NOT KNOWN whether a critical speed lies in the operating range 1909.86 to 5729.58 rpm: only"],
+        ),
+        (
+            (*RESPONSE, "--speeds", "2000:6000:500rpm", "--operating", "5800:6500rpm"),
+            ["NOT KNOWN whether all are far enough from the operating range, 5800 to 6500 rpm (API 684): "],
+        ),
+        (
+            ("critical", COMPRESSOR, "-n", 4, "--operating", "5300:6500rpm"),
+            ["4 critical speeds without damping: ",
              "None lies in the operating range 5300 to 6500 rpm; the nearest, 4375.19 rpm, is 17.4 % away."],
         ),
         (
@@ -34,6 +53,10 @@ FIT = (SAMPLES / "fit/quasilinearization/model.toml", SAMPLES / "fit/quasilinear
         (
             (*RESPONSE, "--speeds", "2000:8000:500rpm", "--operating", "4800:6500rpm"),
             ["NOT far enough from the operating range, 4800 to 6500 rpm (API 684): critical speed 4"],
+        ),
+        (
+            (*RESPONSE, "--speeds", "3000,4000rpm"),
+            ["Too few speeds to find a peak: at 2 speeds from 3000 to 4000 rpm "],
         ),
         (
             ("reduce", ROTOR, "--nodes", "2,3,4", "--modes", 1),
