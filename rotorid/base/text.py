@@ -7,10 +7,14 @@ from collections.abc import Iterable
 
 WIDTH = 80
 MOST_NAMES = 40
+ROUNDING = 1e-12
+"""A share that is nothing but rounding."""
 
 
 def percent(share: float) -> str:
-    """A share in percent, two digits, never as 1e+02."""
+    """A share in percent, two digits, never as 1e+02; rounding is 0."""
+    if share < ROUNDING:
+        return "0"
     return f"{100 * share:.0f}" if share >= 0.0995 else f"{100 * share:.2g}"
 
 

@@ -266,7 +266,7 @@ def coverage_factor(dof: float | None) -> float | None:
 
 
 def _digits(value: float, std: float | None) -> int:
-    """Significant digits of a value that show two of its standard deviation, six at least."""
+    """Significant digits of a value that show two of its standard deviation, from six to ten."""
     if std is None or not (std > 0 and np.isfinite(std)) or value == 0:
         return 6
-    return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 15))
+    return int(np.clip(2 + np.floor(np.log10(abs(value))) - np.floor(np.log10(std)), 6, 10))
