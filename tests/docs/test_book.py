@@ -1,4 +1,4 @@
-"""The coverage table of `docs/book/index.md`: nothing of the three texts is missing, and every command runs."""
+"""The coverage table of `docs/book/index.md`: no number of the three texts is missing, every command runs."""
 
 import re
 import shlex
@@ -92,6 +92,15 @@ def test_every_row_has_a_command_and_its_words_or_says_why_not():
         else:
             assert re.fullmatch(r"`rotorid [^`]+`", row[2]), row
             assert re.fullmatch(r"`[^`]+`", row[3]), row
+
+
+def test_den_hartog_is_named_where_one_looks_for_him(cli):
+    readme = (PAGE.parents[2] / "README.md").read_text(encoding="utf-8")
+    page = (PAGE.parent / "den_hartog.md").read_text(encoding="utf-8")
+    for text in (cli("balance", "--help").out, readme, page):
+        said = _once(text.replace("*", " ").replace("│", " "))
+        assert "Den Hartog's method" in said
+        assert "influence coefficients at several speeds, least squares" in said
 
 
 def _awaited(command):
