@@ -148,7 +148,7 @@ def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
 
-    told = sstr(expression).replace(BEHIND, "")
+    told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
     told = re.sub(r"\*\*(\d+)", lambda found: found[1].translate(_RAISED), told)
     return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
 
@@ -165,14 +165,14 @@ def _sum(terms: Terms, *, latex: bool) -> str:
     write, times, brackets = (_formula, r" \cdot ", r"\left({}\right)") if latex else (_words, "·", "({})")
     told = []
     for parts in terms:
+        if 0 in parts:
+            continue
         inside = [one for one in parts if one not in (1, -1)]
         sign = "-" if len([one for one in parts if one == -1]) == 1 else ""
         alone = len(inside) == 1 and not sign
-        bare = (alone or not (one.is_Add or (one.is_Mul and one is parts[1])) for one in inside)
-        shown = [
-            write(one) if b else brackets.format(write(one)) for one, b in zip(inside, bare, strict=True)
-        ]
-        told += [] if 0 in parts else [sign + (times.join(shown) or "1")]
+        whole = (alone or not (one.is_Add or (one.is_Mul and one is parts[1])) for one in inside)
+        forms = zip(("{}" if bare else brackets for bare in whole), map(write, inside), strict=True)
+        told.append(sign + (times.join(form.format(shown) for form, shown in forms) or "1"))
     return " + ".join(told).replace("+ -", "- ") or "0"
 
 

@@ -21,6 +21,7 @@ from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design
 from rotorid.regression.linear import stretch
 from rotorid.report.equations import BEHIND, Equations, Expression, Row
 from rotorid.timedomain import OdeModel
+from rotorid.timedomain.models.compiled import real, usual
 from rotorid.timedomain.result import Fit
 
 PARTS = ("Re", "Im")
@@ -33,7 +34,7 @@ _WEIGHTED = (
 @singledispatch
 def equations_of(found: object) -> Equations:
     """What was solved to get this result; ValueError where it has no such equations."""
-    raise ValueError(f"--show equations needs a result of equations, not {type(found).__name__}")
+    raise ValueError("--show equations needs data: without them nothing is solved")
 
 
 @equations_of.register
@@ -151,31 +152,36 @@ def _(found: Reduction) -> Equations:
 @equations_of.register
 def _(found: Fit) -> Equations:
     """Sensitivities ∂x/∂θ of the states and ∂y/∂θ of the outputs, [F] (3.6), (3.7), in symbols."""
-    model, n, thetas = found.model, len(found.model.states), found.model.parameters
+    model, n = found.model, len(found.model.states)
+    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
+    E, velocities = Matrix(n, n, getattr(model, "inertia", eye(n))), [Symbol(f"d{state}/dt") for state in x]
+    equations, starts, outputs = [], [], []
+
+    def chain(f: Expression, by: Expression, S: list[Expression]) -> list[tuple[Expression, Expression]]:
+        slopes = [usual(f.diff(symbol)) for symbol in (*x, by)]
+        return [*zip(slopes, (*S, 1), strict=True)]
+
     rates, initial, observed = _as_written(model)
-    E = Matrix(n, n, getattr(model, "inertia", eye(n)))
-    x, velocity = ([Symbol(name.format(s)) for s in model.states] for name in ("{}", "d{}/dt"))
-    equations, others = [], []
-    for theta in map(Symbol, thetas):
-        S, rising = ([Symbol(name.format(s, theta)) for s in x] for name in ("∂{}/∂{}", "d(∂{}/∂{})/dt"))
-        for i, f in enumerate(rates):
-            moved = zip(-E[i, :].diff(theta), velocity, strict=True)
-            chain = [*zip(map(f.diff, x), S, strict=True), (f.diff(theta), 1), *moved]
-            equations.append(Row("", [*zip(E[i, :], rising, strict=True)], chain))
-        for s, f in zip(S, initial, strict=True):
-            others.append(Row("at the start", [(1, s)], [(f.diff(theta), 1)]))
+    for theta in thetas:
+        S = [Symbol(f"∂{state}/∂{theta}") for state in x]
+        for i, (s, f, start) in enumerate(zip(S, rates, initial, strict=True)):
+            left = [(E[i, j], Symbol(f"d({other})/dt")) for j, other in enumerate(S)]
+            moved = zip(-E[i, :].diff(theta), velocities, strict=True)
+            equations.append(Row("", left, [*chain(f, theta, S), *moved]))
+            starts.append(Row("at the start", [(1, s)], chain(start, theta, S)))
         for name, f in zip(model.outputs, observed, strict=True):
-            chain = [*zip(map(f.diff, x), S, strict=True), (f.diff(theta), 1)]
-            others.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain))
+            outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
+    rows, none = [*equations, *starts, *outputs], np.zeros((0, len(thetas)))
     title = f"Sensitivities, [F] (3.6), (3.7), of {counted(n, 'state')}"
-    rows, none = [*equations, *sorted(others, key=lambda row: row.name)], np.zeros((0, len(thetas)))
-    return Equations(title, rows, ("U", "θ", "y"), (), thetas, none, none[:, 0], found.estimate.values)
+    return Equations(
+        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values
+    )
 
 
 def _as_written(model: OdeModel) -> list[list[Expression]]:
     """Rates, initial values, outputs: with the names of the known where the model still has its own texts."""
     groups = {"state": model.states, "initial": model.states, "output": model.outputs}
-    read = [[parse(model.texts[f"{kind} {name}"]) for name in of] for kind, of in groups.items()]
+    read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
     told = {name for group in read for e in group for name in names(e)}
     if {*model.parameters} <= told and not hasattr(model, "inertia"):
         return read
