@@ -106,7 +106,9 @@ class Equations:
 
     def latex(self) -> str:
         """A whole document: symbols, the matrix beside the right side, the solution, notes."""
-        rows = "\\\\\n".join(rf"\text{{{row.name}: }} & {row.written(latex=True)}" for row in self.symbolic)
+        rows = "\\\\\n".join(
+            rf"\text{{{row.name}}}\quad & {row.written(latex=True)}" for row in self.symbolic
+        )
         said = Column(self.title, (self._solution(), *self.notes))
         tables = [_latex_table(self._system())] if self.rows else []
         tables.append(_latex_table([said], r"p{0.9\linewidth}"))
@@ -148,7 +150,7 @@ def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
 
-    told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
+    told = sstr(_decimals(expression)).replace(BEHIND, "").replace("Abs(", "abs(")
     told = re.sub(r"\*\*(\d+)", lambda found: found[1].translate(_RAISED), told)
     return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
 
@@ -157,7 +159,14 @@ def _formula(expression: Expression) -> str:
     from sympy import latex
 
     names = {symbol: _formula_of(symbol.name) for symbol in expression.free_symbols}
-    return str(latex(expression, symbol_names=names))
+    return str(latex(_decimals(expression), symbol_names=names))
+
+
+def _decimals(expression: Expression) -> Expression:
+    """Long fractions as decimals."""
+    from sympy import Float, Rational
+
+    return expression.xreplace({q: Float(q, 6) for q in expression.atoms(Rational) if q.q > 100})
 
 
 def _sum(terms: Terms, *, latex: bool) -> str:
