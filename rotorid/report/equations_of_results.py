@@ -167,10 +167,11 @@ def _(found: Fit) -> Equations:
         for i, (s, f, start) in enumerate(zip(S, rates, initial, strict=True)):
             left = [(E[i, j], Symbol(f"d({other})/dt")) for j, other in enumerate(S)]
             moved = zip(-E[i, :].diff(theta), velocities, strict=True)
-            equations.append(Row("", left, [*chain(f, theta, S), *moved]))
-            starts.append(Row("at the start", [(1, s)], chain(start, theta, S)))
+            equations.append(Row("rate", left, [*chain(f, theta, S), *moved]))
+            starts.append(Row("start", [(1, s)], chain(start, theta, S)))
         for name, f in zip(model.outputs, observed, strict=True):
-            outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
+            if f != Symbol(name):  # an output that is no state as it is
+                outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
     rows, none = [*equations, *starts, *outputs], np.zeros((0, len(thetas)))
     title = f"Sensitivities, [F] (3.6), (3.7), of {counted(n, 'state')}"
     return Equations(
