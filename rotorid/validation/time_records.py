@@ -27,6 +27,7 @@ TRUTH_F = (0.14, 12.0, 28.0)
 PARAMETERS_Q = ("theta1", "theta2", "theta3")
 PARAMETERS_F = ("c1, N/m", "m1, kg", "m2, kg")
 OUTPUTS = np.array([[1.0, 2.0], [2.0, 1.0]])
+"""[Q] (2.25): y = C x."""
 BOOK = Printed("q_iterations.csv")
 RESTORED = ", sign restored"
 
