@@ -22,7 +22,7 @@ def table(name):
     ("integrator", "first", "near"), [("heun", FIRST, 5e-3), ("sequential-heun", "model", 6e-4)]
 )
 def test_tables_of_the_book(integrator, first, near):
-    """The first trajectory of the print is the scheme's own; the last printed digit of most states is 1e-3."""
+    """The first trajectory of the print is that of its own scheme; most states are printed to 1e-3."""
     options = {"method": "quasilinearization", "trajectory": first}
     found = fit(book_model(), book_record(), integrator=integrator, **options)
     parameters = table("table_2_3")
