@@ -134,7 +134,9 @@ def _differences(truth: Trajectory) -> list[Row]:
     slopes = np.diff(table[:, :2], axis=0) / np.diff(truth.t)[:, None]
     on_x1, on_x2, _ = solution(table[:-1], slopes)
     values = (on_x2[0], on_x1[1], on_x2[1])
-    return _beside("[Q] (2.36)", dict(zip(PARAMETERS_Q, map(float, values), strict=True)))
+    return _beside(
+        "[Q] (2.36), regression found by agreement", dict(zip(PARAMETERS_Q, map(float, values), strict=True))
+    )
 
 
 def _beside(source: str, computed: Mapping[str, float]) -> list[Row]:
