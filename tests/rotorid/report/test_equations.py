@@ -596,6 +596,27 @@ def test_the_answer_is_brief_and_the_table_whole(name):
     assert places == sorted(places)
 
 
+def test_text_and_latex_have_the_numbers_of_the_matrix():
+    shown = FOUND["identify"].equations
+    wanted = np.column_stack((shown.matrix, shown.right))
+    whole, latex = shown.answer(FOUND["identify"].answer).whole(), shown.latex()
+    for label, numbers in zip(shown.rows, wanted, strict=True):
+        line = next(line for line in whole.splitlines() if line.strip().startswith(label))
+        np.testing.assert_allclose([float(x) for x in line.split(label)[1].split()], numbers, rtol=1e-5)
+        escaped = label.replace("ω", r"\ensuremath{\omega}")
+        cells = next(line for line in latex.splitlines() if line.startswith(escaped)).split(" & ")[1:]
+        np.testing.assert_allclose([float(x.rstrip(" \\")) for x in cells], numbers, rtol=1e-5)
+
+
+def test_a_long_name_of_an_unknown_is_cut_over_its_column_only():
+    names = [f"{letter * 60}{k}" for k in (1, 2) for letter in "ab"]
+    shown = Equations("t", [], ("K", "θ", "Y"), ["r"], names, np.ones((1, 4)), np.ones(1), np.ones(4))
+    whole = shown.answer(FOUND["fit"].answer).whole()
+    assert max(map(len, whole.splitlines())) <= 100
+    assert whole.count("a" * 19 + "…") == 2
+    assert all(f"{name} = 1" in whole and name in shown.latex() for name in names)
+
+
 def test_an_undetermined_unknown_is_said():
     nothing = Equations(
         "t", [], ("K", "θ", "Y"), ["r"], ["a", "b"], np.ones((1, 2)), np.ones(1), np.array([1, np.nan])
