@@ -110,17 +110,11 @@ def _results(printed: Inputs, exact: Inputs) -> list[Row]:
     rounded = np.array([BOOK.number(ONE, f"{name}, rounded") for name in _masses(one)])
     first = printed.frequencies(rounded)
     second = printed.frequencies(np.array([BOOK.number(TWO, name) for name in _masses(two)]))
-    above = {"omega2 above that of the rotor, %": 100 * (first[1] / exact.omega[1] - 1)}
-    return [
-        *BOOK.rows(ONE, _masses(one)),
-        *BOOK.rows(ONE, {f"{name}, rounded": m for name, m in _masses(one).items()}),
-        *BOOK.rows(TWO, _masses(two)),
-        *BOOK.rows(ONE, _eigenvalues(first)),
-        *BOOK.rows(TWO, _eigenvalues(second)),
-        *BOOK.rows(ONE, _frequencies(first)),
-        *BOOK.rows(TWO, _frequencies(second)),
-        *BOOK.rows(ONE, above),
-    ]
+    numbers = {**_masses(one), **{f"{name}, rounded": m for name, m in _masses(one).items()}}
+    numbers |= _eigenvalues(first) | _frequencies(first)
+    numbers["omega2 above that of the rotor, %"] = 100 * (first[1] / exact.omega[1] - 1)
+    after = _masses(two) | _eigenvalues(second) | _frequencies(second)
+    return [*BOOK.rows(ONE, numbers), *BOOK.rows(TWO, after)]
 
 
 def _with_all_digits(exact: Inputs) -> list[Row]:

@@ -7,6 +7,8 @@ Heun's scheme. Of [F] the intact part of the printed record is compared, and wha
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,12 +17,15 @@ from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model
 from rotorid.timedomain import OdeModel, Record, Trajectory, ode_model, simulate
 from rotorid.timedomain.fit import fit
-from rotorid.validation.row import Row, half_unit, number, printed_table, row
+from rotorid.validation.row import Kind, Row, half_unit, number, printed_table, row
 
 TRUTH_Q = (1.0, -1.0, -1.0)
 TRUTH_F = (0.14, 12.0, 28.0)
 PARAMETERS_Q = ("theta1", "theta2", "theta3")
 PARAMETERS_F = ("c1, N/m", "m1, kg", "m2, kg")
+
+GIVEN = re.compile(r"[tu]\(\d+\)|x\d\(1\), .*|x1.*, iteration 0|theta\d, iteration 0|.*\(0\.0 s\).*")
+"""Times, inputs and starting values: quantities that are computed from nothing."""
 
 SCHEME = (
     "the print recalculates x2 with the recalculated x1, Heun's scheme both from the first guess; they are "
@@ -50,13 +55,19 @@ def rows() -> list[Row]:
     truth = simulate(model, TRUTH_Q, np.linspace(0.0, math.pi, 31), sensitivities=False)
     record = Record(truth.t, {"y1": truth.y[:, 0], "y2": truth.y[:, 1]})
     chain = read_ode_model(sample_data() / "fit" / "three_masses" / "model.toml")
-    return [
+    made = [
         *_table_2_1(truth),
         *_tables_2_2_and_2_3(model, record),
         *_parameters_of_the_record(model, record),
         *_printed_record(chain),
         *_estimates(chain),
     ]
+    return [replace(r, kind=_kind(r)) for r in made]
+
+
+def _kind(r: Row) -> Kind:
+    """Given, or selected: of [F] only what agrees is known to be intact."""
+    return "given" if GIVEN.fullmatch(r.quantity) else "selected" if r.source.startswith("[F]") else r.kind
 
 
 def _book_model() -> OdeModel:
@@ -127,18 +138,8 @@ def _printed_record(chain: OdeModel) -> list[Row]:
         computed = trajectory.y[round(5 * float(line["t_s"])), chain.outputs.index(state)]
         sign = ", sign restored" if state == "y2" else ""
         fifth = fifth_digit(text)
-        short = fifth < half_unit(text)
-        quantity = f"{state}({line['t_s']} s){sign}"
-        made.append(
-            row(
-                "[F] record",
-                quantity,
-                text,
-                float(computed),
-                fifth if short else None,
-                ZEROS if short else "",
-            )
-        )
+        wide = (fifth, ZEROS) if fifth < half_unit(text) else (None, "")
+        made.append(row("[F] record", f"{state}({line['t_s']} s){sign}", text, float(computed), *wide))
     return made
 
 
