@@ -32,6 +32,7 @@ PROVIDERS = {
     "time_records": "Parameters from time records",
     "balancing": "Published balancing examples",
 }
+NAMES = tuple(PROVIDERS)
 WIDTH = 100
 HEADS: dict[Status, str] = dict(
     zip(get_args(Status), ("agree", "misprint", "follow", "differ", "given"), strict=True)
@@ -216,7 +217,7 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
     )
 
     own = (rotor, formula_50, identification, formulas, closed_forms, time_records, balancing)
-    modules = dict(zip(PROVIDERS, own, strict=True))
+    modules = dict(zip(NAMES, own, strict=True))
     options = options or ValidateOptions()
     return Validation(
         groups=tuple(_group(name, modules[name].rows) for name in chosen),

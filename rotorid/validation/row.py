@@ -90,7 +90,7 @@ class Row:
 
     @property
     def status(self) -> Status:
-        """``agrees``, ``given``, ``differs``; ``erratum``, ``consequence``: wrong in the print, and known why."""
+        """``agrees``, ``given``, ``differs``; ``erratum``, ``consequence``: wrong in print for a reason."""
         if not math.isfinite(self.computed):
             return DIFFERS
         near = self._from_print <= 1

@@ -49,7 +49,7 @@ def test_rows_of_time_records(records):
         "[F] record": 164,
         "[F] from the intact printed values": 3,
     }
-    assert statuses(records) == {"agrees": 653}
+    assert statuses(records) == {"agrees": 572, "given": 81}
 
 
 def test_rows_of_published_balancing(examples):
@@ -94,7 +94,8 @@ def test_every_other_tolerance_has_its_reason_and_none_is_wide(every):
 def test_the_first_trajectory_and_the_first_iteration_agree_to_every_printed_digit(records):
     first = [r for r in records if r.quantity.endswith(("iteration 0", "iteration 1")) and r.printed]
     assert len(first) == 4 * 31 + 3
-    assert all(r.tolerance == half_unit(r.text) and r.status == "agrees" for r in first)
+    assert all(r.tolerance == half_unit(r.text) for r in first)
+    assert statuses(first) == {"agrees": 31 + 2 * 30 + 3 - 1, "given": 31 + 1 + 2}
 
 
 @pytest.mark.parametrize("name", ["table_2_2", "table_2_3"])
@@ -264,7 +265,7 @@ def test_a_wrong_step_of_quasilinearization_is_noticed(monkeypatch):
     monkeypatch.setattr(rotorid.timedomain.methods.quasilinearization, "_heun", euler)
     found = statuses(time_records.rows())
     assert found["differs"] > 250
-    assert found["agrees"] > 300
+    assert found["agrees"] > 220
 
 
 def test_a_wrong_solution_in_time_is_noticed(monkeypatch):
