@@ -98,6 +98,7 @@ def _inputs(rotor: fem.Rotor, exact: Inputs) -> list[Row]:
         {
             **{f"a{i}, m from the left support": place for i, place in enumerate(places, start=1)},
             "l, distance of the supports, m": end - start,
+            "elements in the printed table": len(rotor.length),
             **{quantity: value[name] for name, quantity in _names().items()},
             "alpha22 of the running text, m/N": exact.alpha[1, 1],
         },

@@ -127,7 +127,7 @@ def _feedback_1_8() -> list[Row]:
     signals = {"S": np.array([complex(re_1, im_1), complex(re_2, im_2)]), "F": np.ones(2, dtype=complex)}
     tests = Experiments(("1", "2"), np.array([1.0, 2.0]), signals, np.zeros(2, dtype=bool))
     matrix, right, _ = build_rows(_model("task_6_1"), tests).real_rows()
-    numbers = {f"K({i + 1},{j + 1})": value for (i, j), value in np.ndenumerate(matrix)}
+    numbers: dict[str, float] = {f"K({i + 1},{j + 1})": x for (i, j), x in np.ndenumerate(matrix)}
     numbers |= {f"Y({i + 1})": value for i, value in enumerate(right)}
     task = _identified("section_1_8")
     numbers["largest error, %"] = _worst(task, "T1", "T2")
