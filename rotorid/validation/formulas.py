@@ -1,7 +1,7 @@
 """Misprinted equations of [S]: what they, and the right ones, leave at what the program predicts.
 
 The equations stand in `data/formulas.csv`, each with the exercise of `sample_data/identify` whose true
-parameters it is tried with: amplitudes `X` with their parts `X_r`, `X_i`, the frequency `w` and `p = iw`; of
+parameters it is tried with: amplitudes `X` with `X_r`, `X_i` and `X_phi`, the frequency `w` and `p = iw`; of
 free vibration `A1`, `A2` and `z`, and of the beam of task 8.1 `EI` and `delta12`.
 """
 
@@ -59,5 +59,5 @@ def _solution(folder: str) -> Mapping[str, ComplexArray]:
         return values | {"EI": stiffness[0], "delta12": fem.compliance(shaft, (4, 7))[0, 1]}
     w, inputs = data.frequencies, {name: data.signals[name] for name in model.inputs}
     for name, Z in (inputs | model.predict(theta, w, inputs)).items():
-        values |= {name: Z, f"{name}_r": Z.real, f"{name}_i": Z.imag}
+        values |= {name: Z, f"{name}_r": Z.real, f"{name}_i": Z.imag, f"{name}_phi": np.angle(Z)}
     return values | {"w": w, "p": 1j * w}

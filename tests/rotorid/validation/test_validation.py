@@ -149,7 +149,7 @@ def test_what_was_not_computed_differs_and_is_null():
         ("rotor", 75),
         ("masses", 48),
         ("lessons", 110),
-        ("formulas", 32),
+        ("formulas", 34),
         ("closed_forms", 11),
         ("balancing", 40),
     ],
