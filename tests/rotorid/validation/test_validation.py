@@ -227,9 +227,14 @@ def test_a_given_value_that_is_copied_wrongly_differs():
 
 def test_consequences_name_the_misprint_that_they_follow_from(proof):
     rows = [r for r in proof.rows if r.status == "consequence"]
-    assert Counter(r.source for r in rows) == {formula_50.EXACT[1]: 6, formula_50.EXACT[2]: 5}
+    assert Counter(r.source for r in rows) == {
+        formula_50.EXACT[1]: 6,
+        formula_50.EXACT[2]: 5,
+        "[Q] (2.32)": 2,
+    }
     errata = {f"{r.source}: {r.quantity}" for r in proof.rows if r.status == "erratum"}
-    assert {r.follows for r in rows} == {"[S] task 9.1, inputs: alpha12, m/N"} <= errata
+    causes = {"[S] task 9.1, inputs: alpha12, m/N", "[Q] (2.32): M(3,1), sign restored"}
+    assert {r.follows for r in rows} == causes <= errata
     assert all(r.follows in r.note for r in rows)
     assert not any(r.follows for r in proof.rows if r.status != "consequence")
 
