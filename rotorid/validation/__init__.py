@@ -34,9 +34,7 @@ PROVIDERS = {
 }
 NAMES = tuple(PROVIDERS)
 WIDTH = 100
-HEADS: dict[Status, str] = dict(
-    zip(get_args(Status), ("agree", "misprint", "follow", "differ", "given"), strict=True)
-)
+HEADS = dict(zip(get_args(Status), ("agree", "misprint", "follow", "differ", "given"), strict=True))
 """Every status with the head of its column."""
 SELECTED = "{} numbers of [F], whose print is damaged, were selected by agreement: consistent, but no proof"
 

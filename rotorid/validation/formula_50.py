@@ -136,7 +136,9 @@ def _masses(values: FloatArray) -> dict[str, float]:
 
 
 def _eigenvalues(omega: FloatArray) -> dict[str, float]:
-    return {f"eigenvalue {k}, s^2": value**-2 for k, value in enumerate(omega.tolist(), start=1)}
+    found = {f"eigenvalue {k}, s^2": value**-2 for k, value in enumerate(omega.tolist(), start=1)}
+    rounded = {f"eigenvalue {k} as the root is taken of it, s^2": omega[k - 1] ** -2 for k in (1, 2)}
+    return found | rounded
 
 
 def _frequencies(omega: FloatArray) -> dict[str, float]:

@@ -147,7 +147,7 @@ def test_what_was_not_computed_differs_and_is_null():
     ("name", "least"),
     [
         ("rotor", 75),
-        ("masses", 48),
+        ("masses", 53),
         ("lessons", 110),
         ("formulas", 34),
         ("closed_forms", 11),
