@@ -101,7 +101,6 @@ def _overview() -> str:
     lines = [
         "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
         "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
-        "",
     ]
     for job, commands in _COMMANDS.items():
         told = {name: command.__doc__ or "" for name, command in commands.items()}

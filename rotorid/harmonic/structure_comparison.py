@@ -43,7 +43,10 @@ class Structure:
 
     def fit(self, data: Experiments, start: Mapping[str, float]) -> tuple[Identification, float]:
         """Output error, and the sum of squared residuals over their errors."""
-        found = identify_outputs(self.model, data, self.bounds or None, start=start or None)
+        try:
+            found = identify_outputs(self.model, data, self.bounds or None, start=start or None)
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}") from None
         return found, float(np.sum(compare(self.model, data).residual(_values(found)) ** 2))
 
 

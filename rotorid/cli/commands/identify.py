@@ -25,7 +25,7 @@ def identify(
     data: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[OTHER.toml] [DATA]",
+            metavar="OTHER.toml DATA",
             help="Measured amplitudes, .csv or .xlsx; only --design does without. A second model before them "
             "is compared with the first: misfits and F test.",
         ),
