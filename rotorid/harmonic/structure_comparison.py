@@ -101,16 +101,13 @@ class StructureComparison(Answered):
     def _columns(self) -> tuple[Column, ...]:
         from scipy.special import chdtrc
 
-        stated = self.fits[0].errors_stated
-        chance = [
-            float(chdtrc(n, s)) if stated and n else None for n, s in zip(self.dof, self.misfits, strict=True)
-        ]
+        known = np.array(self.dof) * self.fits[0].errors_stated > 0
         return (
             Column("model", self.names, str),
             Column("determined", [fit.rank for fit in self.fits], str, "parameters"),
             Column("misfit", self.misfits, "{:.5g}".format),
             Column("dof", self.dof, str),
-            Column("chance", chance, "{:.3g}".format),
+            Column("chance", np.where(known, chdtrc(self.dof, self.misfits), np.nan), "{:.3g}".format),
         )
 
     def to_frame(self) -> pd.DataFrame:
@@ -119,9 +116,7 @@ class StructureComparison(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types."""
-        models = [
-            row | {"fit": fit.to_dict()} for row, fit in zip(rows(self._columns()), self.fits, strict=True)
-        ]
+        models = rows((*self._columns(), Column("fit", [fit.to_dict() for fit in self.fits])))
         special = None if self.special is None else self.names[self.special]
         F, chance = self.f_test or (None, None)
         told = {"models": models, "special_case": special, "F": F, "probability": chance}
@@ -146,14 +141,10 @@ def compare_structures(pair: Sequence[Structure]) -> StructureComparison:
     more = 1 - less
     # the errors of the larger model's amplitudes, as covariances, for both
     root = np.linalg.inv(plans[more].reweighted(_values(alone[more])).whiten)
-    stated = dict(
-        zip(pair[more].model.outputs, np.moveaxis(root @ np.swapaxes(root, -1, -2), 1, 0), strict=True)
-    )
-    usual = np.tile(np.eye(2), (len(root), 1, 1))
-    data = [
-        replace(one.data, covariances={name: stated.get(name, usual) for name in one.model.outputs})
-        for one in pair
-    ]
+    every = np.moveaxis(root @ np.swapaxes(root, -1, -2), 1, 0)
+    stated = dict.fromkeys(pair[less].model.outputs, every[0])  # what nobody measures has any
+    stated |= dict(zip(pair[more].model.outputs, every, strict=True))
+    data = [replace(s.data, covariances={name: stated[name] for name in s.model.outputs}) for s in pair]
     fits = [one.fit(rows, fit.starts[0]) for one, rows, fit in zip(pair, data, alone, strict=True)]
     theta = _values(fits[less][0])
     elsewhere = theta * np.random.default_rng(7).uniform(0.8, 1.25, len(theta))

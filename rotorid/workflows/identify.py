@@ -151,34 +151,32 @@ class TwoStructures(Found):
 
 @workflow
 def compare(
-    models: Sequence[HarmonicFile | Path | str], data: Path | str, options: IdentifyOptions | None = None
+    models: Sequence[Path | str], data: Path | str, options: IdentifyOptions | None = None
 ) -> TwoStructures:
     """Fit two structures to the same readings by output error, and test whether the smaller one is enough.
 
     Errors of the readings are the only options; ValueError for models that do not predict the same readings.
     """
     from rotorid.harmonic.structure_comparison import Structure, compare_structures
-    from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
+    from rotorid.tables import read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
     if len(models) != 2:
         raise ValueError(f"two models are compared, not {len(models)}")
-    errors = options.amplitude_error, options.phase_error
     refuse(options, {*vars(options)} - {"method", "amplitude_error", "phase_error"}, "belongs to one model")
     pair = []
-    for k, model in enumerate(models):
-        file = model if isinstance(model, HarmonicFile) else read_harmonic_model(model)
-        file = replace(file, errors=amplitude_errors(file.errors, *errors))
-        rows = read_measurements(data, file).without_copies()[0]
-        pair.append(Structure(str(file.path or f"model {k + 1}"), file.model, rows, file.bounds, file.start))
+    for model in models:
+        file = read_harmonic_model(model)
+        errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error)
+        rows = read_measurements(data, replace(file, errors=errors)).without_copies()[0]
+        pair.append(Structure(str(model), file.model, rows, file.bounds, file.start))
     if pair[0].data.errors != pair[1].data.errors:
         raise ValueError(
             "the model files state different errors: give --amplitude-error and --phase-error for both"
         )
     with phase("comparison"):
         found = compare_structures(pair)
-    files = [Path(given) for given in (*models, data) if isinstance(given, Path | str)]
-    return TwoStructures(found=found, provenance=provenance(files, options))
+    return TwoStructures(found=found, provenance=provenance(map(Path, (*models, data)), options))
 
 
 def _check(options: IdentifyOptions, *, measured: bool) -> None:
