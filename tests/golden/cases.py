@@ -239,6 +239,7 @@ simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5
 simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
+fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
 fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
