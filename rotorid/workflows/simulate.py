@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from balancing.data.conventions import polar
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import capital, counted, listing
@@ -198,6 +195,8 @@ def _amplitudes(model: object, options: SimulateOptions, noisy: bool) -> _Simula
 
 def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
     """A time record."""
+    import numpy as np
+
     from rotorid.tables import read_ode_model, read_record
     from rotorid.tables.data.records import record_columns
     from rotorid.timedomain import OdeModel, Record
@@ -221,6 +220,8 @@ def _record(model: object, options: SimulateOptions, noisy: bool) -> _Simulated:
 
 def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float], FloatArray]:
     """Every parameter, by name and in the order of the model."""
+    import numpy as np
+
     found = numbers(given or {}, "--with", "c=1000,alpha=10")
     check_names(found, "--with", names, "parameter", needed=names)
     values = {name: float(found[name]) for name in names}
@@ -229,6 +230,8 @@ def _values(given: Values | None, names: Sequence[str]) -> tuple[dict[str, float
 
 def _amplitude(name: str, shown: str) -> complex:
     """Read "10" or "10@-90"."""
+    from balancing.data.conventions import polar
+
     size, at, angle = shown.partition("@")
     value = number(size)
     if math.isnan(value):
