@@ -52,7 +52,7 @@ def forced_vibration(
             lost = (np.abs(np.linalg.inv(matrix)).T * size[:, :e]).sum()
             if lost < SINGULAR and np.isfinite(size).all():
                 continue
-        why = "it resonates without damping" if one else "nothing holds it at rest"
+        why = "a resonance without damping" if one else "nothing holds it at rest"
         raise ValueError(f"at {one:.6g} rad/s the model has no amplitude: {why}")
     Z = model.forced(theta, w, inputs, False, varying)[0]
     for part in (Z.real, Z.imag):

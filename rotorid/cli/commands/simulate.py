@@ -25,7 +25,7 @@ def simulate(
     options: SimulateOptions,
     to: Destination,
 ) -> None:
-    """The direct problem: amplitudes, natural modes or a record, as identify and fit read them.
+    """The direct problem: amplitudes, modes or a record, as identify and fit read them.
 
     Example: rotorid simulate sample_data/identify/task_5_1/model.toml --with c=1000,alpha=10
     --frequencies 10,20,30 --inputs F=10 --digits 2

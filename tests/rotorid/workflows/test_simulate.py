@@ -281,8 +281,8 @@ def test_misuse_is_one_message(cli, words, said):
 @pytest.mark.parametrize(
     ("equation", "value", "frequency", "why"),
     [
-        ("(m*p**2 + c)*X = F", 1000.0, "10", "resonates without damping"),
-        ("(m*p**2 + c)*X = F", 1000.0 * 1.1**2, "11", "resonates without damping"),
+        ("(m*p**2 + c)*X = F", 1000.0, "10", "a resonance without damping"),
+        ("(m*p**2 + c)*X = F", 1000.0 * 1.1**2, "11", "a resonance without damping"),
         ("(m*p**2 + c*p)*X = F", 1.0, "0", "nothing holds it at rest"),
         ("(m + c/p**2)*X = F", 1000.0, "0", "the frequency 0 cannot be used"),
     ],
