@@ -34,7 +34,7 @@ _WEIGHTED = (
 @singledispatch
 def equations_of(found: object) -> Equations:
     """What was solved to get this result; ValueError where it has no such equations."""
-    raise ValueError("--show equations needs data: without them nothing is solved")
+    raise ValueError("--show equations needs one model and its data: there is nothing else that was solved")
 
 
 @equations_of.register

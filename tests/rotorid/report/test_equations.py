@@ -247,7 +247,11 @@ def test_what_has_no_such_rows_is_refused(cli, tmp_path):
     errors = ("--amplitude-error", 2, "--phase-error", 1)
     for words, said in (
         ((model, data, "--method", "output-error", "--show", "equations"), "--method output-error has not"),
-        ((guessed, *errors, "--design", "80:120:5", "--show", "equations"), "--show equations needs data"),
+        (
+            (guessed, *errors, "--design", "80:120:5", "--show", "equations"),
+            "--show equations needs one model and",
+        ),
+        ((model, *files("task_4_1"), "--show", "equations"), "--show equations needs one model and"),
         ((model, data, "--latex"), "--latex belongs to --show equations"),
         ((model, data, "--show", "equations", "--latex", "--json"), "without --json or --table"),
         ((model, data, "--show", "equation"), "is not one of 'equations'"),
