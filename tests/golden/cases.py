@@ -195,6 +195,7 @@ trial-weight-model-all      trial-weight {MODEL_JOB} --output t.csv --plot t.png
 trial-weight-turbo          trial-weight {TURBO}/job.toml --share 30
 trial-weight-tried          trial-weight sample_data/bk_two_plane/job.toml --mass 2g --max-mass 3g
 trial-weight-nothing        trial-weight --speed 3000rpm
+balance-equations           balance {TURBO}/job.toml --method least-squares --show equations --table
 """
 
 MODEL_COMMANDS = f"""
@@ -250,6 +251,12 @@ fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses
 fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
+identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
+identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
+identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
+reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 validate                    validate --output numbers.csv
 validate-all                validate --all
 """
