@@ -33,9 +33,9 @@ class Fit(Answered, Path):
         What was fitted to what: one model for each record, all with the same parameters.
     method, integrator, loss
         How; the integrator is the one that was used ("none": the model has no states).
-    history, costs, trajectories
+    history, costs, trajectories, stopped_by
         Parameters at the start and after each iteration, (k + 1, n), half the sum of squared residuals at
-        each, and the states of each record that quasilinearization went through.
+        each, the states of each record that quasilinearization went through, and what ended the iteration.
     converged, message, at_bounds
         Whether a minimum was reached, and in words; parameters that stand at a bound.
     estimate
@@ -98,6 +98,7 @@ class Fit(Answered, Path):
                     "converged": self.converged,
                     "message": self.message,
                     "reliable": self.reliable,
+                    "stopped_by": self.stopped_by,
                     "iterations": self.iterations,
                     "history": [
                         {"cost": cost, "parameters": dict(zip(names, row, strict=True))}

@@ -48,6 +48,9 @@ class FitOptions:
         Other places to start from; default: 0.
     max_iterations : N
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
+    tolerance : X
+        Of gauss-newton and quasilinearization: end where a step is below this part of each parameter, or
+        changes the sum of squares by less than this part of it, [F]; default: where no step matters.
     max_seconds : S
         Limit of the search; what it has found by then has no intervals.
     trajectory : model|data
@@ -71,6 +74,7 @@ class FitOptions:
     starts: int = 1
     seed: int | None = None
     max_iterations: int = 100
+    tolerance: float | None = None
     max_seconds: float = 60.0
     trajectory: str | None = None
     pieces: int | None = None
@@ -156,6 +160,7 @@ def fit(
             starts=options.starts,
             seed=options.seed or 0,
             max_iterations=options.max_iterations,
+            tolerance=options.tolerance,
             max_seconds=options.max_seconds,
             trajectory=options.trajectory,
             pieces=options.pieces,
@@ -174,6 +179,8 @@ def _check(options: FitOptions) -> None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):
             raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
+    if options.method not in ("gauss-newton", "quasilinearization"):
+        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
     if options.method != "multiple-shooting":
         refuse(options, ("pieces",), "belongs to --method multiple-shooting")
     if options.starts == 1:

@@ -19,7 +19,7 @@ from rotorid.workflows.fit import fit as work
     panels={
         "Input": "sigma start allow_missing",
         "Method": "method loss starts",
-        "Limits": "max_seconds max_iterations",
+        "Limits": "max_seconds max_iterations tolerance",
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",
     },

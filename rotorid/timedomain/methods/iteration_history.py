@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
 
@@ -19,9 +21,12 @@ class Path(NonlinearEstimate):
     ----------
     trajectories
         Quasilinearization: the states (n, n_x) of each record at the start and after each iteration.
+    stopped_by
+        What ended Gauss–Newton or quasilinearization: "step" |Δβ| or "cost" I(β), see `Stop`; None: neither.
     """
 
     trajectories: tuple[tuple[FloatArray, ...], ...] = ()
+    stopped_by: str | None = None
 
     def after(self, before: FloatArray) -> Path:
         """The same, as the continuation of earlier steps, (k, n)."""
@@ -36,10 +41,67 @@ def at(found: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
     return replace(found, values=values, solution=theta, residuals=residuals, chi_square=chi)
 
 
+@dataclass(frozen=True)
+class Stop:
+    """When an iteration ends: [F] has Δβ < ε or I(β) < ε; here both are relative, and of no unit.
+
+    Attributes
+    ----------
+    tolerance
+        ε: the iteration ends where a step is smaller than this part of each parameter, or changes the sum of
+        squares by less than this part of it. None: where no further step would matter.
+    """
+
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.tolerance is not None and not 0 < self.tolerance < 1:
+            raise ValueError(f"the tolerance is a number between 0 and 1, not {self.tolerance:g}")
+
+    def met(
+        self,
+        step: FloatArray,
+        theta: FloatArray,
+        found: Estimate,
+        costs: Sequence[float],
+        before: FloatArray | None = None,
+    ) -> str | None:
+        """Which condition holds after a step, "step" or "cost"."""
+        if self.tolerance is None:
+            return "step" if negligible(step, theta, found, 1e-9, before) else None
+        if negligible(step, theta, found, self.tolerance, share=0.0):
+            return "step"
+        return "cost" if abs(costs[-1] - costs[-2]) < self.tolerance * costs[-1] else None
+
+    def at_minimum(
+        self, step: FloatArray, theta: FloatArray, found: Estimate, before: FloatArray | None = None
+    ) -> bool:
+        """Whether the next step no longer matters: with a tolerance, beside 1e-6 or a tenth of the errors."""
+        if self.tolerance is None:
+            return negligible(step, theta, found, 1e-8, before)
+        return negligible(step, theta, found, 1e-6, before, share=0.1)
+
+    def words(self, by: str, iterations: int, converged: bool) -> str:
+        """How it ended."""
+        count = counted(iterations, "iteration")
+        if self.tolerance is None:
+            return f"converged in {count}"
+        what = {"step": "|Δβ| is below {} |β|", "cost": "I(β) changes by less than {} of it"}[by]
+        met = what.format(f"{self.tolerance:g}")
+        if converged:
+            return f"converged in {count}: {met}"
+        return f"not converged in {count}: {met}, but the next step still matters; lower --tolerance"
+
+
 def negligible(
-    step: FloatArray, theta: FloatArray, found: Estimate, tolerance: float, before: FloatArray | None = None
+    step: FloatArray,
+    theta: FloatArray,
+    found: Estimate,
+    tolerance: float,
+    before: FloatArray | None = None,
+    share: float = 1e-5,
 ) -> bool:
-    """Whether what follows a step no longer matters: relative to the parameters, or to their errors.
+    """Whether what follows a step no longer matters: relative to the parameters, or a share of their errors.
 
     With the step before this one, the next is taken to be smaller by the same factor: where the convergence
     is quadratic it is smaller still.
@@ -50,7 +112,7 @@ def negligible(
         size = size * min(1.0, float(size.max()) / max(float(np.abs(before).max()), 1e-300))
     limit = tolerance * np.maximum(value, 1e-6 * float(value.max()))
     if found.std is not None:
-        limit = np.maximum(limit, 1e-5 * np.nan_to_num(found.std))
+        limit = np.maximum(limit, share * np.nan_to_num(found.std))
     return bool((size <= limit).all())
 
 
