@@ -112,7 +112,10 @@ def fit(  # noqa: PLR0913
         )
     way = find(METHODS, method, "method").function
     plain = method in ("gauss-newton", "quasilinearization")
-    _check_method(method, plain, loss, bounds, tolerance)
+    if plain and loss != "linear":
+        raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
+    if plain and bounds:
+        raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
         raise ValueError("quasilinearization integrates with heun, or with error control (auto)")
     if starts < 1 or max_iterations < 1 or not max_seconds > 0:
@@ -185,22 +188,6 @@ def search_all(
     # one that did not converge is no minimum; where it describes the record better, it is given, and said
     best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
     return best, merge([p for p in paths if p.converged], problem.model.parameters) if len(begins) > 1 else ()
-
-
-def _check_method(
-    method: str,
-    plain: bool,
-    loss: str,
-    bounds: Mapping[str, tuple[float, float]] | None,
-    tolerance: float | None,
-) -> None:
-    """Refuse what a method does not know."""
-    if plain and loss != "linear":
-        raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
-    if plain and bounds:
-        raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
-    if not plain and tolerance is not None:
-        raise ValueError(f"{method} knows no tolerance; use gauss-newton or quasilinearization")
 
 
 def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
 from rotorid.timedomain.integration.simulate import Trajectory
@@ -83,6 +83,25 @@ class Fit(Answered, Path):
         """Names of the parameters."""
         return self.model.parameters
 
+    @property
+    def series(self) -> tuple[Column, ...]:
+        """Of each output of each record: number and rms of its samples, and rms of what the model leaves."""
+        each = [
+            (record.name, name, record.outputs[name], run.y[:, j] - record.outputs[name])
+            for record, run in zip(self.records, self.simulations, strict=False)
+            for j, name in enumerate(self.model.outputs)
+            if name in record.outputs
+        ]
+        names, outputs, y, left = zip(*each, strict=True) if each else [()] * 4
+        rms = [[float(np.sqrt(np.nanmean(x**2))) for x in table] for table in (y, left)]
+        return (
+            Column("record", names, str if len(self.records) > 1 else None),
+            Column("output", outputs, str),
+            Column("samples", [int(np.isfinite(x).sum()) for x in y], "{:d}".format),
+            Column("rms", rms[0], "{:.4g}".format),
+            Column("residual_rms", rms[1], "{:.4g}".format, "left, rms"),
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
         names, change = self.parameters, self.integration_change
@@ -105,6 +124,7 @@ class Fit(Answered, Path):
                         for row, cost in zip(self.history, self.costs, strict=True)
                     ],
                     "errors": self.errors,
+                    "series": rows(self.series),
                     "at_bounds": self.at_bounds,
                     "minima": [
                         {"parameters": m.values, "cost": m.cost, "starts": m.starts} for m in self.minima

@@ -13,7 +13,7 @@ from rotorid.base.suggestions import did_you_mean, one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import number, pairs
-from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,9 +94,10 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordFit(Parts):
-    """What the fit found."""
+    """What the fit found; `model` is the text of the model's file."""
 
     fit: Fit
+    model: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -108,6 +109,12 @@ class RecordFit(Parts):
         from rotorid.timedomain.plots import figure_fit
 
         return figure_fit(self.fit)
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.estimation import fit_report
+
+        return fit_report(self.to_dict(), self.fit, provenance=self.provenance, model=self.model)
 
 
 @workflow
@@ -169,7 +176,7 @@ def fit(
         )
     log.info("degrees_of_freedom = %s", found.estimate.dof)
     log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))
-    return RecordFit(fit=found, provenance=provenance(files, options))
+    return RecordFit(fit=found, model=text_of(model), provenance=provenance(files, options))
 
 
 def _check(options: FitOptions) -> None:

@@ -302,12 +302,9 @@ def _initial(
             found[name] = inner.number(name, 0.0) or 0.0
         else:
             inner.complain(name, 'a number, an expression of parameters in quotes, or "record"')
-    measured = {"record"} - set(constants)
-    texts = {
-        name: value
-        for name, value in found.items()
-        if isinstance(value, str) and name in states and value not in measured
-    }
+    texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
+    if "record" not in constants:
+        texts = {name: text for name, text in texts.items() if text != "record"}
     _readable(section, "initial", texts, constants, problems)
     for name in states if complete else ():
         if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):

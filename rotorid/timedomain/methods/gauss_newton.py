@@ -7,7 +7,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.timedomain.integration.simulate import SimulationError
-from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import Problem
 
 
@@ -54,7 +54,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, st
         met = stop.met(step, theta, found, costs)
         found = problem.linear_fit(K, -r)
         # a minimum, not only a short step: the next one is no longer either
-        converged = met is not None and stop.at_minimum(found.solution, theta, found)
+        converged = met is not None and negligible(found.solution, theta, found, stop.near)
         if met and (converged or stop.tolerance is not None):
             ended, message = met, stop.words(met, len(history) - 1, converged)
             break

@@ -43,13 +43,13 @@ def at(found: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
 
 @dataclass(frozen=True)
 class Stop:
-    """When an iteration ends: [F] has Δβ < ε or I(β) < ε; here both are relative, and of no unit.
+    """When an iteration ends: where no step matters, or with [F] at Δβ < ε or I(β) < ε, both relative here.
 
     Attributes
     ----------
     tolerance
-        ε: the iteration ends where a step is smaller than this part of each parameter, or changes the sum of
-        squares by less than this part of it. None: where no further step would matter.
+        ε: a step below this part of each parameter, or one that changes the sum of squares by less than this
+        part of it; None: where no step matters.
     """
 
     tolerance: float | None = None
@@ -57,6 +57,11 @@ class Stop:
     def __post_init__(self) -> None:
         if self.tolerance is not None and not 0 < self.tolerance < 1:
             raise ValueError(f"the tolerance is a number between 0 and 1, not {self.tolerance:g}")
+
+    @property
+    def near(self) -> tuple[float, float]:
+        """Limits of a next step that no longer matters, see `negligible`."""
+        return (1e-8, 1e-5) if self.tolerance is None else (1e-6, 0.1)
 
     def met(
         self,
@@ -68,40 +73,28 @@ class Stop:
     ) -> str | None:
         """Which condition holds after a step, "step" or "cost"."""
         if self.tolerance is None:
-            return "step" if negligible(step, theta, found, 1e-9, before) else None
-        if negligible(step, theta, found, self.tolerance, share=0.0):
+            return "step" if negligible(step, theta, found, (1e-9, 1e-5), before) else None
+        if negligible(step, theta, found, (self.tolerance, 0.0)):
             return "step"
         return "cost" if abs(costs[-1] - costs[-2]) < self.tolerance * costs[-1] else None
 
-    def at_minimum(
-        self, step: FloatArray, theta: FloatArray, found: Estimate, before: FloatArray | None = None
-    ) -> bool:
-        """Whether the next step no longer matters: with a tolerance, beside 1e-6 or a tenth of the errors."""
-        if self.tolerance is None:
-            return negligible(step, theta, found, 1e-8, before)
-        return negligible(step, theta, found, 1e-6, before, share=0.1)
-
     def words(self, by: str, iterations: int, converged: bool) -> str:
         """How it ended."""
-        count = counted(iterations, "iteration")
-        if self.tolerance is None:
-            return f"converged in {count}"
-        what = {"step": "|Δβ| is below {} |β|", "cost": "I(β) changes by less than {} of it"}[by]
-        met = what.format(f"{self.tolerance:g}")
-        if converged:
-            return f"converged in {count}: {met}"
-        return f"not converged in {count}: {met}, but the next step still matters; lower --tolerance"
+        said, ε = f"converged in {counted(iterations, 'iteration')}", self.tolerance
+        if ε is None:
+            return said
+        said += f": |Δβ| is below {ε:g} |β|" if by == "step" else f": I(β) changes by less than {ε:g} of it"
+        return said if converged else f"not {said}, but the next step still matters; lower --tolerance"
 
 
 def negligible(
     step: FloatArray,
     theta: FloatArray,
     found: Estimate,
-    tolerance: float,
+    limits: tuple[float, float],
     before: FloatArray | None = None,
-    share: float = 1e-5,
 ) -> bool:
-    """Whether what follows a step no longer matters: relative to the parameters, or a share of their errors.
+    """Whether what follows a step no longer matters: relative to the parameters, or to their errors.
 
     With the step before this one, the next is taken to be smaller by the same factor: where the convergence
     is quadratic it is smaller still.
@@ -110,9 +103,9 @@ def negligible(
     size, value = np.abs(step), np.abs(theta)
     if before is not None:
         size = size * min(1.0, float(size.max()) / max(float(np.abs(before).max()), 1e-300))
-    limit = tolerance * np.maximum(value, 1e-6 * float(value.max()))
+    limit = limits[0] * np.maximum(value, 1e-6 * float(value.max()))
     if found.std is not None:
-        limit = np.maximum(limit, share * np.nan_to_num(found.std))
+        limit = np.maximum(limit, limits[1] * np.nan_to_num(found.std))
     return bool((size <= limit).all())
 
 

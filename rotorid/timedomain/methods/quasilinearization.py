@@ -17,7 +17,7 @@ from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
-from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -82,7 +82,7 @@ def quasilinearization(
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
         met = stop.met(step, theta, found, costs, last)
-        converged = met is not None and change < 1e-3 and stop.at_minimum(step, theta, found, last)
+        converged = bool(met) and change < 1e-3 and negligible(step, theta, found, stop.near, last)
         if met and (converged or stop.tolerance is not None):
             ended, message = met, stop.words(met, len(history) - 1, converged)
             break
