@@ -157,7 +157,7 @@ def _estimate(
         digits = value_digits(value or 0.0, std)
         keys = [f"{name}.value", f"{name}.std"]
         keys += [f"{name}.ci95.0", f"{name}.ci95.1"] if one["ci95"] is not None else []
-        cells = [document.show(f"parameters.{key}", 2 if key.endswith("std") else digits) for key in keys]
+        cells = [document.show(f"parameters.{key}", 3 if key.endswith("std") else digits) for key in keys]
         numbers.append([*cells, NOTHING, NOTHING][:4])
         several = value is None and len({one[name] for one in solutions}) > 1
         unknown = "several values" if several else "not determined" if value is None else ""
