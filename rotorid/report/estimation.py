@@ -110,7 +110,7 @@ def _sheet(
 
 def _records(result: Fit) -> Facts:
     """What was measured, with which errors, and how it was fitted."""
-    from rotorid.timedomain.plots import record_names
+    from rotorid.timedomain.models.record import record_names
 
     names = record_names([one.name for one in result.records])
     spans = [

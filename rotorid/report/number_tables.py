@@ -14,8 +14,8 @@ from rotorid.report.document import NOTHING, Cells
 if TYPE_CHECKING:
     from rotorid.report.rotor_figures import Drawing
 
-NARROW = 6
-"""Columns that a telephone shows side by side; rows of wider tables become blocks there."""
+NARROW, LETTERS = 6, 50
+"""Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
 
 
 def words(head: str, cells: Iterable[object]) -> Cells:
@@ -91,8 +91,11 @@ class Grid:
 
     @property
     def wide(self) -> bool:
-        """Whether it has more columns than a telephone shows side by side."""
-        return len(self.columns) > NARROW
+        """Whether it has more columns or letters than a telephone shows side by side."""
+        from markupsafe import Markup
+
+        cells = [[len(Markup(cell).striptags()) for cell in (one.head, *one.cells)] for one in self.columns]
+        return len(cells) > NARROW or sum(map(max, cells)) > LETTERS
 
     @property
     def whole(self) -> bool:

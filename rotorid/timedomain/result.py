@@ -17,7 +17,7 @@ from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.methods.iteration_history import Path
 from rotorid.timedomain.methods.multiple_starts import Minimum
 from rotorid.timedomain.models.ode_model import OdeModel
-from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.record import Record, record_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,8 +87,10 @@ class Fit(Answered, Path):
     def series(self) -> tuple[Column, ...]:
         """Of each output of each record: number and rms of its samples, and rms of what the model leaves."""
         each = [
-            (record.name, name, record.outputs[name], run.y[:, j] - record.outputs[name])
-            for record, run in zip(self.records, self.simulations, strict=False)
+            (short, name, record.outputs[name], run.y[:, j] - record.outputs[name])
+            for short, record, run in zip(
+                record_names([one.name for one in self.records]), self.records, self.simulations, strict=False
+            )
             for j, name in enumerate(self.model.outputs)
             if name in record.outputs
         ]
