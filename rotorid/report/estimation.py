@@ -38,11 +38,9 @@ def fit_report(
     Parameters
     ----------
     document
-        What `rotorid fit --json` prints, without the provenance.
+        What `rotorid fit --json` prints, without the `provenance`.
     result
         The fit it is from.
-    provenance
-        Program version, input files, date and options.
     model
         Text of the model file; empty: there was none.
     """

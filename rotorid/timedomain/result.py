@@ -92,7 +92,7 @@ class Fit(Answered, Path):
                 record_names([one.name for one in self.records]), self.records, self.simulations, strict=False
             )
             for j, name in enumerate(self.model.outputs)
-            if name in record.outputs
+            if not np.isnan(record.outputs.get(name, np.nan)).all()
         ]
         names, outputs, y, left = zip(*each, strict=True) if each else [()] * 4
         rms = [[float(np.sqrt(np.nanmean(x**2))) for x in table] for table in (y, left)]

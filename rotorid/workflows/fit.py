@@ -94,7 +94,7 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordFit(Parts):
-    """What the fit found; `model` is the text of the model's file."""
+    """What the fit found, and the text of the model's file."""
 
     fit: Fit
     model: str = ""

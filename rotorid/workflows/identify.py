@@ -63,10 +63,7 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Coefficients(Parts):
-    """What data told, and which frequencies to measure next; one of them may be missing.
-
-    `model` is the text of the model's file.
-    """
+    """What data told, and which frequencies to measure next, one perhaps missing; the text of the model."""
 
     identification: Identification | None
     design: Design | None

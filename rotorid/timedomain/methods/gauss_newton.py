@@ -51,7 +51,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, st
         step, theta = found.solution, new
         history.append(theta)
         costs.append(half_square(r))
-        met = stop.met(step, theta, found, costs)
+        met = stop.met(negligible(step, theta, found, stop.short), costs)
         found = problem.linear_fit(K, -r)
         # a minimum, not only a short step: the next one is no longer either
         converged = met is not None and negligible(found.solution, theta, found, stop.near)

@@ -43,13 +43,9 @@ def at(found: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
 
 @dataclass(frozen=True)
 class Stop:
-    """When an iteration ends: where no step matters, or with [F] at Δβ < ε or I(β) < ε, both relative here.
+    """When an iteration ends: where no step matters (None), or with [F] at Δβ < ε or I(β) < ε.
 
-    Attributes
-    ----------
-    tolerance
-        ε: a step below this part of each parameter, or one that changes the sum of squares by less than this
-        part of it; None: where no step matters.
+    Here ε, the `tolerance`, is a part of each parameter, and of I(β), half the sum of squares, its change.
     """
 
     tolerance: float | None = None
@@ -63,19 +59,15 @@ class Stop:
         """Limits of a next step that no longer matters, see `negligible`."""
         return (1e-8, 1e-5) if self.tolerance is None else (1e-6, 0.1)
 
-    def met(
-        self,
-        step: FloatArray,
-        theta: FloatArray,
-        found: Estimate,
-        costs: Sequence[float],
-        before: FloatArray | None = None,
-    ) -> str | None:
-        """Which condition holds after a step, "step" or "cost"."""
-        if self.tolerance is None:
-            return "step" if negligible(step, theta, found, (1e-9, 1e-5), before) else None
-        if negligible(step, theta, found, (self.tolerance, 0.0)):
-            return "step"
+    @property
+    def short(self) -> tuple[float, float]:
+        """Limits of the step that ends it."""
+        return (1e-9, 1e-5) if self.tolerance is None else (self.tolerance, 0.0)
+
+    def met(self, short: bool, costs: Sequence[float]) -> str | None:
+        """Which condition a step meets, "step" or "cost"; whether it is `short`, and the costs up to it."""
+        if short or self.tolerance is None:
+            return "step" if short else None
         return "cost" if abs(costs[-1] - costs[-2]) < self.tolerance * costs[-1] else None
 
     def words(self, by: str, iterations: int, converged: bool) -> str:

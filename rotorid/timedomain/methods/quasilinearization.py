@@ -81,7 +81,8 @@ def quasilinearization(
         costs.append(half_square(found.residuals))
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
-        met = stop.met(step, theta, found, costs, last)
+        earlier = last if stop.tolerance is None else None
+        met = stop.met(negligible(step, theta, found, stop.short, earlier), costs)
         converged = bool(met) and change < 1e-3 and negligible(step, theta, found, stop.near, last)
         if met and (converged or stop.tolerance is not None):
             ended, message = met, stop.words(met, len(history) - 1, converged)

@@ -393,13 +393,11 @@ def _recorded(
     import sympy
 
     found: dict[str, tuple[str, str]] = {}
-    for state in [x for x, value in initial.items() if value == "record" and "record" not in names]:
-        same = [
-            name
-            for name, text in outputs.items()
-            if expressions.parse(str(text), where=f"output {name}") == sympy.Symbol(state)
-        ]
-        if not same:
+    wanted = [x for x, value in initial.items() if value == "record" and "record" not in names]
+    told = {expressions.parse(str(e), where=f"output {y}"): y for y, e in outputs.items()} if wanted else {}
+    for state in wanted:
+        output = told.get(sympy.Symbol(state))
+        if output is None:
             raise ValueError(
                 f'initial {state}: "record" needs an output that is {state} alone, such as {state} = '
                 f'"{state}" in [outputs]; give a number, or a parameter to be estimated'
@@ -407,5 +405,5 @@ def _recorded(
         parameter = f"{state}_0"
         while parameter in names:
             parameter += "_"
-        found[state] = parameter, same[0]
+        found[state] = parameter, output
     return found

@@ -53,12 +53,10 @@ def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, flo
     """What the first samples say of initial states taken from the record, by name of the copies.
 
     They are starting values alone. [F] holds y(t0) at its sample ȳ0 = y0 + e, so that the estimate of θ
-    carries the error e without saying so. Here y0 is estimated, too: the sample is a row of the fit like
-    every other, (y0 − ȳ0)/σ0, which is what it tells of y0; a prior of the same value would count it twice.
-    With A = ∂y/∂θ and V = ∂y/∂y0 of all samples over their σ the fit inverts [A V]ᵀ[A V], and the
-    covariance of θ is the inverse of AᵀA − AᵀV (VᵀV)⁻¹ VᵀA: never less than (AᵀA)⁻¹, which takes y0 as
-    known, and the difference is what the error of the start does. From an exact record this finds what [F]
-    finds.
+    carries e without saying so. Here y0 is estimated, too: the row of the sample, (y0 − ȳ0)/σ0, is its
+    measurement, and a prior of the same value would count it twice. With A = ∂y/∂θ and V = ∂y/∂y0 of all
+    samples over their σ the covariance of θ is the inverse of AᵀA − AᵀV (VᵀV)⁻¹ VᵀA, never less than
+    (AᵀA)⁻¹, which takes y0 as known. From an exact record this finds what [F] finds.
 
     Raises
     ------

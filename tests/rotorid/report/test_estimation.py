@@ -191,3 +191,14 @@ def test_a_model_without_a_file_and_a_bound():
     sheet = read_sheet(fit(model, [Record(t, {"x": np.exp(-2 * t)})]).sheet())
     assert rows_of(sheet, PARAMETERS)[0][-1] == "at its bound"
     assert "as its file says" not in sheet.text
+
+
+def test_outputs_without_samples_are_left_out(recwarn):
+    outputs = {"x": "x", "y": "2*x", "z": "3*x"}
+    model = ode_model({"x": "-a*x"}, initial={"x": 1.0}, estimate={"a": 1.0}, outputs=outputs)
+    t = np.linspace(0.0, 3.0, 30)
+    record = Record(t, {"x": np.exp(-1.2 * t), "y": np.full(30, np.nan)})
+    found = fit(model, [record], FitOptions(allow_missing=True))
+    assert [one["output"] for one in found.document["series"]] == ["x"]
+    assert [row[0] for row in rows_of(read_sheet(found.sheet()), "Each signal")] == ["x"]
+    assert not recwarn.list
