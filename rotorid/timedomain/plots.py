@@ -83,7 +83,7 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     found = [
         (k, record, run.y[:, j] - record.outputs[name])
         for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
-        if name in record.outputs
+        if not np.isnan(record.outputs.get(name, np.nan)).all()
     ]
     if not found:
         words = "nothing measured" if result.simulations else "the states diverge: no residuals"
