@@ -399,8 +399,8 @@ def _recorded(
         output = told.get(sympy.Symbol(state))
         if output is None:
             raise ValueError(
-                f'initial {state}: "record" needs an output that is {state} alone, such as {state} = '
-                f'"{state}" in [outputs]; give a number, or a parameter to be estimated'
+                f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or '
+                "other states; give a number, or a parameter to be estimated"
             )
         parameter = f"{state}_0"
         while parameter in names:
