@@ -136,8 +136,8 @@ def test_a_file_says_it_once(tmp_path):
     with pytest.raises(ValueError, match='initial y1: "record" needs an output that is y1 alone') as said:
         read_ode_model(path)
     assert len(str(said.value).splitlines()) <= 2
-    path.write_text(text.replace('y1 = "record"', 'y1 = "recrod"'))
-    with pytest.raises(ValueError, match="recrod is none"):
+    path.write_text(text.replace('y1 = "record"', 'y1 = "measured"'))
+    with pytest.raises(ValueError, match="measured is none"):
         read_ode_model(path)
 
 
