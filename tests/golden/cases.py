@@ -195,6 +195,7 @@ trial-weight-model-all      trial-weight {MODEL_JOB} --output t.csv --plot t.png
 trial-weight-turbo          trial-weight {TURBO}/job.toml --share 30
 trial-weight-tried          trial-weight sample_data/bk_two_plane/job.toml --mass 2g --max-mass 3g
 trial-weight-nothing        trial-weight --speed 3000rpm
+balance-equations           balance {TURBO}/job.toml --method least-squares --show equations --table
 """
 
 MODEL_COMMANDS = f"""
@@ -226,10 +227,21 @@ identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/t
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
+identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
+identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
+identify-two-designs        identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --design 5:40:1
+simulate-lesson-5           simulate {IDENTIFY}/task_5_1/model.toml --with c=1000,alpha=10 --frequencies 10,20,30 --inputs F=10 --digits 2 --output x.csv --verbose
+simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --amplitude-error 2 --phase-error 1 --seed 1
+simulate-modes              simulate {IDENTIFY}/task_7_1/model.toml --with c1=1e4,c2=2e4,c3=5e3 --modes --digits 3
+simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.14,m1=12,m2=28 --times 0:50:2 --digits 5
+simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
+simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
+simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
+fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
 fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4
@@ -238,8 +250,19 @@ fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
+fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
+fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
+fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
+fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --tolerance 1e-3
+fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
+identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
+identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
+identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
+reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 validate                    validate --output numbers.csv
 validate-all                validate --all
 """
@@ -283,7 +306,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "schema", "validate"),
 )
 
 MODELLED = {
@@ -300,13 +323,36 @@ ALIKE = {
         "trial 1,middle,800,0\ntrial 2,left,400,90\ntrial 2,middle,400,90\n",
     )
 }
+MASS = {
+    "mass.toml": (
+        f"{IDENTIFY}/task_5_1/model.toml",
+        'known = { m = 10.0 }\nestimate = ["c", "alpha"]',
+        'estimate = ["c", "alpha", "m"]',
+    )
+}
 EDITS = {
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
     },
+    "identify-two-models": MASS,
+    "identify-two-designs": MASS,
+    "simulate-resonance": {
+        "undamped.toml": (
+            f"{IDENTIFY}/task_5_1/model.toml",
+            '(m*p**2 + alpha*p + c)*X = F",\n]\nknown = { m = 10.0 }\nestimate = ["c", "alpha"]',
+            '(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]',
+        )
+    },
     "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
+    "fit-not-measured": {
+        "unmeasured.toml": (
+            f"{FIT}/three_masses/from_record.toml",
+            "[estimate]",
+            "[nuisance]\noffset = true\n[estimate]",
+        ),
+    },
     "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},
     "balance-missing-run": {"short.csv": (f"{TURBO}/weights.csv", "trial 3", "trial 4")},
     "balance-undetermined": ALIKE,

@@ -15,9 +15,9 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
-from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.integration.simulate import HEUN, Parts, SimulationError, heun_step, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
-from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -25,23 +25,23 @@ from rotorid.timedomain.models.record import Record
 
 
 def quasilinearization(
-    problem: Problem, start: FloatArray, curves: Sequence[Curve], *, max_iterations: int, tolerance: float
+    problem: Problem, start: FloatArray, curves: Sequence[Curve], *, max_iterations: int, stop: Stop
 ) -> Path:
     """Iterate linear fits about the last trajectory until neither it nor the parameters change.
 
     Parameters
     ----------
     problem
-        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, with any
-        other the linear equations are solved by collocation.
+        Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
+        [Q] does; with any other the linear equations are solved by collocation.
     start
         First parameters (n,).
     curves
         First trajectory of each record.
     max_iterations
         Steps at most.
-    tolerance
-        A step below this, relative to the parameters, is negligible.
+    stop
+        When to end.
 
     Raises
     ------
@@ -56,6 +56,7 @@ def quasilinearization(
     found: Estimate | None = None
     step: FloatArray | None = None
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
+    ended: str | None = None
     for _ in range(max_iterations):
         if found is not None and problem.late:
             message = (
@@ -80,8 +81,11 @@ def quasilinearization(
         costs.append(half_square(found.residuals))
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
-        if negligible(step, theta, found, tolerance, last) and change < 1e-3:
-            converged, message = True, f"converged in {counted(len(history) - 1, 'iteration')}"
+        earlier = last if stop.tolerance is None else None
+        met = stop.met(negligible(step, theta, found, stop.short, earlier), costs)
+        converged = bool(met) and change < 1e-3 and negligible(step, theta, found, stop.near, last)
+        if met and (converged or stop.tolerance is not None):
+            ended, message = met, stop.words(met, len(history) - 1, converged)
             break
     if found is None:
         raise ValueError("max_iterations must be at least 1")
@@ -89,7 +93,7 @@ def quasilinearization(
     if not np.isfinite(r).all():
         converged, message, r = False, f"not converged: {problem.failure}", -found.residuals
     path, size = np.array(history), np.array(costs)
-    return Path(at(found, theta, r), path, size, converged, message, (), tuple(trajectories))
+    return Path(at(found, theta, r), path, size, converged, message, (), tuple(trajectories), ended)
 
 
 def linear_solutions(
@@ -108,8 +112,9 @@ def linear_solutions(
     if not model.states or len(t) == 1:
         table = np.broadcast_to(first, (len(t), *shape)).copy()
         return table, lambda at: np.broadcast_to(first, (*np.shape(at), *shape))
-    if problem.integrator == "heun":
-        table = _heun(model, theta, curve(t), record, first)
+    if problem.integrator in HEUN:
+        parts = HEUN[problem.integrator](len(model.states))
+        table = _heun(model, theta, curve(t), record, first, parts)
         flat = table.reshape(len(t), -1)
 
         def straight(at: FloatArray) -> FloatArray:
@@ -120,7 +125,9 @@ def linear_solutions(
     return _collocated(model, theta, curve, record, first)
 
 
-def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray) -> FloatArray:
+def _heun(
+    model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray, parts: Parts
+) -> FloatArray:
     t, u = record.t, inputs_of(model, record)
     A = model.f_x(t, x, theta, u)
     b = model.f(t, x, theta, u) - np.einsum("tij,tj->ti", A, x)
@@ -129,9 +136,7 @@ def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, fir
     table[0] = w = first
     with np.errstate(all="ignore"):
         for i, h in enumerate(np.diff(t)):
-            slope = A[i] @ w + B[i]
-            w = w + h / 2 * (slope + A[i + 1] @ (w + h * slope) + B[i + 1])
-            table[i + 1] = w
+            table[i + 1] = w = heun_step(lambda j, w: A[j] @ w + B[j], i, i + 1, w, h, parts)
     if not np.isfinite(table).all():
         raise SimulationError(
             "the linearised equations have no finite solution; start from another trajectory"

@@ -18,13 +18,18 @@ def table(name):
     return np.loadtxt(DATA / f"quasilinearization_{name}.csv", delimiter=",", skiprows=1)[:, 1:]
 
 
-def test_tables_of_the_book_with_heun():
-    found = fit(book_model(), book_record(), method="quasilinearization", integrator="heun", trajectory=FIRST)
+@pytest.mark.parametrize(
+    ("integrator", "first", "near"), [("heun", FIRST, 5e-3), ("sequential-heun", "model", 6e-4)]
+)
+def test_tables_of_the_book(integrator, first, near):
+    """The first trajectory of the print is that of its own scheme; most states are printed to 1e-3."""
+    options = {"method": "quasilinearization", "trajectory": first}
+    found = fit(book_model(), book_record(), integrator=integrator, **options)
     parameters = table("table_2_3")
-    assert found.history[:7] == pytest.approx(parameters, abs=0.005 * np.ptp(parameters))
+    assert found.history[:7] == pytest.approx(parameters, abs=near * np.ptp(parameters))
     states = table("table_2_2")
     for k in range(6):
-        assert found.trajectories[k][0] == pytest.approx(states[:, 2 * k : 2 * k + 2], abs=5e-3)
+        assert found.trajectories[k][0] == pytest.approx(states[:, 2 * k : 2 * k + 2], abs=near)
     assert any("more accurate integration" in text for text in found.warnings)
 
 
@@ -94,3 +99,14 @@ def test_what_it_does_not_know():
         fit(book_model(), book_record(), method="quasilinearization", trajectory={"x1": 1.0})
     with pytest.raises(ValueError, match="heun"):
         fit(decay(), decay_record(), method="quasilinearization", integrator="rk4")
+
+
+def test_a_tolerance_ends_it():
+    """The step that [Q] prints in table 2.3, against the one that is asked for."""
+    every = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST)
+    found = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST, tolerance=0.01)
+    steps = np.abs(np.diff(every.history, axis=0) / every.history[1:]).max(axis=1)
+    first = int(np.flatnonzero(steps < 0.01)[0]) + 1
+    assert (found.iterations, found.stopped_by, every.stopped_by) == (first, "step", "step")
+    assert found.iterations < every.iterations
+    assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-4)
