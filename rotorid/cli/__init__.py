@@ -21,6 +21,7 @@ from rotorid.cli.commands import (
     fit,
     identify,
     influence,
+    modes,
     reduce,
     response,
     schema,
@@ -56,7 +57,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit},
+    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit, "modes": modes.modes},
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():

@@ -79,7 +79,7 @@ class Comparison:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(predicted) / np.abs(self.measured)
         near = (ratio < TRUSTED) & (ratio > 1 / TRUSTED)
-        whiten, _ = _whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
+        whiten, _ = whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
         return replace(self, whiten=whiten, _last={})
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -95,7 +95,7 @@ class Comparison:
             shape = self.measured[i].real
             mode = nearest_mode(z, v, float(self.experiments.frequencies[i]), shape)
             if mode is not None:
-                reference = _reference(shape)
+                reference = reference_point(shape)
                 frequencies[i] = np.sqrt(mode[0])
                 Z[i] = mode[1] / mode[1][reference] * shape[reference]
         return Z, frequencies
@@ -140,7 +140,7 @@ class Comparison:
         parts = []
         for i, (A, dA, z, v) in zip(self.free, self._modes(theta), strict=True):
             shape, omega = self.measured[i].real, float(self.experiments.frequencies[i])
-            reference = _reference(shape)
+            reference = reference_point(shape)
             others = np.flatnonzero(~np.isnan(shape) & (np.arange(len(shape)) != reference))
             mode = nearest_mode(z, v, omega, shape)
             if mode is None or mode[1][reference] == 0:
@@ -149,8 +149,10 @@ class Comparison:
             dz, dw = mode_slopes(A, dA, mode[0], w, reference)
             root = np.sqrt(mode[0])
             over = self.whiten[i, :, 0, 0]
-            # the frequency has the relative error of the reference amplitude
+            # without an error of its own the frequency has the relative one of the reference amplitude
             share = over[reference] * abs(shape[reference]) / omega
+            if self.experiments.frequency_std is not None:
+                share = 1 / self.experiments.frequency_std[i]
             r = np.concatenate(
                 ([(root - omega) * share], over[others] * (w * shape[reference] - shape)[others])
             )
@@ -179,7 +181,7 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     left_out = _left_out(experiments, model, given, np.asarray(known))
     if not len(forced) and not len(free):
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
-    whiten, warnings = _whitening(experiments, outputs, measured)
+    whiten, warnings = whitening(experiments, outputs, measured)
     rows = [
         (i, outputs[j], part)
         for i in forced
@@ -187,7 +189,7 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
         for part in ("amplitude", "phase")
     ]
     for i in free:
-        reference = _reference(measured[i].real)
+        reference = reference_point(measured[i].real)
         rows.append((i, outputs[reference], "frequency"))
         rows += [(i, outputs[j], "shape") for j in np.flatnonzero(given[i]) if j != reference]
     return Comparison(
@@ -223,13 +225,13 @@ def _left_out(
     return tuple(words)
 
 
-def _reference(shape: FloatArray) -> int:
+def reference_point(shape: FloatArray) -> int:
     """The first measured amplitude that is no node of the mode."""
     size = np.nan_to_num(np.abs(shape))
     return int(np.flatnonzero(size >= 0.1 * size.max())[0])
 
 
-def _whitening(
+def whitening(
     experiments: Experiments, outputs: tuple[str, ...], amplitudes: ComplexArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across; and warnings."""

@@ -119,7 +119,7 @@ def identify(
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
         model = read_harmonic_model(file_of(model, "a model"))
-    file = replace(model, errors=_errors(model.errors, options.amplitude_error, options.phase_error))
+    file = replace(model, errors=stated_errors(model.errors, options.amplitude_error, options.phase_error))
     result = None
     if data is not None:
         if not isinstance(data, Experiments):
@@ -152,7 +152,7 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
         refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
 
 
-def _errors(
+def stated_errors(
     stated: AmplitudeErrors | None, percent: float | None, degrees: float | None
 ) -> AmplitudeErrors | None:
     """Errors of the model file, those of the options before them."""

@@ -1,0 +1,162 @@
+"""Modes fitted to amplitudes: frequencies, damping and shapes with errors, and what speaks against them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import counted, error_figures, listing
+from rotorid.base.unit_words import Shown
+from rotorid.harmonic.comparison import reference_point
+from rotorid.harmonic.plausibility import misfit
+from rotorid.regression.nonlinear import NonlinearEstimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LARGEST = 10.0
+"""No relative error of a shape is told as larger: there its amplitude is 0."""
+RARE, EXACT = 1e-3, 1e-3
+"""Probability below which chance explains nothing; a share of a shape that nobody minds."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModes(Answered):
+    """Modes from amplitudes.
+
+    Attributes
+    ----------
+    points
+        Where amplitudes were read, length P.
+    fit
+        ω_r in rad/s, then ζ_r.
+    residues, spread
+        R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for the variance
+        of the residuals where no errors are stated.
+    ends
+        First and last frequency around each resonance, rad/s.
+    axis
+        How people see frequencies.
+    """
+
+    points: tuple[str, ...]
+    fit: NonlinearEstimate
+    residues: ComplexArray
+    spread: FloatArray
+    ends: tuple[tuple[float, float], ...]
+    axis: Shown
+
+    @cached_property
+    def undetermined(self) -> tuple[str, ...]:
+        """Why there are no modes to go on with, in words."""
+        found = [] if self.fit.converged else [self.fit.message]
+        std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
+        values, errors = self.fit.estimate.solution.reshape(2, -1), std.reshape(2, -1)
+        for mode, (low, high) in enumerate(self.ends):
+            (omega, zeta), (error, other) = values[:, mode], errors[:, mode]
+            if not low < omega < high:
+                found.append(f"mode {mode + 1} ({omega:.5g} rad/s) is read on one side only")
+            elif not 2 * error < high - low:
+                found.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
+            elif zeta + 2 * other < 0:
+                found.append(f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads")
+        return tuple(found)
+
+    @cached_property
+    def parts(self) -> tuple[FloatArray, FloatArray]:
+        """Residues along and across the common phase of their mode, and their variances, (2, k, P) each."""
+        phase = np.angle((self.residues**2 / np.trace(self.spread, axis1=2, axis2=3)).sum(axis=1)) / 2
+        turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
+        turned = self.residues * np.exp(-1j * phase[:, None])
+        estimate = self.fit.estimate
+        unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
+        variances = np.einsum("aik,kpij,ajk->akp", turn, self.spread, turn)
+        return np.stack((turned.real, turned.imag)), variances * (1.0 if estimate.errors_stated else unit)
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Real shapes (k, P); the first point that is no node of a mode has 1."""
+        return np.array([s / s[reference_point(s)] for s in self.parts[0][0]])
+
+    @property
+    def shape_std(self) -> FloatArray:
+        """Relative standard deviations (k, P), independent from point to point; NaN where unknown."""
+        return np.asarray(np.minimum(np.sqrt(self.parts[1][0]) / np.abs(self.parts[0][0]), LARGEST))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What must be known before the numbers are used."""
+        from scipy.special import chdtrc
+
+        (along, across), (_, variances) = self.parts
+        lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
+        chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
+        minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
+        return (
+            *self.undetermined,
+            *misfit(self.fit.estimate),
+            *(
+                f"mode {mode + 1} is complex: its phases scatter by {np.degrees(np.sqrt(lost[mode])):.2g}°, more "
+                "than errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
+                for mode in np.flatnonzero((chance < RARE) & (lost > minded))
+            ),
+        )
+
+    def columns(self) -> tuple[Column, ...]:
+        """The table of modes that `reduce` and `identify` read, a row per mode and point."""
+        P, k = len(self.points), len(self.ends)
+        omega, zeta = np.repeat(self.fit.estimate.solution, P).reshape(2, -1)
+        told = [
+            Column("mode", np.repeat(np.arange(1, k + 1), P)),
+            Column("frequency_rad_s", omega),
+            Column("node", self.points * k),
+            Column("shape", self.shapes.ravel()),
+            Column("damping_percent", 100 * zeta),
+        ]
+        if self.fit.std is not None and not np.isnan(self.shape_std).any():
+            errors = np.repeat(self.fit.std, P).reshape(2, -1)
+            told.append(Column("frequency_std_percent", 100 * errors[0] / omega))
+            told.append(Column("shape_std_percent", 100 * self.shape_std.ravel()))
+            told.append(Column("damping_std_percent", 100 * errors[1] / np.abs(zeta)))
+        return tuple(told)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        modes = [] if self.undetermined else rows(self.columns())
+        return plain({**self.fit.estimate.to_dict(), "modes": modes, "warnings": self.warnings})
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table of modes; ValueError where one is not determined, for a part would look like all."""
+        if self.undetermined:
+            raise ValueError(f"there is no table of modes: {self.undetermined[0]}")
+        return frame(self.columns())
+
+    @property
+    def answer(self) -> Answer:
+        """Frequencies and damping with their errors, shapes, and what speaks against them."""
+        estimate = self.fit.estimate
+        if self.undetermined:
+            return Answer("Not every mode is determined: no table of modes.", "", self.warnings)
+        told = [f"{self.axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
+        shapes = [Column("point", self.points, str)]
+        for mode, (shape, std) in enumerate(zip(self.shapes, self.shape_std, strict=True), 1):
+            shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
+            shapes.append(Column("±", np.abs(shape) * std, error_figures))
+        notes = ["ω in rad/s, ζ of critical damping", *estimate.told().notes]
+        if not estimate.errors_stated:
+            notes.append(
+                "errors are not stated: taken as the same share of every amplitude, from what is left"
+            )
+        return Answer(
+            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {self.axis.word.rpartition(', ')[2]}.",
+            f"{estimate.told().found}\n\n{text(shapes, width=COLUMNS)}",
+            self.warnings,
+            tuple(notes),
+        )
