@@ -57,7 +57,11 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit, "modes": modes.modes},
+    "Identify coefficients": {
+        "identify": identify.identify,
+        "fit": fit.fit,
+        "modes": modes.modes,
+    },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():
@@ -95,9 +99,7 @@ def _rotorid(
 def _overview() -> str:
     """The jobs, each with the first example of its first command, and their commands."""
     lines = [
-        "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
-        "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
-        "",
+        "An example of each job, run in a checkout (else: rotorid demo DIR). More: rotorid COMMAND --help"
     ]
     for job, commands in _COMMANDS.items():
         told = {name: command.__doc__ or "" for name, command in commands.items()}

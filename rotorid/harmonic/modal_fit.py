@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -64,13 +65,9 @@ class Readings:
         """One of these for every point."""
         return [self.point(p, q)[what] for p in range(self.Z.shape[1])]
 
-    def residual(self, q: FloatArray) -> FloatArray:
-        """What no R, a and b explain, over its error: as many numbers as are left."""
-        return np.concatenate(self.each(0, q))
-
-    def jacobian(self, q: FloatArray) -> FloatArray:
-        """Its slopes but for those of the projector (Kaufman)."""
-        return np.concatenate(self.each(1, q))
+    def rows(self, what: int, q: FloatArray) -> AnyArray:
+        """One of these of all points together."""
+        return np.concatenate(self.each(what, q))
 
 
 def fit_modes(
@@ -102,6 +99,8 @@ def fit_modes(
     if bands is not None:
         omega = experiments.frequencies[order]
         order = order[np.any([(omega >= low) & (omega <= high) for low, high in bands], axis=0)]
+    if not len(order):
+        raise ValueError("there are no readings in --bands")
     experiments, excitation = experiments.take(order), excitation[order]
     omega, Z = experiments.frequencies, experiments.table(points)
     H = Z / excitation[:, None]
@@ -121,17 +120,24 @@ def fit_modes(
     fitted = Z
     for turn in range(ROUNDS):
         readings = Readings(omega, excitation, Z, whitening(experiments, tuple(points), fitted)[0])
-        functions = readings.residual, readings.jacobian
         fit = nonlinear_least_squares(
-            *functions, q, names=names, sigma_stated=experiments.stated, bounds=bounds, near=turn > 0
+            partial(readings.rows, 0),
+            partial(readings.rows, 1),
+            q,
+            names=names,
+            sigma_stated=experiments.stated,
+            bounds=bounds,
+            near=turn > 0,
         )
         q = fit.estimate.solution
-        fitted = readings.basis(q)[0] @ np.transpose(readings.each(2, q))
-        ratio = np.abs(fitted) / np.abs(Z)
-        fitted = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), fitted, Z)
+        model = readings.basis(q)[0] @ np.transpose(readings.each(2, q))
+        ratio = np.abs(model) / np.abs(Z)
+        fitted = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
+    left = np.nan_to_num((Z - model) / np.abs(model))
+    trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
     residues = np.transpose(readings.each(2, q))[: len(rows)]
     spread = np.swapaxes(readings.each(3, q), 0, 1)[: len(rows)]
-    return FittedModes(tuple(points), fit, residues, spread, ends, experiments.axis)
+    return FittedModes(tuple(points), fit, residues, spread, ends, float(trend), experiments.axis)
 
 
 def _peaks(omega: FloatArray, H: ComplexArray) -> list[tuple[float, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 LARGEST = 10.0
-"""No relative error of a shape is told as larger: there its amplitude is 0."""
+"""No relative error of a shape is larger: amplitudes that are 0 within it are told as that share of it."""
 RARE, EXACT = 1e-3, 1e-3
 """Probability below which chance explains nothing; a share of a shape that nobody minds."""
 
@@ -42,6 +42,8 @@ class FittedModes(Answered):
         of the residuals where no errors are stated.
     ends
         First and last frequency around each resonance, rad/s.
+    trend
+        Correlation of neighbouring residuals, in its standard deviations.
     axis
         How people see frequencies.
     """
@@ -51,6 +53,7 @@ class FittedModes(Answered):
     residues: ComplexArray
     spread: FloatArray
     ends: tuple[tuple[float, float], ...]
+    trend: float
     axis: Shown
 
     @cached_property
@@ -58,15 +61,16 @@ class FittedModes(Answered):
         """Why there are no modes to go on with, in words."""
         found = [] if self.fit.converged else [self.fit.message]
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
-        values, errors = self.fit.estimate.solution.reshape(2, -1), std.reshape(2, -1)
-        for mode, (low, high) in enumerate(self.ends):
-            (omega, zeta), (error, other) = values[:, mode], errors[:, mode]
+        told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
+        for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
+            zip(told, self.ends, strict=True), 1
+        ):
             if not low < omega < high:
-                found.append(f"mode {mode + 1} ({omega:.5g} rad/s) is read on one side only")
+                found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
             elif not 2 * error < high - low:
-                found.append(f"these readings do not tell frequency and damping of mode {mode + 1}")
+                found.append(f"these readings do not tell frequency and damping of mode {mode}")
             elif zeta + 2 * other < 0:
-                found.append(f"the damping of mode {mode + 1} is negative ({zeta:.2g}): phases must be leads")
+                found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
         return tuple(found)
 
     @cached_property
@@ -78,7 +82,9 @@ class FittedModes(Answered):
         estimate = self.fit.estimate
         unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
         variances = np.einsum("aik,kpij,ajk->akp", turn, self.spread, turn)
-        return np.stack((turned.real, turned.imag)), variances * (1.0 if estimate.errors_stated else unit)
+        variances *= 1.0 if estimate.errors_stated else unit
+        least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
+        return np.stack((np.copysign(least, turned.real), turned.imag)), variances
 
     @property
     def shapes(self) -> FloatArray:
@@ -88,22 +94,25 @@ class FittedModes(Answered):
     @property
     def shape_std(self) -> FloatArray:
         """Relative standard deviations (k, P), independent from point to point; NaN where unknown."""
-        return np.asarray(np.minimum(np.sqrt(self.parts[1][0]) / np.abs(self.parts[0][0]), LARGEST))
+        return np.asarray(np.sqrt(self.parts[1][0]) / np.abs(self.parts[0][0]))
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What must be known before the numbers are used."""
-        from scipy.special import chdtrc
+        from scipy.special import chdtrc, ndtr
 
         (along, across), (_, variances) = self.parts
         lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
         chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
         minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
+        misfits = [*misfit(self.fit.estimate)]
+        if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
+            misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
         return (
             *self.undetermined,
-            *misfit(self.fit.estimate),
+            *(f"{why}; or another mode is in the range (--bands)" for why in misfits),
             *(
-                f"mode {mode + 1} is complex: its phases scatter by {np.degrees(np.sqrt(lost[mode])):.2g}°, more "
+                f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°, more "
                 "than errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
                 for mode in np.flatnonzero((chance < RARE) & (lost > minded))
             ),
@@ -129,8 +138,10 @@ class FittedModes(Answered):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
-        modes = [] if self.undetermined else rows(self.columns())
-        return plain({**self.fit.estimate.to_dict(), "modes": modes, "warnings": self.warnings})
+        estimate, modes = self.fit.estimate, [] if self.undetermined else rows(self.columns())
+        if self.undetermined:
+            estimate = replace(estimate, values=estimate.values * np.nan, covariance=None)
+        return plain({**estimate.to_dict(), "modes": modes, "warnings": self.warnings})
 
     def to_frame(self) -> pd.DataFrame:
         """The table of modes; ValueError where one is not determined, for a part would look like all."""

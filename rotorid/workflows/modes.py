@@ -26,8 +26,8 @@ class ModesOptions:
     Attributes
     ----------
     excitation
-        A force (of a shaker, constant or in columns F; the same holds for a shaken base), or an unbalance,
-        whose force grows with the square of the speed.
+        A force (constant or in columns F; or a shaken base), or an unbalance, whose force grows with the
+        square of the speed.
     bands : LIST
         Around each resonance, one mode in each: 120:150,500:580 in rad/s, or 20:25Hz,80:90Hz; default:
         around each peak.
@@ -64,7 +64,7 @@ def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
     Raises
     ------
     ValueError
-        For a table or an option that cannot be, and readings that show no resonance.
+        For a table or an option that cannot be, and for readings without a resonance.
     """
     import numpy as np
 

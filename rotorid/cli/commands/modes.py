@@ -27,11 +27,9 @@ def modes(
 ) -> None:
     """Natural frequencies, damping and shapes from amplitudes around resonances, with ±.
 
+    The table of modes is for `reduce --measured`, and for `identify` in place of amplitudes.
+
     Example: rotorid modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2
     --phase-error 1 --output modes.csv
-
-    The table of modes is what `reduce --measured` and `identify` read:
-
-    Example: rotorid identify sample_data/identify/task_7_1/model.toml sample_data/modes/modes.csv
     """
     to.deliver("modes", lambda: work(data, options))

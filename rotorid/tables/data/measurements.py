@@ -131,8 +131,8 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
         part = next(f"{name}_{part}" for part in ("amplitude", "re") if f"{name}_{part}" in table)
         bad = (omega == 0) | ((name == "F") & (np.isnan(values) | (values == 0)))
         table.complain_where(bad, part, "a frequency above 0, and a force F that is not 0")
-        if np.isnan(values).all():
-            table.as_whole(table.fields[part].name, "a number in at least one row, or no such column")
+        if not np.nan_to_num(values).any():
+            table.as_whole(table.fields[part].name, "a number that is not 0 in at least one row")
         order = {"velocity": 1, "acceleration": 2}.get(table.unit(part).kind, 0)
         signals[name] = values / (1j * np.where(bad, 1.0, omega)) ** order
     problems.stop()
@@ -167,7 +167,7 @@ def _free_vibrations(path: str | Path, model: HarmonicModel, file: HarmonicFile 
         np.ones(k, dtype=bool),
         errors,
         covariances,
-        frequency_std=None if own is None else own * modes.frequencies,
+        frequency_std=own * modes.frequencies if own is not None and own.all() else None,
     )
 
 
