@@ -13,7 +13,7 @@ from rotorid.workflows.option_values import Band, band, one_of
 from rotorid.workflows.result_provenance import Found, phase, provenance, workflow
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.modal_result import FittedModes
+    from rotorid.harmonic.modal.modal_result import FittedModes
 
 Excitation = Literal["force", "unbalance"]
 """What excites: the same, or as F, at every frequency; or growing with its square."""
@@ -68,7 +68,7 @@ def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
     """
     import numpy as np
 
-    from rotorid.harmonic.modal_fit import fit_modes
+    from rotorid.harmonic.modal.modal_fit import fit_modes
     from rotorid.tables.data.measurements import read_amplitudes
 
     one_of(options.excitation, "--excitation", get_args(Excitation))

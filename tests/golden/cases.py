@@ -73,6 +73,7 @@ GIVEN = (
     "reduce --compliance sample_data/book_task_9/compliance.csv --measured sample_data/book_task_9/modes.csv"
 )
 IDENTIFY, FIT = "sample_data/identify", "sample_data/fit"
+SHAKEN = "modes sample_data/modes/amplitudes.csv --excitation force"
 PROBES = '--sensors "probe DE:45,probe NDE:45"'
 
 ROTOR_COMMANDS = f"""
@@ -228,6 +229,11 @@ identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
+identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
+modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
+modes-band                  {SHAKEN} --bands 24:28
+modes-one-side              {SHAKEN} --bands 25:26.2
+modes-no-reading            {SHAKEN} --bands 100:120Hz
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
@@ -283,7 +289,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "modes", "schema", "validate"),
 )
 
 MODELLED = {

@@ -1,73 +1,24 @@
-"""Modes from amplitudes around resonances, the measurements that [S] lesson 7 begins with.
-
-At every point X = e (Σ_r R_r / (1 − (ω/ω_r)² + 2 i ζ_r ω/ω_r) + a + b / ω²): all points have the same ω_r and
-ζ_r; e is the excitation, a and b stand for modes above and below the range. R, a and b are linear and
-eliminated (variable projection), so the search has two parameters a mode. It begins with circles: a resonance
-with a constant neighbour is one (Kennedy and Pancu, 1947).
-"""
+"""The search for modes: from the peaks and their circles, with errors at the fitted amplitudes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.comparison import TRUSTED, whitening
 from rotorid.harmonic.experiments import Experiments
-from rotorid.harmonic.modal_result import FittedModes
+from rotorid.harmonic.modal.modal_readings import Readings
+from rotorid.harmonic.modal.modal_result import FittedModes
 from rotorid.regression.nonlinear import nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """Amplitudes Z (n, P) under excitations (n,), and what whitens them (n, P, 2, 2)."""
-
-    omega: FloatArray
-    excitation: ComplexArray
-    Z: ComplexArray
-    root: FloatArray
-
-    def basis(self, q: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-        """What R, a and b multiply (n, k + 2), and its slopes by q = (ω_r, ζ_r), (n, 2k)."""
-        own, damping = np.split(q, 2)
-        u, e = self.omega[:, None] / own, self.excitation[:, None]
-        g = 1 / (1 - u**2 + 2j * damping * u)
-        slopes = -np.tile(g**2, 2) * np.hstack(((2 * u**2 - 2j * damping * u) / own, 2j * u))
-        return e * np.hstack((g, u[:, :1] ** 0, u[:, :1] ** -2)), e * slopes
-
-    def point(self, p: int, q: FloatArray) -> tuple[AnyArray, ...]:
-        """Of a point what R, a and b do not explain, its slopes, R, a and b, and their covariances."""
-        seen = ~np.isnan(self.Z[:, p])
-
-        def real(z: ComplexArray) -> FloatArray:
-            parts = self.root[seen, p] @ np.stack((z[seen].real, z[seen].imag), axis=1)
-            return np.asarray(parts.reshape(-1, z.shape[1]))
-
-        columns, slopes = self.basis(q)
-        design = real(np.stack((columns, 1j * columns), axis=-1).reshape(len(seen), -1))
-        y, size = real(self.Z[:, [p]])[:, 0], design.shape[1]
-        Q, R = np.linalg.qr(design, mode="complete")
-        rest, inverse = Q[:, size:].T, np.linalg.inv(R[:size])
-        c = (inverse @ (Q[:, :size].T @ y)).reshape(-1, 2) @ (1, 1j)
-        spread = np.einsum("iaib->iab", (inverse @ inverse.T).reshape(len(c), 2, -1, 2))
-        return rest @ y, -rest @ real(slopes * np.tile(c[: len(c) - 2], 2)), c, spread
-
-    def each(self, what: int, q: FloatArray) -> list[AnyArray]:
-        """One of these for every point."""
-        return [self.point(p, q)[what] for p in range(self.Z.shape[1])]
-
-    def rows(self, what: int, q: FloatArray) -> AnyArray:
-        """One of these of all points together."""
-        return np.concatenate(self.each(what, q))
 
 
 def fit_modes(
@@ -163,7 +114,7 @@ def _peaks(omega: FloatArray, H: ComplexArray) -> list[tuple[float, float]]:
 def _circle(omega: FloatArray, H: ComplexArray) -> tuple[float, float]:
     """ω_r and ζ_r of the circles through responses (n, P): H (s − ω²) = c + a ω² with s = ω_r² (1 + 2 i ζ_r).
 
-    It is linear in s, which all points share, and in c and a of each.
+    It is linear in s, which all points share, and in c and a of each (Kennedy and Pancu, 1947).
     """
     top, bottom = 0j, np.finfo(float).tiny
     for h in H.T:
