@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rotorid.timedomain import OdeModel, Record
     from rotorid.timedomain.result import Fit
 
-WITHOUT_CONTROL = ("expm", "heun", "rk4")
+WITHOUT_CONTROL = ("expm", "heun", "sequential-heun", "rk4")
 """Integrators that know no tolerance."""
 Values = str | Mapping[str, float]
 """As "k=2,d=0.1", or by name."""
