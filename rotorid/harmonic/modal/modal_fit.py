@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -10,13 +11,18 @@ import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.harmonic.comparison import TRUSTED, whitening
-from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
 from rotorid.harmonic.modal.modal_readings import Readings
 from rotorid.harmonic.modal.modal_result import FittedModes
-from rotorid.regression.nonlinear import nonlinear_least_squares
+from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
 
 PROMINENCE, SKIRT = 1.4, 4.0
 """A mode's peak stands so many times above its valleys; its circle is fitted down to this fraction of it."""
+UNSTATED = {
+    "share of every amplitude": AmplitudeErrors(1.0, 1.0),
+    "size everywhere": AmplitudeErrors(floor=1.0),
+}
+"""What errors are the same in, if none are stated: what the readings make more likely."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
 
@@ -32,7 +38,7 @@ def fit_modes(
     Parameters
     ----------
     experiments
-        Harmonic tests with their errors; where none are stated, all amplitudes have the same relative one.
+        Harmonic tests with their errors; where none are stated, see `UNSTATED`.
     points
         Names of the signals.
     excitation
@@ -67,16 +73,42 @@ def fit_modes(
     names = [f"{letter}{mode}" for letter in "ωζ" for mode in range(1, len(rows) + 1)]
     ends = tuple((float(omega[row[0]]), float(omega[row[-1]])) for row in rows)
     # −ω with −ζ is the same mode, and far from its readings a mode is another's neighbour
-    bounds = {name: (low / 2, 2 * high) for name, (low, high) in zip(names, ends, strict=False)}
-    fitted = Z
+    limits = [*((low / 2, 2 * high) for low, high in ends), *[(-1.0, 1.0)] * len(ends)]
+    bounds = dict(zip(names, limits, strict=True))
+    kinds = [experiments.errors] if experiments.errors else [*UNSTATED.values()]
+    found = [
+        _search(replace(experiments, errors=errors), points, excitation, q, bounds, experiments.stated)
+        for errors in kinds
+    ]
+    best = max(found, key=lambda one: one[0])
+    _, fit, readings, left = best
+    q = fit.estimate.solution
+    trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
+    residues = np.transpose(readings.each(2, q))[: len(rows)]
+    spread = np.swapaxes(readings.each(3, q), 0, 1)[: len(rows)]
+    same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
+    return FittedModes(tuple(points), fit, residues, spread, ends, float(trend), same, experiments.axis)
+
+
+def _search(
+    experiments: Experiments,
+    points: Sequence[str],
+    excitation: ComplexArray,
+    q: FloatArray,
+    bounds: Bounds,
+    stated: bool,
+) -> tuple[float, NonlinearEstimate, Readings, ComplexArray]:
+    """Likelihood (its logarithm but for a constant), fit, readings, and what is left of these relatively."""
+    fitted = Z = experiments.table(points)
     for turn in range(ROUNDS):
-        readings = Readings(omega, excitation, Z, whitening(experiments, tuple(points), fitted)[0])
+        root, _ = whitening(experiments, tuple(points), fitted)
+        readings = Readings(experiments.frequencies, excitation, Z, root)
         fit = nonlinear_least_squares(
             partial(readings.rows, 0),
             partial(readings.rows, 1),
             q,
-            names=names,
-            sigma_stated=experiments.stated,
+            names=list(bounds),
+            sigma_stated=stated,
             bounds=bounds,
             near=turn > 0,
         )
@@ -84,11 +116,9 @@ def fit_modes(
         model = readings.basis(q)[0] @ np.transpose(readings.each(2, q))
         ratio = np.abs(model) / np.abs(Z)
         fitted = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
-    left = np.nan_to_num((Z - model) / np.abs(model))
-    trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    residues = np.transpose(readings.each(2, q))[: len(rows)]
-    spread = np.swapaxes(readings.each(3, q), 0, 1)[: len(rows)]
-    return FittedModes(tuple(points), fit, residues, spread, ends, float(trend), experiments.axis)
+    r, seen = fit.estimate.residuals, ~np.isnan(Z)
+    likelihood = np.log(np.linalg.det(root[seen])).sum() - seen.sum() * np.log(max(r @ r, 1e-300))
+    return float(likelihood), fit, readings, np.nan_to_num((Z - model) / np.abs(model))
 
 
 def _peaks(omega: FloatArray, H: ComplexArray) -> list[tuple[float, float]]:

@@ -44,6 +44,8 @@ class FittedModes(Answered):
         First and last frequency around each resonance, rad/s.
     trend
         Correlation of neighbouring residuals, in its standard deviations.
+    same
+        What errors that are not stated were taken to be the same in.
     axis
         How people see frequencies.
     """
@@ -54,6 +56,7 @@ class FittedModes(Answered):
     spread: FloatArray
     ends: tuple[tuple[float, float], ...]
     trend: float
+    same: str
     axis: Shown
 
     @cached_property
@@ -161,9 +164,9 @@ class FittedModes(Answered):
             shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
             shapes.append(Column("±", np.abs(shape) * std, error_figures))
         notes = ["ω in rad/s, ζ of critical damping", *estimate.told().notes]
-        if not estimate.errors_stated:
+        if self.same:
             notes.append(
-                "errors are not stated: taken as the same share of every amplitude, from what is left"
+                f"errors are not stated: the same {self.same}, as what is left of the amplitudes shows"
             )
         return Answer(
             f"{counted(len(told), 'mode')}: {listing(told, 'and')} {self.axis.word.rpartition(', ')[2]}.",

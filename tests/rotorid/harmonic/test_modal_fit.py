@@ -87,10 +87,14 @@ def test_modes_beyond_the_range_hardly_bias_those_in_it():
     np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
 
 
-@pytest.mark.parametrize(("stated", "masses", "read"), [(True, 3, 3), (False, 3, 3), (True, 4, 2)])
-def test_intervals_of_drawn_readings_hold_the_truth(stated, masses, read):
+@pytest.mark.parametrize(
+    ("errors", "masses", "read"),
+    [("stated", 3, 3), ("share of", 3, 3), ("stated", 4, 2), ("size everywhere", 4, 1)],
+)
+def test_intervals_of_drawn_readings_hold_the_truth(errors, masses, read):
     """Random chains: 95 % of the intervals, within four standard deviations of such a count."""
     rng, held, count = np.random.default_rng(7), np.zeros(3), 0
+    chosen = 0
     for _ in range(60):
         M0, K0 = chain(rng.uniform(5, 20, masses), rng.uniform(5e3, 2e4, masses))
         omega0, shapes = undamped(M0, K0)
@@ -98,8 +102,10 @@ def test_intervals_of_drawn_readings_hold_the_truth(stated, masses, read):
         C = 2 * damping[0] / omega0[0] * K0
         omega = around(omega0[:read], damping[:read])
         exact = amplitudes(omega, M0, C, K0, np.eye(masses)[-1])
-        errors = AmplitudeErrors(0.02, 0.02) if stated else None
-        result = fitted(omega, measured(omega, exact, errors, (rng, 0.02)))
+        share = 0.01 * np.abs(exact).max() / np.abs(exact) if "size" in errors else 0.02
+        stated = AmplitudeErrors(0.02, 0.02) if errors == "stated" else None
+        result = fitted(omega, measured(omega, exact, stated, (rng, share)))
+        chosen += stated is not None or result.same.startswith(errors)
         assert len(result.ends) == read
         _, _, low, high = found(result)
         truth = np.array([omega0[:read], damping[:read]])
@@ -109,6 +115,7 @@ def test_intervals_of_drawn_readings_hold_the_truth(stated, masses, read):
         error = np.abs(ratio) * np.hypot(result.shape_std[:, -1], result.shape_std[:, 0])
         held[2] += (np.abs(ratio - (shapes[-1] / shapes[0])[:read]) <= factor * error).sum()
         count += read
+    assert chosen > 50
     assert np.abs(held / count - 0.95).max() < 4 * np.sqrt(0.95 * 0.05 / count)
 
 
