@@ -25,6 +25,7 @@ from rotorid.cli.commands import (
     reduce,
     response,
     schema,
+    simulate,
     split,
     tolerance,
     trial_weight,
@@ -60,6 +61,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,
+        "simulate": simulate.simulate,
         "modes": modes.modes,
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},

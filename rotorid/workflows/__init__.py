@@ -15,6 +15,7 @@ from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
 from rotorid.workflows.result_provenance import Outcome
+from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
 from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
@@ -43,6 +44,8 @@ __all__ = [
     "ResponseOptions",
     "RotorInfluence",
     "RotorResponse",
+    "SimulateOptions",
+    "Simulation",
     "SplitOptions",
     "SplitWeight",
     "ToleranceOptions",
@@ -60,6 +63,7 @@ __all__ = [
     "modes",
     "reduce",
     "response",
+    "simulate",
     "split",
     "tolerance",
     "trial_weight",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from rotorid.workflows.identify import stated_errors
+from rotorid.workflows.identify import amplitude_errors
 from rotorid.workflows.input_checks import file_of
 from rotorid.workflows.option_values import Band, band, one_of
 from rotorid.workflows.result_provenance import Found, phase, provenance, workflow
@@ -77,7 +77,7 @@ def modes(data: Path | str, options: ModesOptions) -> ModesOfReadings:
     given = options.bands.split(",") if isinstance(options.bands, str) else options.bands or []
     sections = [found for each in given if (found := band(each, "--bands")) is not None]
     file = file_of(data, "a table of amplitudes")
-    errors = stated_errors(None, options.amplitude_error, options.phase_error)
+    errors = amplitude_errors(None, options.amplitude_error, options.phase_error)
     experiments = read_amplitudes(file, errors)
     excitation = experiments.signals.get("F", np.ones(len(experiments), dtype=complex))
     if options.excitation == "unbalance":

@@ -7,14 +7,18 @@ quantities with units are read by `rotorid.workflows.option_quantities`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar, cast
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.base.suggestions import one_of as one_of
+from rotorid.base.text import listing
 
 _T = TypeVar("_T")
 Speeds = str | Sequence[float | str]
 """As `speeds` reads them, or one by one: rad/s, or "3000rpm"."""
+Times = str | Sequence[float]
+"""As `times` reads them, or one by one, s."""
 Band = str | tuple[float | str, float | str]
 """As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
 Nodes = str | Sequence[str | int]
@@ -146,6 +150,18 @@ def numbers(
     return pairs(given, what, read, example)
 
 
+def check_names(
+    given: Collection[str], what: str, names: Collection[str], noun: str, needed: Collection[str] = ()
+) -> None:
+    """Refuse names that the model does not have, with the nearest, and the lack of a value."""
+    for name in given:
+        if name not in names:
+            hint = did_you_mean(name, names) or (f"; {noun}s are {listing(names, 'and')}" if names else "")
+            raise ValueError(f"{what}: {name!r} is no {noun} of the model{hint}")
+    if lost := [name for name in needed if name not in given]:
+        raise ValueError(f"{what}: the value of {listing(lost, 'and')} is missing, such as {lost[0]}=1")
+
+
 def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
     """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
     if given is None:
@@ -194,6 +210,16 @@ def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[f
     return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
 
 
+def times(given: Times, what: str = "--times") -> list[float]:
+    """Read times, s: "0:50:0.2" (first:last:step) or "0,0.5,2"."""
+    parts = given.split(":" if ":" in given else ",") if isinstance(given, str) else given
+    found = [number(part) if isinstance(part, str) else part for part in parts]
+    ranged = isinstance(given, str) and ":" in given
+    if not found or not all(map(math.isfinite, found)) or (ranged and len(found) != 3):
+        raise ValueError(f"{what} {given!r}: use FIRST:LAST:STEP or a list with commas, in seconds")
+    return [float(f"{t:.12g}") for t in _range(found, what, given, "time")] if ranged else found
+
+
 def rising_speeds(given: Speeds, what: str = "--speeds") -> list[float]:
     """`speeds` in ascending order, each once."""
     return sorted(set(speeds(given, what=what)))
@@ -207,15 +233,15 @@ def one_speed(given: str | float, what: str) -> float:
     return values[0]
 
 
-def _range(ends: Sequence[float], what: str, given: str) -> tuple[float, ...]:
+def _range(ends: Sequence[float], what: str, given: object, noun: str = "speed") -> tuple[float, ...]:
     """First, last and step as all values between them."""
     first, last, step = ends
     if step <= 0 or last < first:
         raise ValueError(
-            f"{what} {given!r}: the step must be positive and the last speed not below the first"
+            f"{what} {given!r}: the step must be positive and the last {noun} not below the first"
         )
     if (last - first) / step > 1e6:
-        raise ValueError(f"{what} {given!r} has more than a million speeds")
+        raise ValueError(f"{what} {given!r} has more than a million {noun}s")
     return tuple(first + step * i for i in range(math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1))
 
 

@@ -229,6 +229,15 @@ identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
+identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
+identify-two-designs        identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --design 5:40:1
+simulate-lesson-5           simulate {IDENTIFY}/task_5_1/model.toml --with c=1000,alpha=10 --frequencies 10,20,30 --inputs F=10 --digits 2 --output x.csv --verbose
+simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --amplitude-error 2 --phase-error 1 --seed 1
+simulate-modes              simulate {IDENTIFY}/task_7_1/model.toml --with c1=1e4,c2=2e4,c3=5e3 --modes --digits 3
+simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.14,m1=12,m2=28 --times 0:50:2 --digits 5
+simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
+simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
+simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
 modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
 modes-band                  {SHAKEN} --bands 24:28
@@ -290,7 +299,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "modes", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "schema", "validate"),
 )
 
 MODELLED = {
@@ -307,11 +316,27 @@ ALIKE = {
         "trial 1,middle,800,0\ntrial 2,left,400,90\ntrial 2,middle,400,90\n",
     )
 }
+MASS = {
+    "mass.toml": (
+        f"{IDENTIFY}/task_5_1/model.toml",
+        'known = { m = 10.0 }\nestimate = ["c", "alpha"]',
+        'estimate = ["c", "alpha", "m"]',
+    )
+}
 EDITS = {
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
+    },
+    "identify-two-models": MASS,
+    "identify-two-designs": MASS,
+    "simulate-resonance": {
+        "undamped.toml": (
+            f"{IDENTIFY}/task_5_1/model.toml",
+            '(m*p**2 + alpha*p + c)*X = F",\n]\nknown = { m = 10.0 }\nestimate = ["c", "alpha"]',
+            '(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]',
+        )
     },
     "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
     "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},

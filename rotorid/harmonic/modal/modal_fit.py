@@ -117,7 +117,7 @@ def _search(
         ratio = np.abs(model) / np.abs(Z)
         fitted = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
     r, seen = fit.estimate.residuals, ~np.isnan(Z)
-    likelihood = np.log(np.linalg.det(root[seen])).sum() - seen.sum() * np.log(max(r @ r, 1e-300))
+    likelihood = np.log(np.linalg.det(root[seen])).sum() - seen.sum() * np.log(np.fmax(r @ r, 1e-300))
     return float(likelihood), fit, readings, np.nan_to_num((Z - model) / np.abs(model))
 
 

@@ -14,7 +14,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, error_figures, listing
 from rotorid.base.unit_words import Shown
-from rotorid.harmonic.comparison import reference_point
+from rotorid.harmonic.comparison import reference_amplitude
 from rotorid.harmonic.plausibility import misfit
 from rotorid.regression.nonlinear import NonlinearEstimate
 
@@ -92,7 +92,7 @@ class FittedModes(Answered):
     @property
     def shapes(self) -> FloatArray:
         """Real shapes (k, P); the first point that is no node of a mode has 1."""
-        return np.array([s / s[reference_point(s)] for s in self.parts[0][0]])
+        return np.array([s / s[reference_amplitude(s)] for s in self.parts[0][0]])
 
     @property
     def shape_std(self) -> FloatArray:

@@ -52,6 +52,8 @@ class HarmonicFile:
         Stated errors of the amplitudes, or None.
     path
         Where it was read.
+    unmeasured
+        Outputs that a model in time does not show.
     """
 
     model: HarmonicModel
@@ -59,6 +61,7 @@ class HarmonicFile:
     start: Mapping[str, float] = field(default_factory=dict)
     errors: AmplitudeErrors | None = None
     path: Path | None = None
+    unmeasured: tuple[str, ...] = ()
 
 
 def read_harmonic_model(path: str | Path) -> HarmonicFile:
@@ -177,7 +180,7 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         message = f"{path}: {lost} {stand} in initial values only, which amplitudes do not show: left out"
         warnings.warn(message, TableWarning, stacklevel=3)
     bounds = {name: limits for name, limits in form.bounds.items() if name in start}
-    return HarmonicFile(model, bounds, start, form.errors, path)
+    return HarmonicFile(model, bounds, start, form.errors, path, tuple({*own} & {*model.outputs}))
 
 
 def _equations(section: Section, key: str) -> list[str] | None:
