@@ -52,19 +52,19 @@ def fit_modes(
     ValueError
         Where there is no peak, and where readings are fewer than unknowns.
     """
-    order = np.argsort(experiments.frequencies, kind="stable")
+    omega, read = experiments.frequencies, ~np.isnan(experiments.table(points)).all(axis=1)
     if bands is not None:
-        omega = experiments.frequencies[order]
-        order = order[np.any([(omega >= low) & (omega <= high) for low, high in bands], axis=0)]
-    if not len(order):
+        read &= np.any([(omega >= low) & (omega <= high) for low, high in bands], axis=0)
+    if not read.any():
         raise ValueError("there are no readings in --bands")
+    order = np.flatnonzero(read)[np.argsort(omega[read], kind="stable")]
     experiments, excitation = experiments.take(order), excitation[order]
     omega, Z = experiments.frequencies, experiments.table(points)
     H = Z / excitation[:, None]
     sections = _peaks(omega, H) if bands is None else sorted(bands)
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
     spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
-    if min(spare) < 0 or sum(spare) < len(rows) or min(map(len, rows)) < 3:
+    if min(spare) < 0 or sum(spare) < len(rows) or min(len(np.unique(omega[row])) for row in rows) < 3:
         raise ValueError(
             f"too few readings: every resonance needs 3 frequencies, and every point {len(rows) + 2} (one a "
             "mode and two for modes beyond the range), and one more for the frequencies and damping"

@@ -68,10 +68,10 @@ class FittedModes(Answered):
         for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
             zip(told, self.ends, strict=True), 1
         ):
-            if not low < omega < high:
-                found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
-            elif not 2 * error < high - low:
+            if not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
+            elif not low < omega < high:
+                found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
             elif zeta + 2 * other < 0:
                 found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
         return tuple(found)

@@ -228,8 +228,24 @@ def test_too_few_readings_are_refused():
     omega0, _ = undamped(M, K)
     with pytest.raises(ValueError, match="too few readings"):
         near_one(omega0[0] * (1 + 2e-3 * np.array([-1, 0, 1])), bands=[(0.0, 20.0)])
+    band = [(0.9 * omega0[0], 1.1 * omega0[0])]
+    with pytest.raises(ValueError, match="3 frequencies"):
+        near_one(np.repeat(omega0[0] * np.array([0.999, 1.001]), 6), share=0.01, bands=band)
+    thrice = near_one(np.repeat(omega0[0] * np.array([0.998, 1.0, 1.002]), 4), share=0.01, bands=band)
+    assert "do not tell" in thrice.undetermined[0]
     with pytest.raises(ValueError, match="no readings in --bands"):
         near_one(bands=[(1.0, 2.0)])
+
+
+def test_readings_that_lack_are_left_out():
+    """Rows in any order, one of them blank, one blank at one point: the exact modes all the same."""
+    omega0, shapes = undamped(M, K)
+    omega = np.random.default_rng(6).permutation(around(omega0, 2e-4 * omega0))
+    Z = amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])
+    Z[3], Z[5, 1] = np.nan, np.nan
+    result = fitted(omega, measured(omega, Z))
+    np.testing.assert_allclose(result.fit.values[:3], omega0, rtol=1e-9)
+    np.testing.assert_allclose(result.shapes, shapes.T, rtol=1e-7)
 
 
 def test_phases_that_lag_are_found_out():
