@@ -13,7 +13,7 @@ from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import check_names, number, pairs
-from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,6 +48,9 @@ class FitOptions:
         Other places to start from; default: 0.
     max_iterations : N
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
+    tolerance : X
+        Of gauss-newton and quasilinearization: end where a step is below this part of each parameter, or
+        changes the sum of squares by less than this part of it, [F]; default: where no step matters.
     max_seconds : S
         Limit of the search; what it has found by then has no intervals.
     trajectory : model|data
@@ -71,6 +74,7 @@ class FitOptions:
     starts: int = 1
     seed: int | None = None
     max_iterations: int = 100
+    tolerance: float | None = None
     max_seconds: float = 60.0
     trajectory: str | None = None
     pieces: int | None = None
@@ -90,9 +94,10 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordFit(Parts):
-    """What the fit found."""
+    """What the fit found, and the text of the model's file."""
 
     fit: Fit
+    model: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -104,6 +109,12 @@ class RecordFit(Parts):
         from rotorid.timedomain.plots import figure_fit
 
         return figure_fit(self.fit)
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.estimation import fit_report
+
+        return fit_report(self.to_dict(), self.fit, provenance=self.provenance, model=self.model)
 
 
 @workflow
@@ -156,6 +167,7 @@ def fit(
             starts=options.starts,
             seed=options.seed or 0,
             max_iterations=options.max_iterations,
+            tolerance=options.tolerance,
             max_seconds=options.max_seconds,
             trajectory=options.trajectory,
             pieces=options.pieces,
@@ -164,7 +176,7 @@ def fit(
         )
     log.info("degrees_of_freedom = %s", found.estimate.dof)
     log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))
-    return RecordFit(fit=found, provenance=provenance(files, options))
+    return RecordFit(fit=found, model=text_of(model), provenance=provenance(files, options))
 
 
 def _check(options: FitOptions) -> None:
@@ -174,6 +186,8 @@ def _check(options: FitOptions) -> None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):
             raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
+    if options.method not in ("gauss-newton", "quasilinearization"):
+        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
     if options.method != "multiple-shooting":
         refuse(options, ("pieces",), "belongs to --method multiple-shooting")
     if options.starts == 1:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
+    from rotorid.report.equations import Equations
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -49,6 +50,11 @@ class Outcome(Answered):
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
+
+    @property
+    def equations(self) -> Equations:
+        """What was solved, in symbols and in numbers."""
+        raise ValueError(f"{type(self).__name__} has no equations")
 
     def figure(self) -> Figure:
         """The main picture."""
@@ -77,6 +83,13 @@ class Parts(Outcome):
         """As JSON types, without the provenance."""
         known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
         return {**known.pop("", {}), **known}
+
+    @property
+    def equations(self) -> Equations:
+        """Those of the first."""
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(next(iter(self.parts.values())))
 
     @property
     def answer(self) -> Answer:
@@ -151,6 +164,13 @@ def provenance(
         "inputs": [{"file": str(f), "sha256": hashlib.sha256(file_content(f)).hexdigest()} for f in files],
         "options": {key: plain(value) for key, value in (given | changed(options)).items()},
     }
+
+
+def text_of(file: object) -> str:
+    """Text of a file that was read; nothing, where what was given is none."""
+    from rotorid.tables.reader.input_file import file_content
+
+    return file_content(Path(file)).decode("utf-8-sig", "replace") if isinstance(file, Path | str) else ""
 
 
 @contextmanager

@@ -196,6 +196,7 @@ trial-weight-model-all      trial-weight {MODEL_JOB} --output t.csv --plot t.png
 trial-weight-turbo          trial-weight {TURBO}/job.toml --share 30
 trial-weight-tried          trial-weight sample_data/bk_two_plane/job.toml --mass 2g --max-mass 3g
 trial-weight-nothing        trial-weight --speed 3000rpm
+balance-equations           balance {TURBO}/job.toml --method least-squares --show equations --table
 """
 
 MODEL_COMMANDS = f"""
@@ -227,6 +228,7 @@ identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/t
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
+identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
 identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
@@ -254,8 +256,19 @@ fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
+fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
+fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
+fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
+fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --tolerance 1e-3
+fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
+identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
+identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
+identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
+reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 validate                    validate --output numbers.csv
 validate-all                validate --all
 """
@@ -339,6 +352,13 @@ EDITS = {
         )
     },
     "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
+    "fit-not-measured": {
+        "unmeasured.toml": (
+            f"{FIT}/three_masses/from_record.toml",
+            "[estimate]",
+            "[nuisance]\noffset = true\n[estimate]",
+        ),
+    },
     "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},
     "balance-missing-run": {"short.csv": (f"{TURBO}/weights.csv", "trial 3", "trial 4")},
     "balance-undetermined": ALIKE,

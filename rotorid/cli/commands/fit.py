@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, command
+from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
@@ -19,10 +19,11 @@ from rotorid.workflows.fit import fit as work
     panels={
         "Input": "sigma start allow_missing",
         "Method": "method loss starts",
-        "Limits": "max_seconds max_iterations",
+        "Limits": "max_seconds max_iterations tolerance",
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",
     },
+    to=(*WITH_REPORT, *EQUATIONS),
 )
 def fit(
     model: Annotated[
