@@ -16,7 +16,7 @@ STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
 SINGLE = [DOCS / "rk4.md", DOCS / "validation.md"]
-AWAITED = {"quasilinearization", "lesson_7"}
+AWAITED = {"quasilinearization"}
 """Pages of the books with commands that are built at this moment."""
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
