@@ -16,11 +16,12 @@ from rotorid.harmonic.output_identification import identify_outputs
 from rotorid.harmonic.regression_rows import ask_about_case
 from rotorid.harmonic.result import Identification
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
+from rotorid.regression.prior import Prior
 
 Identify = Callable[
-    [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None], Identification
+    [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None, Prior], Identification
 ]
-"""Model, experiments, bounds, loss, start."""
+"""Model, experiments, bounds, loss, start, prior."""
 
 
 def identify(
@@ -31,6 +32,7 @@ def identify(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
+    prior: Prior | None = None,
 ) -> Identification:
     """Identify a model's parameters from measured amplitudes.
 
@@ -51,23 +53,33 @@ def identify(
         Of output error: one of `LOSSES` in `rotorid.regression.robust`.
     start
         Starting values by name for output error, where the linear estimate is not to be used.
+    prior
+        What is known beside the data, or a ridge: of output error towards where it starts, of equation error
+        of the unknowns of the regression towards 0.
 
     Raises
     ------
     ValueError
-        For signals that were not measured at all, options that do not go together, unknown names.
+        For signals that were not measured at all, options that do not go together, unknown names, a prior
+        without any errors of the amplitudes to weigh it by.
     """
     chosen = find(METHODS, method, "method")
-    for what, given in (("bounds", bounds), ("start", start)):
+    prior = prior or Prior()
+    for what, given in (("bounds", bounds), ("start", start), ("prior", prior.known)):
         for name in given or {}:
             if name not in model.parameters:
                 raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
     for name, (low, high) in limits(bounds).items():
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
+    if prior.known and not experiments.stated:
+        raise ValueError(
+            "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
+            "--phase-error, or [errors] in the model file)"
+        )
     ask_about_case(model, experiments)
     experiments, copies = experiments.without_copies()
-    found = chosen.function(model, experiments, bounds, loss, start)
+    found = chosen.function(model, experiments, bounds, loss, start, prior)
     return replace(found, left_out=(*copies, *found.left_out))
 
 
@@ -77,14 +89,15 @@ def _by_equations(
     bounds: Bounds | None,
     loss: str,
     start: Mapping[str, float] | None,
+    prior: Prior,
 ) -> Identification:
     if loss != "linear" or start:
         raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
     hidden = hidden_outputs(model, experiments)
     seen = without(model, hidden) if hidden else None
     if seen is None:
-        return equation_error(model, experiments, bounds=bounds)
-    found = equation_error(seen, experiments, bounds=bounds)
+        return equation_error(model, experiments, bounds=bounds, prior=prior)
+    found = equation_error(seen, experiments, bounds=bounds, prior=prior)
     if not np.isfinite(found.condition_number):
         raise ValueError(
             f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "

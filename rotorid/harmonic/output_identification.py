@@ -20,6 +20,8 @@ from rotorid.harmonic.starting_values import starting_values
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
+from rotorid.regression.normal_matrix import normal_matrix
+from rotorid.regression.prior import NO_PRIOR, Prior
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 MOST_STARTS = 8
@@ -36,12 +38,13 @@ def identify_outputs(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
+    prior: Prior = NO_PRIOR,
 ) -> Identification:
     """Identify by output error from the linear estimate, from each of its solutions where it has several.
 
     Parameters
     ----------
-    model, experiments, bounds, loss, start
+    model, experiments, bounds, loss, start, prior
         As in `identify`.
 
     Returns
@@ -49,11 +52,11 @@ def identify_outputs(
     Residuals are relative to each amplitude: (measured − predicted)/|measured|. `influence` is of first
     order.
     """
-    starts, linear, reasons = _linear_starts(model, experiments, bounds, start)
+    starts, linear, reasons = _linear_starts(model, experiments, bounds, start, prior)
     found, problem = [], None
     for begin in starts:
         try:
-            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss))
+            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss, prior=prior))
         except ValueError as error:  # one of several starts may have no answer
             problem = error
     if problem is not None and not found:
@@ -66,11 +69,15 @@ def identify_outputs(
     points = np.stack([f.fit.values for f in best])
     apart = (np.ptp(points, axis=0) > SAME * np.abs(points).max(axis=0)) & ~np.isnan(points).any(axis=0)
     values = np.where(apart, np.nan, estimate.values)
-    covariance = None if estimate.covariance is None else estimate.covariance.copy()
+    covariance = None if estimate.covariance is None or prior.ridge else estimate.covariance.copy()
     if covariance is not None:
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
     free_of_bounds = not chosen.fit.at_bounds and estimate.full_rank and loss == "linear"
+    K, r, experiment = chosen.jacobian, -estimate.residuals, chosen.experiment
+    if chosen.prior:  # its rows belong to no experiment
+        K, r = chosen.prior.rows.below(K, estimate.residuals, estimate.solution)
+        r, experiment = -r, np.append(experiment, np.full(len(chosen.prior.rows), -1))
     identification = Identification(
         model=model,
         experiments=experiments,
@@ -91,21 +98,21 @@ def identify_outputs(
         residual_names=model.outputs,
         residual_rms=_rms(residuals),
         predicted=chosen.predicted,
-        influence=leave_one_out(chosen.jacobian, -estimate.residuals, chosen.experiment, len(experiments))
-        if free_of_bounds
-        else None,
+        influence=leave_one_out(K, r, experiment, len(experiments)) if free_of_bounds else None,
         left_out=chosen.left_out,
         converged=chosen.fit.converged,
         warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
+        prior=chosen.prior,
+        normal_matrix=normal_matrix(model.parameters, chosen.jacobian),
     )
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(model, others).recovery.solutions
 
-    return replace(
-        identification, warnings=(*identification.warnings, *doubts(identification, estimate, bounds, refit))
-    )
+    doubted = doubts(identification, estimate, bounds, refit)
+    said = chosen.prior.warnings if chosen.prior else ()
+    return replace(identification, warnings=(*identification.warnings, *doubted, *said))
 
 
 def _linear_starts(
@@ -113,6 +120,7 @@ def _linear_starts(
     experiments: Experiments,
     bounds: Bounds | None,
     start: Mapping[str, float] | None,
+    prior: Prior,
 ) -> tuple[list[dict[str, float]], LinearFit | None, tuple[str, ...]]:
     """Where to begin, the linear estimate, and its reasons for what is not determined.
 
@@ -124,7 +132,7 @@ def _linear_starts(
     try:
         seen = without(model, hidden) if hidden else model
         if seen is not None:
-            linear = linear_fit(seen, experiments, limits(bounds) or None)
+            linear = linear_fit(seen, experiments, limits(bounds) or None, Prior(prior.known))
             words = reasons(linear, experiments)
     except ValueError:  # more equations than outputs, no complete row
         pass

@@ -9,6 +9,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import gain, solution
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.normal_matrix import NormalMatrix, normal_matrix
+from rotorid.regression.prior import PriorEffect, effect
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
@@ -35,6 +37,8 @@ class Judgement:
     warnings: tuple[str, ...]
     integration_change: FloatArray | None
     autocorrelation: float | None
+    prior: PriorEffect | None
+    normal_matrix: NormalMatrix | None
 
 
 @dataclass(eq=False)
@@ -45,6 +49,8 @@ class _Draft:
     reliable: bool
     warnings: list[str] = field(default_factory=list)
     integration_change: FloatArray | None = None
+    prior: PriorEffect | None = None
+    normal_matrix: NormalMatrix | None = None
 
     def note(self, *words: str, spoils: bool = False) -> None:
         """Add warnings, empty ones left out; those that spoil the fit leave no intervals."""
@@ -80,17 +86,23 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
         curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
         found = replace(found, covariance=None, solution_covariance=None, curved=curved)
     neighbours = None if seen is None else seen.neighbours
-    return Judgement(found, draft.reliable, tuple(draft.warnings), draft.integration_change, neighbours)
+    change, warnings = draft.integration_change, tuple(draft.warnings)
+    return Judgement(found, draft.reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:
     """What needs the model simulated at the values found; SimulationError where it cannot be."""
     found, r = draft.estimate, draft.estimate.residuals
     J = problem.jacobian(found.solution)
+    draft.normal_matrix = normal_matrix(found.names, J)
+    draft.prior = effect(problem.prior, J, r, found.solution)
+    if draft.prior is not None:
+        draft.note(*draft.prior.warnings, spoils=problem.prior.ridge > 0)
+        draft.estimate = draft.prior.apart(found, stated=problem.stated)
     if weak := _insensitive(problem, J, found):
         draft.note(f"the record hardly depends on {', '.join(weak)}")
     if path.converged:
-        draft.estimate, local = combined(problem, found)
+        draft.estimate, local = combined(problem, draft.estimate)
         draft.note(local)
     spread = None if problem.stated or loss != "linear" else unequal(problem, J.shape[1], r)
     if spread is not None:
@@ -133,7 +145,8 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     missed = r - exact
     if np.linalg.norm(missed) <= ROUNDING * np.linalg.norm(problem.data):
         return np.zeros(len(found.names))
-    change: FloatArray = solution(J, missed, rcond=RCOND)
+    K, _ = problem.prior.below(J, missed, found.solution)
+    change: FloatArray = solution(K, np.append(missed, np.zeros(len(K) - len(J))), rcond=RCOND)
     return change
 
 

@@ -59,6 +59,9 @@ class FitOptions:
         Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
+    ridge : LAMBDA
+        Regularise: multiply the diagonal of the normal matrix by 1 + λ, which pulls towards the starting
+        values; no intervals.
     sigma : LIST
         Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
         from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
@@ -76,6 +79,7 @@ class FitOptions:
     pieces: int | None = None
     rtol: float | None = None
     allow_missing: bool = False
+    ridge: float | None = None
     sigma: Values | float | None = None
 
 
@@ -161,6 +165,7 @@ def fit(
             pieces=options.pieces,
             rtol=RTOL if options.rtol is None else options.rtol,
             weigh=weigh,
+            ridge=options.ridge or 0.0,
         )
     log.info("degrees_of_freedom = %s", found.estimate.dof)
     log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))

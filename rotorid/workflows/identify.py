@@ -39,6 +39,9 @@ class IdentifyOptions:
         One standard deviation of an amplitude, in place of the one that the model states.
     phase_error : DEGREES
         One standard deviation of a phase, in place of the one that the model states.
+    ridge : LAMBDA
+        Regularise: multiply the diagonal of the normal matrix by 1 + λ, which pulls towards 0, or with
+        output-error towards the start; no intervals.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N
@@ -49,6 +52,7 @@ class IdentifyOptions:
     loss: str = "linear"
     amplitude_error: float | None = None
     phase_error: float | None = None
+    ridge: float | None = None
     design: Speeds | None = None
     choose: int | None = None
 
@@ -110,6 +114,7 @@ def identify(
     """
     from rotorid.harmonic import Experiments, HarmonicModel
     from rotorid.harmonic import identify as estimate
+    from rotorid.regression.prior import Prior
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
@@ -132,6 +137,7 @@ def identify(
                 bounds=file.bounds or None,
                 loss=options.loss,
                 start=(file.start or None) if options.method == "output-error" else None,
+                prior=Prior(file.prior, options.ridge or 0.0),
             )
         log.info("degrees_of_freedom = %s", result.dof)
     return Coefficients(

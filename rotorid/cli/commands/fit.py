@@ -18,7 +18,7 @@ from rotorid.workflows.fit import fit as work
     least={"starts": 1, "seed": 0, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1},
     panels={
         "Input": "sigma start allow_missing",
-        "Method": "method loss starts",
+        "Method": "method loss starts ridge",
         "Limits": "max_seconds max_iterations",
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",

@@ -35,8 +35,8 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
     """
     theta = start.copy()
     r, K = problem.evaluate(theta)
-    history, costs = [theta], [half_square(r)]
-    found = problem.linear_fit(K, -r)
+    history, costs = [theta], [half_square(r, problem.prior.residual(theta))]
+    found = problem.linear_fit(K, -r, theta)
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
     for _ in range(max_iterations):
         new = theta + found.solution
@@ -49,9 +49,9 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
             break
         step, theta = found.solution, new
         history.append(theta)
-        costs.append(half_square(r))
+        costs.append(half_square(r, problem.prior.residual(theta)))
         small = negligible(step, theta, found, tolerance)
-        found = problem.linear_fit(K, -r)
+        found = problem.linear_fit(K, -r, theta)
         if small:
             # a minimum, not only a short step: the next one is no longer either
             converged = negligible(found.solution, theta, found, 10 * tolerance)

@@ -47,6 +47,8 @@ class OdeModel:
         Parameters that every one of several records has for itself.
     t0
         Time to which the initial values belong, s; "first" or None (not stated): the first of each record.
+    prior
+        Value and standard deviation of parameters that are known beside the records, by name.
     """
 
     states: tuple[str, ...]
@@ -62,6 +64,7 @@ class OdeModel:
     observed: tuple[Expression, ...] = field(repr=False)
     per_record: tuple[str, ...] = ()
     t0: float | str | None = None
+    prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rates_alone: ClassVar[bool] = True
     """Whether `rates` are the whole right side."""
 
