@@ -83,6 +83,13 @@ class LinearFit:
     settled: bool
     prior: Prior
 
+    @property
+    def alone(self) -> str:
+        """What the data determine without a prior, in words, if that is not everything."""
+        names = self.model.parameters
+        lost = [name for name, out in zip(names, undetermined_parameters(self.system)[0], strict=True) if out]
+        return only_determined(names, lost, self.words) if lost else ""
+
 
 def linear_fit(
     model: HarmonicModel,
@@ -217,7 +224,8 @@ def _effect(fit: LinearFit) -> PriorEffect | None:
         return None
     theta, weight = fit.recovery.solutions[0], weights(fit.system)
     K, r = weight @ fit.system.jacobian(theta), weight @ (fit.system.combinations(theta) - fit.system.values)
-    return effect(fit.prior.rows(fit.model.parameters, theta, K), K, r, theta)
+    told = effect(fit.prior.rows(fit.model.parameters, theta, K), K, r, theta)
+    return told and told.of_model(fit.alone)
 
 
 def _doubts(fit: LinearFit, found: Identification, bounds: Bounds | None) -> tuple[str, ...]:
@@ -340,8 +348,7 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
     model, recovery, estimate = fit.model, fit.recovery, fit.estimate
     found = []
     if recovery.undetermined.any():
-        lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
-        found.append(only_determined(model.parameters, lost, fit.words))
+        found.append(fit.alone)
     for group in fit.groups:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):

@@ -69,7 +69,7 @@ def identify_outputs(
     points = np.stack([f.fit.values for f in best])
     apart = (np.ptp(points, axis=0) > SAME * np.abs(points).max(axis=0)) & ~np.isnan(points).any(axis=0)
     values = np.where(apart, np.nan, estimate.values)
-    covariance = None if estimate.covariance is None or prior.ridge else estimate.covariance.copy()
+    covariance = None if estimate.covariance is None else estimate.covariance.copy()
     if covariance is not None:
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
@@ -103,7 +103,8 @@ def identify_outputs(
         converged=chosen.fit.converged,
         warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
-        prior=chosen.prior,
+        prior=chosen.prior
+        and chosen.prior.of_model(linear.alone if linear and linear.model is model else ""),
         normal_matrix=normal_matrix(model.parameters, chosen.jacobian),
     )
 

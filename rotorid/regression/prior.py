@@ -141,11 +141,11 @@ class PriorEffect:
     @property
     def why(self) -> dict[str, str]:
         """Beside each parameter, how much of it is from the data, where the prior says anything."""
-        each = {} if self.rows.ridge else dict(zip(self._names, self.share, strict=True))
+        only = "by the ridge only" if self.rows.ridge else "by its prior only"
         return {
-            name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
-            for name, share in each.items()
-            if share < 0.995
+            name: f"{percent(share)} % from the data" if share >= 0.005 else only
+            for name, share in zip(self._names, self.share, strict=True)
+            if share < 0.005 or (share < 0.995 and not self.rows.ridge)
         }
 
     @property
@@ -155,7 +155,7 @@ class PriorEffect:
             (rms, rms_now), (condition, now) = self.residual_rms, self.condition_numbers
             return (
                 f"--ridge {self.rows.ridge:g} biases the estimate by nobody knows how much: no intervals. "
-                f"Residual rms {rms_now:.3g}, condition number {now:.3g}; without it, linearised here, {rms:.3g} "
+                f"Residual rms {rms_now:.3g}, condition number {now:.3g}; without it, linearised, {rms:.3g} "
                 f"and {condition:.3g}",
             )
         each = zip(self._names, self.rows.value, self.rows.std, self.away, strict=True)
@@ -177,9 +177,15 @@ class PriorEffect:
     def _names(self) -> list[str]:
         return [self.rows.names[j] for j in self.rows.place]
 
+    def of_model(self, alone: str) -> PriorEffect:
+        """With better words of what the data alone determine than those of the linearised model."""
+        return replace(self, alone=alone) if self.alone and alone else self
+
     def apart(self, found: Estimate, *, stated: bool) -> Estimate:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
         m = len(found.residuals)
+        if self.rows.ridge:
+            found = replace(found, covariance=None, solution_covariance=None)
         chi_square = m * self.residual_rms[0] ** 2 if stated else None
         return replace(found, errors_stated=stated, chi_square=chi_square, dof=m - self.rank)
 
