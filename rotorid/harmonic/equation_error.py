@@ -21,7 +21,6 @@ from rotorid.harmonic.parameter_recovery import (
     only_determined,
     recover,
     undetermined_parameters,
-    weights,
 )
 from rotorid.harmonic.plausibility import doubts, what_more_can_tell
 from rotorid.harmonic.polynomial import ONE, Polynomial
@@ -32,7 +31,6 @@ from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
 from rotorid.regression.normal_matrix import normal_matrix
-from rotorid.regression.prior import NO_PRIOR, Prior, PriorEffect, effect
 from rotorid.regression.undetermined_combinations import FoundCombination, echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
@@ -64,8 +62,6 @@ class LinearFit:
         The combinations (q,) as functions of the parameters, in words, and the parameters from them.
     settled
         Whether the weights fit the estimate.
-    prior
-        Of the parameters, or a ridge of the unknowns.
     """
 
     model: HarmonicModel
@@ -81,26 +77,10 @@ class LinearFit:
     words: tuple[str, ...]
     recovery: Recovery
     settled: bool
-    prior: Prior
-
-    @property
-    def alone(self) -> str:
-        """What the data determine without a prior, in words, if that is not everything."""
-        names = self.model.parameters
-        lost = [name for name, out in zip(names, undetermined_parameters(self.system)[0], strict=True) if out]
-        return only_determined(names, lost, self.words) if lost else ""
 
 
-def linear_fit(
-    model: HarmonicModel,
-    experiments: Experiments,
-    bounds: Bounds | None = None,
-    prior: Prior = NO_PRIOR,
-) -> LinearFit:
-    """Regression of the equations, and the parameters that follow; errors as in `identify`.
-
-    A prior is one more combination for each of its parameters: that of a single one.
-    """
+def linear_fit(model: HarmonicModel, experiments: Experiments, bounds: Bounds | None = None) -> LinearFit:
+    """Regression of the equations, and the parameters that follow; errors as in `identify`."""
     rows = build_rows(model, experiments)
     groups = _groups(model, rows)
     fixed = np.zeros(rows.coefficients.shape[1])
@@ -108,7 +88,7 @@ def linear_fit(
     if fixed.all():  # each unknown is alone with its factor: nothing is told relative to another
         fixed[:] = 0.0
     kept = np.flatnonzero(fixed == 0)
-    estimate, solution, K, Y, experiment, settled = _regress(model, experiments, rows, fixed, prior.ridge)
+    estimate, solution, K, Y, experiment, settled = _regress(model, experiments, rows, fixed)
     picks = _determined(estimate)[: 0 if len(groups) and not fixed.any() else None]
     whole = np.zeros((len(picks), len(fixed)))
     whole[:, kept] = picks
@@ -127,26 +107,22 @@ def linear_fit(
         below @ combos.rows if groups else None,
     )
     if len(picks):
-        recovery = recover(system.with_prior(prior.known), limits(bounds))
+        recovery = recover(system, limits(bounds))
     else:
         recovery = Recovery((), np.ones(len(model.parameters), dtype=bool), None, (), ())
     words = _words(model, whole, system)
-    found = rows, estimate, solution, K, Y, experiment, picks, groups, system, words, recovery, settled
-    return LinearFit(model, *found, prior)
+    return LinearFit(
+        model, rows, estimate, solution, K, Y, experiment, picks, groups, system, words, recovery, settled
+    )
 
 
 def equation_error(
-    model: HarmonicModel,
-    experiments: Experiments,
-    *,
-    bounds: Bounds | None = None,
-    prior: Prior = NO_PRIOR,
+    model: HarmonicModel, experiments: Experiments, *, bounds: Bounds | None = None
 ) -> Identification:
     """Linear regression; see `identify`."""
-    fit = linear_fit(model, experiments, bounds, prior)
+    fit = linear_fit(model, experiments, bounds)
     rows, estimate, recovery, words = fit.rows, fit.estimate, fit.recovery, fit.words
-    system = fit.system.with_prior(prior.known)
-    values, covariance = system.values, system.covariance
+    values, covariance = fit.system.values, fit.system.covariance
     warnings = [*rows.warnings, *recovery.warnings]
     if not fit.settled:
         warnings.append(
@@ -173,7 +149,7 @@ def equation_error(
     influence = None
     if recovery.gain is not None:
         change = leave_one_out(fit.K, fit.Y, fit.experiment, len(experiments))
-        influence = change @ (recovery.gain[:, : len(fit.picks)] @ fit.picks).T
+        influence = change @ (recovery.gain @ fit.picks).T
     residuals = rows.residuals(fit.solution)
     used = np.stack((residuals.real, residuals.imag), axis=2)[rows.used]
     found = Identification(
@@ -208,24 +184,10 @@ def equation_error(
         converged=fit.settled,
         warnings=tuple(warnings),
         notes=_notes(model, experiments, estimate),
-        prior=(told := _effect(fit)),
         normal_matrix=normal_matrix(estimate.names, fit.K),
     )
-    said = told.warnings if told else ()
-    return replace(found, warnings=(*found.warnings, *_doubts(fit, found, bounds), *said))
 
-
-def _effect(fit: LinearFit) -> PriorEffect | None:
-    """Of a prior, on the parameters; of a ridge, on the unknowns of the regression."""
-    if fit.prior.ridge:
-        own = fit.prior.rows(fit.estimate.names, np.zeros(fit.K.shape[1]), fit.K)
-        return effect(own, fit.K, -fit.estimate.residuals[: len(fit.Y)], fit.estimate.solution)
-    if not (fit.prior.known and fit.settled and fit.recovery.solutions):
-        return None
-    theta, weight = fit.recovery.solutions[0], weights(fit.system)
-    K, r = weight @ fit.system.jacobian(theta), weight @ (fit.system.combinations(theta) - fit.system.values)
-    told = effect(fit.prior.rows(fit.model.parameters, theta, K), K, r, theta)
-    return told and told.of_model(fit.alone)
+    return replace(found, warnings=(*found.warnings, *_doubts(fit, found, bounds)))
 
 
 def _doubts(fit: LinearFit, found: Identification, bounds: Bounds | None) -> tuple[str, ...]:
@@ -235,7 +197,7 @@ def _doubts(fit: LinearFit, found: Identification, bounds: Bounds | None) -> tup
         return linear_fit(fit.model, others).recovery.solutions
 
     def refine(theta: FloatArray) -> tuple[NonlinearEstimate, FloatArray]:
-        refined = output_error(fit.model, found.experiments, theta, prior=fit.prior).fit
+        refined = output_error(fit.model, found.experiments, theta).fit
         shown = [i for i, w in enumerate(fit.words) if w not in found.parameters]
         return refined, fit.system.combinations(refined.estimate.solution)[shown]
 
@@ -251,7 +213,7 @@ def limits(bounds: Bounds | None) -> dict[str, tuple[float, float]]:
 
 
 def _regress(
-    model: HarmonicModel, experiments: Experiments, rows: Rows, fixed: FloatArray, ridge: float
+    model: HarmonicModel, experiments: Experiments, rows: Rows, fixed: FloatArray
 ) -> tuple[Estimate, FloatArray, FloatArray, FloatArray, IntArray, bool]:
     """Unweighted, or with stated errors reweighted until the weights fit; some unknowns are fixed."""
     kept = np.flatnonzero(fixed == 0)
@@ -259,11 +221,7 @@ def _regress(
     words = [names[i] for i in kept]
 
     def solve(K: FloatArray, Y: FloatArray, sigma: float | None) -> tuple[Estimate, FloatArray]:
-        zero = np.zeros(len(kept))
-        A, r = Prior(ridge=ridge).rows(words, zero, K[:, kept]).below(K[:, kept], K @ fixed - Y, zero)
-        found = least_squares(A, -r, names=words, sigma=sigma, rcond=RCOND)
-        if ridge:  # biased by nobody knows how much
-            found = replace(found, covariance=None, solution_covariance=None)
+        found = least_squares(K[:, kept], Y - K @ fixed, names=words, sigma=sigma, rcond=RCOND)
         solution = fixed.copy()
         solution[kept] = found.solution
         return found, solution
@@ -348,7 +306,8 @@ def reasons(fit: LinearFit, experiments: Experiments) -> tuple[str, ...]:
     model, recovery, estimate = fit.model, fit.recovery, fit.estimate
     found = []
     if recovery.undetermined.any():
-        found.append(fit.alone)
+        lost = [name for name, out in zip(model.parameters, recovery.undetermined, strict=True) if out]
+        found.append(only_determined(model.parameters, lost, fit.words))
     for group in fit.groups:
         loose = [model.combinations.words[i] for i in group]
         if set(loose) <= set(model.parameters):

@@ -16,12 +16,12 @@ from rotorid.harmonic.output_identification import identify_outputs
 from rotorid.harmonic.regression_rows import ask_about_case
 from rotorid.harmonic.result import Identification
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
-from rotorid.regression.prior import Prior
+from rotorid.regression.prior import Known
 
 Identify = Callable[
-    [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None, Prior], Identification
+    [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None], Identification
 ]
-"""Model, experiments, bounds, loss, start, prior."""
+"""Model, experiments, bounds, loss, start."""
 
 
 def identify(
@@ -32,7 +32,8 @@ def identify(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
-    prior: Prior | None = None,
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> Identification:
     """Identify a model's parameters from measured amplitudes.
 
@@ -53,33 +54,35 @@ def identify(
         Of output error: one of `LOSSES` in `rotorid.regression.robust`.
     start
         Starting values by name for output error, where the linear estimate is not to be used.
-    prior
-        What is known beside the data, or a ridge: of output error towards where it starts, of equation error
-        of the unknowns of the regression towards 0.
+    prior, ridge
+        Of output error: what is known beside the data, or λ of a ridge towards where it begins.
 
     Raises
     ------
     ValueError
-        For signals that were not measured at all, options that do not go together, unknown names, a prior
-        without any errors of the amplitudes to weigh it by.
+        For signals that were not measured at all, options that do not go together, unknown names.
     """
     chosen = find(METHODS, method, "method")
-    prior = prior or Prior()
-    for what, given in (("bounds", bounds), ("start", start), ("prior", prior.known)):
+    for what, given in (("bounds", bounds), ("start", start), ("prior", prior)):
         for name in given or {}:
             if name not in model.parameters:
                 raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
     for name, (low, high) in limits(bounds).items():
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
-    if prior.known and not experiments.stated:
+    if (prior or ridge) and chosen.function is not identify_outputs:
+        raise ValueError("[prior] and --ridge belong to --method output-error")
+    if prior and not experiments.stated:
         raise ValueError(
             "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
             "--phase-error, or [errors] in the model file)"
         )
     ask_about_case(model, experiments)
     experiments, copies = experiments.without_copies()
-    found = chosen.function(model, experiments, bounds, loss, start, prior)
+    if prior or ridge:
+        found = identify_outputs(model, experiments, bounds, loss, start, prior, ridge)
+    else:
+        found = chosen.function(model, experiments, bounds, loss, start)
     return replace(found, left_out=(*copies, *found.left_out))
 
 
@@ -89,15 +92,14 @@ def _by_equations(
     bounds: Bounds | None,
     loss: str,
     start: Mapping[str, float] | None,
-    prior: Prior,
 ) -> Identification:
     if loss != "linear" or start:
         raise ValueError("loss and start belong to method='output-error'; linear regression has neither")
     hidden = hidden_outputs(model, experiments)
     seen = without(model, hidden) if hidden else None
     if seen is None:
-        return equation_error(model, experiments, bounds=bounds, prior=prior)
-    found = equation_error(seen, experiments, bounds=bounds, prior=prior)
+        return equation_error(model, experiments, bounds=bounds)
+    found = equation_error(seen, experiments, bounds=bounds)
     if not np.isfinite(found.condition_number):
         raise ValueError(
             f"these experiments do not determine the {len(seen.combinations.words)} combinations of the "

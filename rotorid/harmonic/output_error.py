@@ -29,7 +29,7 @@ from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
-from rotorid.regression.prior import NO_PRIOR, Prior, PriorEffect, effect
+from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
@@ -83,10 +83,10 @@ def output_error(
     model: HarmonicModel,
     experiments: Experiments,
     start: Mapping[str, float] | ArrayLike,
-    *,
     bounds: Bounds | None = None,
     loss: str = "linear",
-    prior: Prior = NO_PRIOR,
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> OutputError:
     """Fit predicted to measured amplitudes.
 
@@ -102,7 +102,7 @@ def output_error(
         First guess of each parameter, by name or in the model's order; NaN where there is none.
     bounds, loss
         As in `nonlinear_least_squares`.
-    prior
+    prior, ridge
         As in `identify`.
 
     Raises
@@ -117,7 +117,7 @@ def output_error(
     """
     comparison = compare(model, experiments)
     point = starting_values(model, experiments, start)[0]
-    own = prior.rows(model.parameters, point, comparison.jacobian(point) if prior.ridge else point[None])
+    own = prior_rows(model.parameters, prior or {}, ridge, point, comparison.jacobian)
     rounds: list[NonlinearEstimate] = []
     while True:
         fit = nonlinear_least_squares(

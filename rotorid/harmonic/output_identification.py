@@ -21,7 +21,7 @@ from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
 from rotorid.regression.normal_matrix import normal_matrix
-from rotorid.regression.prior import NO_PRIOR, Prior
+from rotorid.regression.prior import Known
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 MOST_STARTS = 8
@@ -38,13 +38,14 @@ def identify_outputs(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
-    prior: Prior = NO_PRIOR,
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> Identification:
     """Identify by output error from the linear estimate, from each of its solutions where it has several.
 
     Parameters
     ----------
-    model, experiments, bounds, loss, start, prior
+    model, experiments, bounds, loss, start, prior, ridge
         As in `identify`.
 
     Returns
@@ -52,11 +53,11 @@ def identify_outputs(
     Residuals are relative to each amplitude: (measured − predicted)/|measured|. `influence` is of first
     order.
     """
-    starts, linear, reasons = _linear_starts(model, experiments, bounds, start, prior)
+    starts, linear, reasons = _linear_starts(model, experiments, bounds, start)
     found, problem = [], None
     for begin in starts:
         try:
-            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss, prior=prior))
+            found.append(output_error(model, experiments, begin, bounds, loss, prior, ridge))
         except ValueError as error:  # one of several starts may have no answer
             problem = error
     if problem is not None and not found:
@@ -74,10 +75,11 @@ def identify_outputs(
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
     free_of_bounds = not chosen.fit.at_bounds and estimate.full_rank and loss == "linear"
-    K, r, experiment = chosen.jacobian, -estimate.residuals, chosen.experiment
-    if chosen.prior:  # its rows belong to no experiment
-        K, r = chosen.prior.rows.below(K, estimate.residuals, estimate.solution)
-        r, experiment = -r, np.append(experiment, np.full(len(chosen.prior.rows), -1))
+    K, r, experiment, told = chosen.jacobian, estimate.residuals, chosen.experiment, chosen.prior
+    if told:  # its rows belong to no experiment
+        K, r = told.rows.below(K), np.append(r, told.rows.residual(estimate.solution))
+        experiment = np.append(experiment, np.full(len(told.rows), -1))
+        told = replace(told, alone=told.alone and (reasons or (told.alone,))[0])
     identification = Identification(
         model=model,
         experiments=experiments,
@@ -98,22 +100,20 @@ def identify_outputs(
         residual_names=model.outputs,
         residual_rms=_rms(residuals),
         predicted=chosen.predicted,
-        influence=leave_one_out(K, r, experiment, len(experiments)) if free_of_bounds else None,
+        influence=leave_one_out(K, -r, experiment, len(experiments)) if free_of_bounds else None,
         left_out=chosen.left_out,
         converged=chosen.fit.converged,
         warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
-        prior=chosen.prior
-        and chosen.prior.of_model(linear.alone if linear and linear.model is model else ""),
+        prior=told,
         normal_matrix=normal_matrix(model.parameters, chosen.jacobian),
     )
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(model, others).recovery.solutions
 
-    doubted = doubts(identification, estimate, bounds, refit)
-    said = chosen.prior.warnings if chosen.prior else ()
-    return replace(identification, warnings=(*identification.warnings, *doubted, *said))
+    said = (*doubts(identification, estimate, bounds, refit), *(told.warnings if told else ()))
+    return replace(identification, warnings=(*identification.warnings, *said))
 
 
 def _linear_starts(
@@ -121,7 +121,6 @@ def _linear_starts(
     experiments: Experiments,
     bounds: Bounds | None,
     start: Mapping[str, float] | None,
-    prior: Prior,
 ) -> tuple[list[dict[str, float]], LinearFit | None, tuple[str, ...]]:
     """Where to begin, the linear estimate, and its reasons for what is not determined.
 
@@ -133,7 +132,7 @@ def _linear_starts(
     try:
         seen = without(model, hidden) if hidden else model
         if seen is not None:
-            linear = linear_fit(seen, experiments, limits(bounds) or None, Prior(prior.known))
+            linear = linear_fit(seen, experiments, limits(bounds) or None)
             words = reasons(linear, experiments)
     except ValueError:  # more equations than outputs, no complete row
         pass

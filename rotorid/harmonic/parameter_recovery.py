@@ -88,7 +88,7 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
     warnings: list[str] = []
     candidates, searched = real_solutions(system.cleared(), free, base)
     found: list[tuple[float, FloatArray]] = []
-    weight = weights(system)
+    weight = _weights(system)
     for start in candidates:
         theta = _refine(system, start, free, weight)
         if theta is not None and not any(_same(theta, other) for _, other in found):
@@ -118,7 +118,7 @@ def recover(system: System, bounds: Bounds | None = None) -> Recovery:
     return Recovery(tuple(solutions), open_, gain, tuple(reasons), tuple(warnings))
 
 
-def weights(system: System) -> FloatArray:
+def _weights(system: System) -> FloatArray:
     """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
     if system.covariance is not None:
         std = np.sqrt(np.diag(system.covariance))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 from typing import Any
@@ -56,23 +56,6 @@ class System:
         matrix = self.matrix - self.values[:, None] * self.below
         values = np.where(self.below.any(axis=1), 0.0, self.values)
         return System(self.names, self.exponents, matrix, values, None)
-
-    def with_prior(self, known: Mapping[str, tuple[float, float]]) -> System:
-        """With values and deviations of parameters as more combinations, each a parameter by itself."""
-        if not known or self.covariance is None:
-            return self
-        from scipy.linalg import block_diag
-
-        value, std = np.array([*known.values()]).T
-        alone = np.array([[float(name == other) for other in self.names] for name in known])
-        return System(
-            self.names,
-            np.vstack((self.exponents, alone)),
-            block_diag(self.matrix, np.eye(len(known))),
-            np.append(self.values, value),
-            block_diag(self.covariance, np.diag(std**2)),
-            None if self.below is None else block_diag(self.below, np.zeros((len(known), len(known)))),
-        )
 
     def bottom(self, theta: FloatArray) -> FloatArray:
         """What stands below each sum (q,), 1 where nothing does."""

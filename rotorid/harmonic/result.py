@@ -17,7 +17,7 @@ from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
 from rotorid.regression.normal_matrix import NormalMatrix
-from rotorid.regression.prior import PriorEffect, prior_dict
+from rotorid.regression.prior import PriorEffect
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 if TYPE_CHECKING:
@@ -147,7 +147,7 @@ class Identification(Answered, Uncertain):
                     for experiment, row in zip(self.experiments.names, influence, strict=True)
                 ],
                 "normal_matrix": self.normal_matrix and self.normal_matrix.to_dict(),
-                **prior_dict(self.prior),
+                **(self.prior.to_dict() if self.prior else {}),
             }
         )
 

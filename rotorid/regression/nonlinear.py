@@ -18,7 +18,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.prior import PriorRows
+from rotorid.regression.prior import Prior
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import Function, Search, drive, inside, polish
 
@@ -110,7 +110,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     loss: str = "linear",
     max_iterations: int = 200,
     near: bool = False,
-    prior: PriorRows | None = None,
+    prior: Prior | None = None,
 ) -> NonlinearEstimate:
     """Minimise the sum of squared residuals over the parameters of a nonlinear model.
 

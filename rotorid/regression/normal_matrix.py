@@ -16,14 +16,9 @@ from rotorid.regression.search import RCOND
 
 @dataclass(frozen=True, eq=False)
 class NormalMatrix:
-    """KᵀK of the data's rows, divided by their errors where these are known; columns are not scaled.
+    """KᵀK (n, n) of the data's rows, over their errors where known, in the units of the unknowns.
 
-    Attributes
-    ----------
-    names, matrix
-        Of the unknowns, and (n, n).
-    condition_number
-        Of the matrix in these units, four digits; infinite where the rows do not determine all unknowns.
+    Its condition number has four digits; it is infinite where the rows do not determine all unknowns.
     """
 
     names: tuple[str, ...]
@@ -44,5 +39,5 @@ class NormalMatrix:
 def normal_matrix(names: tuple[str, ...], K: FloatArray) -> NormalMatrix:
     """That of rows K (m, n)."""
     s = np.linalg.svd(K, compute_uv=False)
-    full = least_squares(K, np.zeros(len(K)), rcond=RCOND).rank == len(names)
-    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else float("inf"))
+    full = least_squares(K, np.zeros(len(K)), rcond=RCOND).full_rank
+    return NormalMatrix(names, K.T @ K, float(f"{(s[0] / s[-1]) ** 2:.4g}") if full else np.inf)

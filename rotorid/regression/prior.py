@@ -1,16 +1,15 @@
 """What is known of parameters beside the data: a prior, or a ridge; both are more measured rows.
 
-A prior θ_j = v ± s of a parameter is the row θ_j / s = v / s beside rows that are divided by their errors. A
-ridge λ is a prior towards v whose s nobody knows: s = 1 / (√λ |K_j|) with K_j the column of θ_j, so that
-|K θ − Y|² + λ Σ |K_j|² (θ_j − v_j)² is minimised: it multiplies the diagonal of KᵀK by 1 + λ, whatever units
-there are. [Q] 2.3 asks for regularisation where its information matrix (2.28) is ill-conditioned, and leaves
-open which.
+A prior θ_j = v ± s is the row θ_j / s = v / s beside rows that are divided by their errors. A ridge λ is a
+prior at the start with s = 1 / (√λ |K_j|), K_j the column of θ_j there: it minimises
+|K θ − Y|² + λ Σ |K_j|² (θ_j − v_j)² and multiplies the diagonal of KᵀK by 1 + λ. [Q] 2.3 asks for
+regularisation where its information matrix (2.28) is ill-conditioned, and leaves open which.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,20 +25,15 @@ FAR = 3.0
 """Standard deviations between a prior and the data from which on they contradict each other."""
 SILENT = 1e-6
 """Share of the data below which they say nothing of a parameter."""
+Known = Mapping[str, tuple[float, float]]
+"""Value and standard deviation of parameters, by name, in their units."""
 
 
 @dataclass(frozen=True, eq=False)
-class PriorRows:
-    """Rows of a prior or a ridge, to stand below those of the data.
+class Prior:
+    """Rows below those of the data: value and deviation of p of the n parameters, by `place`.
 
-    Attributes
-    ----------
-    names
-        Of all n parameters.
-    place, value, std
-        Indices of the p parameters that have a row, the values there, and their deviations.
-    ridge
-        λ; 0 for a prior, whose deviations are known.
+    `ridge` is λ, or 0 for a prior.
     """
 
     names: tuple[str, ...]
@@ -55,59 +49,40 @@ class PriorRows:
         """Residuals (p,) at the parameters (n,)."""
         return np.asarray((theta[self.place] - self.value) / self.std)
 
-    def below(self, K: FloatArray, r: FloatArray, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives (m, n) and residuals (m,) of the data, and those of these rows below them."""
-        own = np.eye(len(self.names))[self.place] / self.std[:, None]
-        return np.vstack((K, own)), np.append(r, self.residual(theta))
+    def below(self, K: FloatArray) -> FloatArray:
+        """Derivatives (m, n) of the data, and those of these rows below them."""
+        return np.vstack((K, np.eye(len(self.names))[self.place] / self.std[:, None]))
 
     def beside(self, residual: Function, jacobian: Function) -> tuple[Function, Function]:
-        """The same for functions of the parameters (n,)."""
+        """Functions of the parameters with these rows."""
         return (
             lambda theta: np.append(residual(theta), self.residual(theta)),
-            lambda theta: self.below(jacobian(theta), np.zeros(0), theta)[0],
+            lambda theta: self.below(jacobian(theta)),
         )
 
 
-@dataclass(frozen=True)
-class Prior:
-    """What is known by name, or a ridge towards the start.
-
-    Attributes
-    ----------
-    known
-        Value and standard deviation, in the unit of the parameter.
-    ridge
-        λ of all parameters; 0: none.
+def prior_rows(
+    names: tuple[str, ...],
+    known: Known,
+    ridge: float = 0.0,
+    start: FloatArray | None = None,
+    slopes: Function | None = None,
+) -> Prior:
+    """Rows of what is known, or of a ridge λ at the start (n,), by the derivatives of the data there.
 
     Raises
     ------
     ValueError
-        A prior and a ridge, deviations or a λ that are not above 0.
+        For both of them, and a λ that is not above 0.
     """
-
-    known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    ridge: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.known and self.ridge:
-            raise ValueError("--ridge or [prior], not both: a ridge is a prior that nobody knows")
-        if not (np.isfinite(self.ridge) and self.ridge >= 0):
-            raise ValueError(f"--ridge takes a number above 0, such as 0.01, not {self.ridge:g}")
-        for name, (value, std) in self.known.items():
-            if not (np.isfinite(value) and np.isfinite(std) and std > 0):
-                raise ValueError(f"the prior of {name} needs a value and a standard deviation above 0")
-
-    def rows(self, names: Sequence[str], start: FloatArray, K: FloatArray) -> PriorRows:
-        """Rows for these parameters (n,), of which a ridge takes the start and the columns of K there."""
-        value, std = np.array([self.known.get(name, (0.0, np.inf)) for name in names]).T
-        if self.ridge:
-            with np.errstate(divide="ignore"):
-                value, std = start, 1.0 / (np.sqrt(self.ridge) * np.linalg.norm(K, axis=0))
-        place = np.flatnonzero(np.isfinite(std))
-        return PriorRows(tuple(names), place, value[place], std[place], self.ridge)
-
-
-NO_PRIOR = Prior()
+    if not (np.isfinite(ridge) and ridge >= 0) or (ridge and known):
+        raise ValueError("--ridge takes a number above 0, such as 0.01, and a model without [prior]")
+    value, std = np.array([known.get(name, (0.0, np.inf)) for name in names]).T
+    if ridge and start is not None and slopes is not None:
+        with np.errstate(divide="ignore"):
+            value, std = start, 1.0 / (np.sqrt(ridge) * np.linalg.norm(slopes(start), axis=0))
+    place = np.flatnonzero(np.isfinite(std))
+    return Prior(names, place, value[place], std[place], ridge)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,21 +94,20 @@ class PriorEffect:
     rows
         The prior.
     share
-        (p,): of what is known of each of its parameters, how much comes from the data, 1 − (variance with
-        them / variance of the prior). Their sum, and 1 for each parameter without a prior, is the number of
-        parameters that the data pay for.
+        (p,): how much of what is known of its parameters comes from the data, 1 − variance / prior variance.
     away
         (p,): standard deviations between the prior and all the rest; NaN where the data say nothing.
-    alone, rank
-        What the data alone determine, in words, if that is not everything; it holds near the values found.
+    alone, lost, rank
+        What the data alone determine, in words, if that is not everything; what they do not.
     condition_numbers, residual_rms
-        Of the rows of the data without and with it; a nonlinear model is linearised there.
+        Of the rows of the data without and with it; a nonlinear model is linearised.
     """
 
-    rows: PriorRows
+    rows: Prior
     share: FloatArray
     away: FloatArray
     alone: str
+    lost: tuple[str, ...]
     rank: int
     condition_numbers: tuple[float, float]
     residual_rms: tuple[float, float]
@@ -141,11 +115,12 @@ class PriorEffect:
     @property
     def why(self) -> dict[str, str]:
         """Beside each parameter, how much of it is from the data, where the prior says anything."""
-        only = "by the ridge only" if self.rows.ridge else "by its prior only"
-        return {
-            name: f"{percent(share)} % from the data" if share >= 0.005 else only
+        if self.rows.ridge:
+            return dict.fromkeys(self.lost, "by the ridge only")
+        return dict.fromkeys(self.lost, "through the prior") | {
+            name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
             for name, share in zip(self._names, self.share, strict=True)
-            if share < 0.005 or (share < 0.995 and not self.rows.ridge)
+            if share < 0.995
         }
 
     @property
@@ -166,20 +141,15 @@ class PriorEffect:
             if abs(away) > FAR
         )
 
-    def judgement(self, words: str) -> str:
-        """What is determined with it, and by the data alone."""
-        if not self.alone:
-            return words
-        which = "the ridge" if self.rows.ridge else "the prior"
-        return f"With {which} {words[0].lower()}{words[1:]}\nWithout it {self.alone}."
-
     @property
     def _names(self) -> list[str]:
         return [self.rows.names[j] for j in self.rows.place]
 
-    def of_model(self, alone: str) -> PriorEffect:
-        """With better words of what the data alone determine than those of the linearised model."""
-        return replace(self, alone=alone) if self.alone and alone else self
+    def judgement(self, words: str) -> str:
+        """What is determined with it, and by the data alone."""
+        which = "ridge" if self.rows.ridge else "prior"
+        with_it = f"With the {which} {words[0].lower()}{words[1:]}"
+        return f"{with_it}\nWithout it {self.alone}." if self.alone else words
 
     def apart(self, found: Estimate, *, stated: bool) -> Estimate:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
@@ -190,53 +160,41 @@ class PriorEffect:
         return replace(found, errors_stated=stated, chi_square=chi_square, dof=m - self.rank)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        each = zip(self._names, self.rows.value, self.rows.std, self.share, self.away, strict=True)
+        """Part of a document, `prior` or `ridge`, as JSON types."""
+        each = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
         keys = ("value", "std", "data_share", "deviation")
-        parameters = {name: dict(zip(keys, numbers, strict=True)) for name, *numbers in each}
-        (without, with_it), (before, after) = self.condition_numbers, self.residual_rms
-        return plain(
-            {
-                **({"lambda": self.rows.ridge} if self.rows.ridge else {}),
-                "parameters": parameters,
-                "data_alone": self.alone or None,
-                "condition_number": {"without": without, "with": with_it},
-                "residual_rms": {"without": before, "with": after},
-            }
-        )
+        known = [dict(zip(keys, numbers, strict=True)) for numbers in each]
+        own = {
+            **({"lambda": self.rows.ridge} if self.rows.ridge else {}),
+            "parameters": dict(zip(self._names, known, strict=True)),
+            "data_alone": self.alone or None,
+            "condition_number": dict(zip(("without", "with"), self.condition_numbers, strict=True)),
+            "residual_rms": dict(zip(("without", "with"), self.residual_rms, strict=True)),
+        }
+        return plain({"ridge" if self.rows.ridge else "prior": own})
 
 
-def prior_dict(found: PriorEffect | None) -> dict[str, Any]:
-    """Part of a document: `prior` or `ridge`; empty without any."""
-    return {} if found is None else {"ridge" if found.rows.ridge else "prior": found.to_dict()}
+def effect(rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray) -> PriorEffect | None:
+    """What the rows of a prior did to the estimate (n,); None without any.
 
-
-def effect(rows: PriorRows, K: FloatArray, r: FloatArray, theta: FloatArray) -> PriorEffect | None:
-    """What the rows of a prior did; None without any.
-
-    Parameters
-    ----------
-    rows
-        The prior.
-    K, r
-        Derivatives (m, n) and residuals (m,) of the data at the estimate, divided by their errors.
-    theta
-        The estimate (n,).
+    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors.
     """
     if not len(rows):
         return None
     alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=RCOND)
-    both = least_squares(*rows.below(K, -r, theta), names=rows.names, sigma=1.0, rcond=RCOND)
+    A = rows.below(K)
+    both = least_squares(A, np.zeros(len(A)), sigma=1.0, rcond=RCOND)
     assert both.std is not None
     share = np.nan_to_num(1.0 - (both.std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        away = (theta[rows.place] - rows.value) / (rows.std * np.sqrt(share))
+        away = rows.residual(theta) / np.sqrt(share)
     best = r + K @ solution(K, -r, rcond=RCOND)
     return PriorEffect(
         rows=rows,
         share=share,
         away=np.where(share > SILENT, away, np.nan),
         alone="" if alone.full_rank else alone.describe_rank(),
+        lost=alone.undetermined,
         rank=alone.rank,
         condition_numbers=(alone.condition_number, both.condition_number),
         residual_rms=(float(np.sqrt(np.mean(best**2))), float(np.sqrt(np.mean(r**2)))),

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find
-from rotorid.regression.prior import Prior, PriorRows
+from rotorid.regression.prior import Prior, prior_rows
 from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
@@ -95,8 +95,7 @@ def fit(  # noqa: PLR0913
     Raises
     ------
     ValueError
-        Unknown names or methods, records that do not suit the model, a prior of the model without any errors
-        of the records to weigh it by.
+        Unknown names or methods, records that do not suit the model, a prior without errors to weigh it by.
     SimulationError
         The states diverge with the starting values.
 
@@ -124,27 +123,32 @@ def fit(  # noqa: PLR0913
     if starts < 1 or max_iterations < 1 or not max_seconds > 0:
         raise ValueError("starts and max_iterations must be at least 1, max_seconds above 0")
     several = (records,) if isinstance(records, Record) else tuple(records)
-    before = _beforehand(model, several, weigh, ridge)
+    stated = any(record.sigma is not None for record in several)
+    if weigh and stated:
+        raise ValueError("standard deviations are stated: there is nothing to estimate them for")
+    if model.prior and not (weigh or stated):
+        raise ValueError(
+            "[prior] is weighed against the errors of the records: state them (--sigma 0.01, or columns "
+            "NAME_std), or have them estimated (--sigma auto)"
+        )
     problem = Problem(model, several, integrator, rtol, seconds=max_seconds)
     names = problem.model.parameters
     limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
     begin = _start(problem.model, for_copies(model, len(several), start or {}))
     begin = inside(begin, limits[:, 0], limits[:, 1])
-    rows = before.rows(names, begin, problem.evaluate(begin)[1] if ridge else begin[None])
-    if not (weigh and before.known):
-        problem.prior = rows
+    prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
+    if ridge or not weigh:
+        problem.prior = prior
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
     search = Search(way, limits, loss, kind, pieces, max_iterations, tolerance)
     path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
     if weigh:
-        problem, path = _weighed(search, problem, path, rows)
+        problem, path = _weighed(search, problem, path, prior)
     problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
     warnings = judged.warnings
-    if len(problem.prior) < len(rows):
-        warnings = (*warnings, "[prior] is not used: the errors are estimated without it; state --sigma")
     if len(minima) > 1:
         warnings = (*warnings, f"{len(minima)} different minima were found; the best is given, see minima")
     if plain and _outside(path.estimate.solution, limits):
@@ -170,20 +174,7 @@ def fit(  # noqa: PLR0913
     )
 
 
-def _beforehand(model: OdeModel, records: Sequence[Record], weigh: bool, ridge: float) -> Prior:
-    """The prior of a model, or a ridge, where there are errors to weigh the prior by."""
-    stated = any(record.sigma is not None for record in records)
-    if weigh and stated:
-        raise ValueError("standard deviations are stated: there is nothing to estimate them for")
-    if model.prior and not (weigh or stated):
-        raise ValueError(
-            "[prior] is weighed against the errors of the records: state them (--sigma 0.01, or columns "
-            "NAME_std), or have them estimated (--sigma auto)"
-        )
-    return Prior(for_copies(model, len(records), model.prior), ridge)
-
-
-def _weighed(search: Searching, problem: Problem, path: Path, rows: PriorRows) -> tuple[Problem, Path]:
+def _weighed(search: Searching, problem: Problem, path: Path, prior: Prior) -> tuple[Problem, Path]:
     """Weights from the residuals of the last fit, until they stay; only then a prior, whatever it says."""
     for _ in range(WEIGHINGS if path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
@@ -192,10 +183,10 @@ def _weighed(search: Searching, problem: Problem, path: Path, rows: PriorRows) -
             break
         problem = problem.weighed(errors)
         path = search(problem, path.estimate.solution).after(path.history)
-    if problem.prior is not rows and path.converged:
-        if not problem.errors:
-            raise ValueError("--sigma auto finds no errors to weigh [prior] by, only rounding: state them")
-        problem.prior = rows
+    if len(prior) and problem.prior is not prior:
+        if not (path.converged and problem.errors):
+            raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
+        problem.prior = prior
         path = search(problem, path.estimate.solution).after(path.history)
     return problem, path
 

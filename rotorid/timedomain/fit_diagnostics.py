@@ -145,7 +145,7 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     missed = r - exact
     if np.linalg.norm(missed) <= ROUNDING * np.linalg.norm(problem.data):
         return np.zeros(len(found.names))
-    K, _ = problem.prior.below(J, missed, found.solution)
+    K = problem.prior.below(J)
     change: FloatArray = solution(K, np.append(missed, np.zeros(len(K) - len(J))), rcond=RCOND)
     return change
 

@@ -14,7 +14,7 @@ from rotorid.base.result import Column, frame
 from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
 from rotorid.regression.normal_matrix import NormalMatrix
-from rotorid.regression.prior import PriorEffect, prior_dict
+from rotorid.regression.prior import PriorEffect
 from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.methods.iteration_history import Path
 from rotorid.timedomain.methods.multiple_starts import Minimum
@@ -122,7 +122,7 @@ class Fit(Answered, Path):
                 }
             ),
             "normal_matrix": self.normal_matrix and self.normal_matrix.to_dict(),
-            **prior_dict(self.prior),
+            **(self.prior.to_dict() if self.prior else {}),
         }
 
     def to_frame(self) -> pd.DataFrame:

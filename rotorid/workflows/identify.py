@@ -40,8 +40,8 @@ class IdentifyOptions:
     phase_error : DEGREES
         One standard deviation of a phase, in place of the one that the model states.
     ridge : LAMBDA
-        Regularise: multiply the diagonal of the normal matrix by 1 + λ, which pulls towards 0, or with
-        output-error towards the start; no intervals.
+        Regularise output-error: multiply the diagonal of the normal matrix by 1 + λ, which pulls towards the
+        start; no intervals.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N
@@ -114,7 +114,6 @@ def identify(
     """
     from rotorid.harmonic import Experiments, HarmonicModel
     from rotorid.harmonic import identify as estimate
-    from rotorid.regression.prior import Prior
     from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 
     options = options or IdentifyOptions()
@@ -137,7 +136,8 @@ def identify(
                 bounds=file.bounds or None,
                 loss=options.loss,
                 start=(file.start or None) if options.method == "output-error" else None,
-                prior=Prior(file.prior, options.ridge or 0.0),
+                prior=file.prior,
+                ridge=options.ridge or 0.0,
             )
         log.info("degrees_of_freedom = %s", result.dof)
     return Coefficients(

@@ -12,7 +12,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.prior import Prior, PriorRows
+from rotorid.regression.prior import Prior, prior_rows
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, Trajectory, simulate
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -66,7 +66,7 @@ class Problem:
         rtol: float = RTOL,
         errors: Mapping[str, float] | None = None,
         seconds: float = np.inf,
-        prior: PriorRows | None = None,
+        prior: Prior | None = None,
     ) -> None:
         self.records, self._given = tuple(from_t0(model, record) for record in records), model
         self.integrator, self.rtol = integrator, rtol
@@ -79,8 +79,7 @@ class Problem:
         self.models = models_of(model, len(self.records))
         """One per record, all with the same parameters."""
         self.model = self.models[0]
-        names = self.model.parameters
-        self.prior = prior or Prior().rows(names, self.model.start, np.zeros((0, len(names))))
+        self.prior = prior or prior_rows(self.model.parameters, {})
         tables = [self._table(record) for record in self.records]
         known = {given for _, _, given in tables if given is not None}
         if len(known) > 1:
@@ -210,9 +209,9 @@ class Problem:
 
     def linear_fit(self, K: FloatArray, Y: FloatArray, theta: FloatArray) -> Estimate:
         """The step of the parameters (n,) from linearised rows K δ = Y, (m, n) and (m,), and the prior's."""
-        A, r = self.prior.below(K, -Y, theta)
+        A, y = self.prior.below(K), np.append(Y, -self.prior.residual(theta))
         sigma = 1.0 if self.scaled else None
-        found = least_squares(A, -r, names=self.model.parameters, sigma=sigma, rcond=RCOND)
+        found = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
         return replace(found, residuals=found.residuals[: len(Y)])
 
     def _table(self, record: Record) -> tuple[FloatArray, FloatArray, bool | None]:
