@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rotorid.base.registry import Method
     from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, Identification
-    from rotorid.harmonic.experiment_design import Design
+    from rotorid.regression.d_optimal import Design
     from rotorid.tables import HarmonicFile
 
 MOST_CANDIDATES = 2000

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import TypeVar, cast
 
 from rotorid.base.suggestions import one_of as one_of
@@ -15,6 +16,8 @@ from rotorid.base.suggestions import one_of as one_of
 _T = TypeVar("_T")
 Speeds = str | Sequence[float | str]
 """As `speeds` reads them, or one by one: rad/s, or "3000rpm"."""
+Times = str | Sequence[float]
+"""As `times` reads them, or one by one, s."""
 Band = str | tuple[float | str, float | str]
 """As `band` reads it, or the lowest and highest speed, rad/s or "3000rpm"."""
 Nodes = str | Sequence[str | int]
@@ -194,6 +197,18 @@ def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[f
     return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
 
 
+def times(given: Times, what: str) -> list[float]:
+    """Read rising times, s: "0:10:0.5" (first:last:step) or "0,0.5,2"."""
+    sign = ":" if isinstance(given, str) and ":" in given else ","
+    found = [number(str(part)) for part in (given.split(sign) if isinstance(given, str) else given)]
+    good = all(map(math.isfinite, found)) and (sign == "," or len(found) == 3)
+    if good and sign == ":":
+        found = list(_range(found, what, str(given)))
+    if not (good and found) or any(after <= before for before, after in pairwise(found)):
+        raise ValueError(f"{what} {given!r}: use FIRST:LAST:STEP or a rising list with commas, in s")
+    return found
+
+
 def rising_speeds(given: Speeds, what: str = "--speeds") -> list[float]:
     """`speeds` in ascending order, each once."""
     return sorted(set(speeds(given, what=what)))
@@ -211,11 +226,9 @@ def _range(ends: Sequence[float], what: str, given: str) -> tuple[float, ...]:
     """First, last and step as all values between them."""
     first, last, step = ends
     if step <= 0 or last < first:
-        raise ValueError(
-            f"{what} {given!r}: the step must be positive and the last speed not below the first"
-        )
+        raise ValueError(f"{what} {given!r}: the step must be positive and the last not below the first")
     if (last - first) / step > 1e6:
-        raise ValueError(f"{what} {given!r} has more than a million speeds")
+        raise ValueError(f"{what} {given!r} has more than a million steps")
     return tuple(first + step * i for i in range(math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1))
 
 
