@@ -15,15 +15,7 @@ from rotorid.workflows.fit import fit as work
 
 @command(
     FitOptions,
-    least={
-        "starts": 1,
-        "seed": 0,
-        "choose": 1,
-        "ridge": 0,
-        "max_iterations": 1,
-        "max_seconds": 0.01,
-        "pieces": 1,
-    },
+    least={"starts": 1, "seed": 0, "choose": 1, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1},
     panels={
         "Input": "sigma start allow_missing",
         "Method": "method loss starts ridge",
