@@ -99,8 +99,10 @@ class PriorEffect:
         (p,): standard deviations between the prior and all the rest; NaN where the data say nothing.
     alone, lost, rank
         What the data alone determine, in words, if that is not everything; what they do not.
+    best
+        Residuals (m,) of the data alone; a nonlinear model is linearised.
     condition_numbers, residual_rms
-        Of the rows of the data without and with it; a nonlinear model is linearised.
+        Of the rows of the data without and with it.
     """
 
     rows: Prior
@@ -109,6 +111,7 @@ class PriorEffect:
     alone: str
     lost: tuple[str, ...]
     rank: int
+    best: FloatArray
     condition_numbers: tuple[float, float]
     residual_rms: tuple[float, float]
 
@@ -125,7 +128,7 @@ class PriorEffect:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Priors that the data contradict; that a ridge has no intervals."""
+        """The prior that all the rest contradicts most; that a ridge has no intervals."""
         if self.rows.ridge:
             (rms, rms_now), (condition, now) = self.residual_rms, self.condition_numbers
             return (
@@ -133,12 +136,14 @@ class PriorEffect:
                 f"Residual rms {rms_now:.3g}, condition number {now:.3g}; without it, linearised, {rms:.3g} "
                 f"and {condition:.3g}",
             )
-        each = zip(self._names, self.rows.value, self.rows.std, self.away, strict=True)
-        return tuple(
-            f"the data contradict the prior {name} = {value:.6g} ± {std:.2g} by {abs(away):.2g} standard "
-            "deviations: one of them, or the model, is wrong"
-            for name, value, std, away in each
-            if abs(away) > FAR
+        far = np.nan_to_num(np.abs(self.away))
+        i = int(np.argmax(far))
+        if far[i] <= FAR:
+            return ()
+        rest = "the data" if len(far) == 1 else "the data and the other priors"
+        return (
+            f"{rest} contradict the prior {self._names[i]} = {self.rows.value[i]:.6g} ± "
+            f"{self.rows.std[i]:.2g} by {far[i]:.2g} standard deviations: one of these or the model is wrong",
         )
 
     @property
@@ -153,11 +158,10 @@ class PriorEffect:
 
     def apart(self, found: Estimate, *, stated: bool) -> Estimate:
         """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
-        m = len(found.residuals)
         if self.rows.ridge:
             found = replace(found, covariance=None, solution_covariance=None)
-        chi_square = m * self.residual_rms[0] ** 2 if stated else None
-        return replace(found, errors_stated=stated, chi_square=chi_square, dof=m - self.rank)
+        chi_square = float(self.best @ self.best) if stated else None
+        return replace(found, errors_stated=stated, chi_square=chi_square, dof=len(self.best) - self.rank)
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
@@ -196,6 +200,7 @@ def effect(rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray) -> Prio
         alone="" if alone.full_rank else alone.describe_rank(),
         lost=alone.undetermined,
         rank=alone.rank,
+        best=best,
         condition_numbers=(alone.condition_number, both.condition_number),
         residual_rms=(float(np.sqrt(np.mean(best**2))), float(np.sqrt(np.mean(r**2)))),
     )

@@ -74,7 +74,7 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
         draft.note("the record is zero throughout: a sensor without a signal?")
     draft.note(*_integration_words(found, draft.integration_change, problem.model.parameters))
     seen = correlation(problem, r)
-    poor = misfit(problem, found.dof, r, loss)
+    poor = misfit(problem, found.dof, r if draft.prior is None else draft.prior.best, loss)
     draft.note(poor, spoils=True)
     if not poor:
         draft.note("" if seen is None else seen.words(), *_chi_words(found))
