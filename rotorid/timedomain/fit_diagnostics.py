@@ -61,7 +61,7 @@ class _Draft:
 
 def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
-    draft, r = _Draft(path.estimate, path.converged), path.estimate.residuals
+    draft = _Draft(path.estimate, path.converged)
     draft.note("" if path.converged else f"{path.message}; no intervals are given", path.bound_warning)
     try:
         _note_sensitivities(draft, problem, path, loss)
@@ -73,8 +73,9 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     if not problem.data.any():
         draft.note("the record is zero throughout: a sensor without a signal?")
     draft.note(*_integration_words(found, draft.integration_change, problem.model.parameters))
+    r = found.residuals if draft.prior is None else draft.prior.best  # of the data alone
     seen = correlation(problem, r)
-    poor = misfit(problem, found.dof, r if draft.prior is None else draft.prior.best, loss)
+    poor = misfit(problem, found.dof, r, loss)
     draft.note(poor, spoils=True)
     if not poor:
         draft.note("" if seen is None else seen.words(), *_chi_words(found))
@@ -98,7 +99,7 @@ def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) 
     draft.prior = effect(problem.prior, J, r, found.solution)
     if draft.prior is not None:
         draft.note(*draft.prior.warnings, spoils=problem.prior.ridge > 0)
-        draft.estimate = draft.prior.apart(found, stated=problem.stated)
+        draft.estimate, r = draft.prior.apart(found, stated=problem.stated), draft.prior.best
     if weak := _insensitive(problem, J, found):
         draft.note(f"the record hardly depends on {', '.join(weak)}")
     if path.converged:

@@ -64,8 +64,8 @@ class FitOptions:
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
     ridge : LAMBDA
-        Regularise: multiply the diagonal of the normal matrix by 1 + λ, which pulls towards the starting
-        values; no intervals.
+        Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
+        intervals.
     sigma : LIST
         Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
         from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
