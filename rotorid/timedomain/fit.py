@@ -61,7 +61,7 @@ def fit(  # noqa: PLR0913
     method
         One of `METHODS` in `rotorid.timedomain.methods.fit_methods`.
     integrator
-        Of `INTEGRATORS`. Quasilinearization takes "heun" as [Q] does, or integrates with error control.
+        Of `INTEGRATORS`. Quasilinearization takes one of `HEUN`, or integrates with error control.
     start
         Starting values by name, instead of the model's.
     bounds
@@ -119,7 +119,7 @@ def fit(  # noqa: PLR0913
     if plain and bounds:
         raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
-        raise ValueError("quasilinearization integrates with heun, or with error control (auto)")
+        raise ValueError("quasilinearization integrates with heun, sequential-heun, or error control (auto)")
     if starts < 1 or max_iterations < 1 or not max_seconds > 0:
         raise ValueError("starts and max_iterations must be at least 1, max_seconds above 0")
     several = (records,) if isinstance(records, Record) else tuple(records)

@@ -13,7 +13,7 @@ from rotorid.regression.normal_matrix import NormalMatrix, normal_matrix
 from rotorid.regression.prior import PriorEffect, effect
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.adaptive import shortest_pulse
-from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.integration.simulate import STEPWISE, SimulationError, inputs_of
 from rotorid.timedomain.methods.iteration_history import Path
 from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
 from rotorid.timedomain.nonlinear_combinations import combined
@@ -138,7 +138,7 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     if used in ("expm", "none"):
         return None
     r = problem.residual(found.solution)
-    if used in ("heun", "rk4"):
+    if used in STEPWISE:
         finer = problem.again("auto", RTOL)
     else:
         finer = problem.again(problem.integrator, max(problem.rtol / 100, 1e-13))

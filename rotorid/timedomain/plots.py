@@ -173,10 +173,10 @@ def _finish(axes: Axes, name: str) -> None:
 
 
 def _fine(result: Fit, k: int) -> Trajectory:
-    from rotorid.timedomain.integration.simulate import simulate
+    from rotorid.timedomain.integration.simulate import STEPWISE, simulate
 
     record, run = result.records[k], result.simulations[k]
-    if run.method in ("heun", "rk4") or len(record) == 1 or len(record) >= CURVE_POINTS:
+    if run.method in STEPWISE or len(record) == 1 or len(record) >= CURVE_POINTS:
         return run
     try:
         return simulate(result.models[k], result.estimate.solution, _refined(record))

@@ -1,37 +1,37 @@
-"""Identification from time records, [Q] tables 2.1 to 2.3 and the three masses of [F].
+"""Identification from time records, [Q] tables 2.1 to 2.3 with its text, and the three masses of [F].
 
 The tables of [Q] are its record, and the states and parameters of each step of its quasilinearization with
-Heun's scheme. Of [F] the intact part of the printed record is compared, and what a fit finds from it.
+the integrator "sequential-heun"; its text has the normal equations of each step. Of [F] the intact part of
+the printed record is compared, and what a fit finds from it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.regression import solution
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model
 from rotorid.timedomain import OdeModel, Record, Trajectory, ode_model, simulate
 from rotorid.timedomain.fit import fit
-from rotorid.validation.row import Row, half_unit, number, printed_table, row
+from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
+from rotorid.timedomain.methods.quasilinearization import linear_solutions
+from rotorid.validation.row import Printed, Row, half_unit, number, printed_table, row
 
 TRUTH_Q = (1.0, -1.0, -1.0)
 TRUTH_F = (0.14, 12.0, 28.0)
 PARAMETERS_Q = ("theta1", "theta2", "theta3")
 PARAMETERS_F = ("c1, N/m", "m1, kg", "m2, kg")
+OUTPUTS = np.array([[1.0, 2.0], [2.0, 1.0]])
+"""[Q] (2.25): y = C x."""
+BOOK = Printed("q_iterations.csv")
+RESTORED = ", sign restored"
 
-SCHEME = (
-    "the print recalculates x2 with the recalculated x1, Heun's scheme both from the first guess; they are "
-    "one in the first iteration only, where the equations are not coupled yet"
-)
-STATES = {2: 1e-3, 3: 3e-3, 4: 1e-3, 5: 6e-4}
-"""How far the two schemes are apart in table 2.2, by iteration."""
-PARAMETERS = 3e-3
-"""The same in table 2.3."""
 EXACT = "tighter than half a unit: the record is exact to ten digits, and so is the estimate"
-START = "the iteration starts there, exactly"
 ZEROS = "the print drops trailing zeros: half a unit of the fifth significant digit"
 ROUNDED = "three standard errors that the rounding of the printed values leaves"
 FROM_PRINT = {"c1, N/m": 3e-6, "m1, kg": 6e-5, "m2, kg": 1.2e-5}
@@ -43,8 +43,8 @@ def rows() -> list[Row]:
     Returns
     -------
     list of Row
-        90 of table 2.1, 372 of table 2.2, 21 of table 2.3, 3 of the parameters of the record of [Q]; 164 of
-        the record of [F], 9 of its estimates.
+        90 of table 2.1, 372 of table 2.2, 21 of table 2.3, 65 of the normal equations, 3 of differences and 3
+        of the parameters of the record of [Q]; 164 of the record of [F], 3 of its estimates.
     """
     model = _book_model()
     truth = simulate(model, TRUTH_Q, np.linspace(0.0, math.pi, 31), sensitivities=False)
@@ -52,7 +52,8 @@ def rows() -> list[Row]:
     chain = read_ode_model(sample_data() / "fit" / "three_masses" / "model.toml")
     return [
         *_table_2_1(truth),
-        *_tables_2_2_and_2_3(model, record),
+        *_iterations(model, record),
+        *_differences(truth),
         *_parameters_of_the_record(model, record),
         *_printed_record(chain),
         *_estimates(chain),
@@ -86,26 +87,62 @@ def _table_2_1(truth: Trajectory) -> list[Row]:
     ]
 
 
-def _tables_2_2_and_2_3(model: OdeModel, record: Record) -> list[Row]:
-    """States and parameters of each iteration; the first trajectory is Heun's solution at θ = 0."""
-    found = fit(model, record, method="quasilinearization", integrator="heun")
-    made = []
-    for line in printed_table("q_table_2_2.csv"):
-        j = int(line["j"])
-        for k in range(6):
-            x = found.trajectories[k][0][j - 1] if k < len(found.trajectories) else np.full(2, math.nan)
-            for name, value in zip(("x1", "x2"), x, strict=True):
-                text, wide = line[f"{name}_iteration_{k}"], STATES.get(k) if j > 1 else None
-                quantity = f"{name}({j}), iteration {k}"
-                made.append(row("[Q] table 2.2", quantity, text, float(value), wide, SCHEME if wide else ""))
-    for line in printed_table("q_table_2_3.csv"):
-        k = int(line["iteration"])
-        theta = found.history[k] if k < len(found.history) else np.full(3, math.nan)
-        for name, value in zip(PARAMETERS_Q, theta, strict=True):
-            tolerance, reason = {0: (1e-12, START), 1: (None, "")}.get(k, (PARAMETERS, SCHEME))
-            quantity = f"{name}, iteration {k}"
-            made.append(row("[Q] table 2.3", quantity, line[name], float(value), tolerance, reason))
+def _iterations(model: OdeModel, record: Record) -> list[Row]:
+    """States, parameters and normal equations of each iteration; the first trajectory is that of θ = 0."""
+    found = fit(model, record, method="quasilinearization", integrator="sequential-heun")
+    problem = Problem(model, (record,), "sequential-heun", RTOL)
+    steps = list(zip(found.history[:7], (x for (x,) in found.trajectories), strict=False))
+    states = {
+        f"x{i + 1}({j + 1}), iteration {k}": float(value)
+        for k, (_, x) in enumerate(steps[:6])
+        for (j, i), value in np.ndenumerate(x)
+    }
+    parameters = {
+        f"{name}, iteration {k}": value
+        for k, (theta, _) in enumerate(steps)
+        for name, value in zip(PARAMETERS_Q, theta.tolist(), strict=True)
+    }
+    made = [*_beside("[Q] table 2.2", states), *_beside("[Q] table 2.3", parameters)]
+    for s, (theta, x) in enumerate(steps):
+        made += _beside(f"[Q] (2.{29 + s})", _normal_equations(problem, theta, x))
     return made
+
+
+def _normal_equations(problem: Problem, theta: FloatArray, x: FloatArray) -> dict[str, float]:
+    """[Q] (2.25) to (2.28): M and Y of M θ = Y, from the equations linearised about a trajectory (31, 2)."""
+    table, _ = linear_solutions(problem, theta, lambda _: x, 0)
+    seen = OUTPUTS @ table
+    F = seen[..., 1:].reshape(-1, 3)
+    y = np.column_stack(list(problem.records[0].outputs.values())) - seen[..., 0]
+    Y = F.T @ (y.ravel() + F @ theta)
+    return {
+        **{f"M({i + 1},{j + 1})": float(value) for (i, j), value in np.ndenumerate(F.T @ F)},
+        **{f"Y({i + 1})": value for i, value in enumerate(Y.tolist())},
+    }
+
+
+def _differences(truth: Trajectory) -> list[Row]:
+    """[Q] (2.36): the parameters among the coefficients of the differences of table 2.1, all of them free.
+
+    The print does not say how they were computed. With the states and the input as table 2.1 has them, to
+    four digits, these regressions of the forward differences on both states and the input repeat all three.
+    """
+    printed = [
+        [float(f"{value:.3e}") for value in (*x, u)] for x, u in zip(truth.x, truth.y[:, 2], strict=True)
+    ]
+    table = np.array(printed)
+    slopes = np.diff(table[:, :2], axis=0) / np.diff(truth.t)[:, None]
+    on_x1, on_x2, _ = solution(table[:-1], slopes)
+    values = (on_x2[0], on_x1[1], on_x2[1])
+    return _beside(
+        "[Q] (2.36), regression found by agreement", dict(zip(PARAMETERS_Q, map(float, values), strict=True))
+    )
+
+
+def _beside(source: str, computed: Mapping[str, float]) -> list[Row]:
+    """Every printed number of a source; what was not computed is not finite."""
+    quantities = [quantity for given, quantity in BOOK.lines if given == source]
+    return BOOK.rows(source, {q: computed.get(q.removesuffix(RESTORED), math.nan) for q in quantities})
 
 
 def _parameters_of_the_record(model: OdeModel, record: Record) -> list[Row]:
@@ -125,7 +162,7 @@ def _printed_record(chain: OdeModel) -> list[Row]:
     for line in lines:
         text, state = line["value"], line["state"]
         computed = trajectory.y[round(5 * float(line["t_s"])), chain.outputs.index(state)]
-        sign = ", sign restored" if state == "y2" else ""
+        sign = RESTORED if state == "y2" else ""
         fifth = fifth_digit(text)
         short = fifth < half_unit(text)
         quantity = f"{state}({line['t_s']} s){sign}"

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rotorid.timedomain import OdeModel, Record
     from rotorid.timedomain.result import Fit
 
-WITHOUT_CONTROL = ("expm", "heun", "rk4")
+WITHOUT_CONTROL = ("expm", "heun", "sequential-heun", "rk4")
 """Integrators that know no tolerance."""
 MOST_CANDIDATES = 2000
 _NO_RECORD = "give a record after the model file (only --design does without)"

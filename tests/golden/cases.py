@@ -231,6 +231,7 @@ identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
+fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
 fit-quasi-noisy             fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02 --output f.csv
 fit-quasi-data              fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method quasilinearization --trajectory data --sigma auto
 fit-shooting                fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method multiple-shooting --pieces 4

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
@@ -54,6 +56,11 @@ class Augmented:
         if self.np:
             out[n:, n:] = np.kron(f_x, np.eye(self.np))
         return out
+
+    def rows(self, states: Sequence[int]) -> list[int]:
+        """Where these states and their rows of S stand."""
+        n = self.nx
+        return [*states, *(n + i * self.np + k for i in states for k in range(self.np))]
 
     def pack(self, x: FloatArray, s: FloatArray) -> FloatArray:
         """States (n_x,) and sensitivities (n_x, n_p) as one vector."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,9 @@ __all__ = ["INTEGRATORS", "SimulationError", "Trajectory", "inputs_of", "simulat
 
 Integrate = Callable[[Augmented, FloatArray, FloatArray, float], tuple[FloatArray, FloatArray, str]]
 """System, initial states and sensitivities, rtol → both at all times, and the method used."""
+At = TypeVar("At", int, float)
+Parts = Sequence[Sequence[int]]
+"""Numbers of states, or of rows, that are corrected together."""
 Step = Callable[[Augmented, float, float, FloatArray], FloatArray]
 """System, time now and then, states → states then."""
 
@@ -173,9 +177,44 @@ def _exact(
     return *matrix_exponential.propagate(t, x0, s0, matrix[0], matrix[1:], drive), "expm"
 
 
-def _heun(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
-    h, k1 = then - now, system(now, z)
-    return z + h / 2 * (k1 + system(then, z + h * k1))
+HEUN: dict[str, Callable[[int], Parts]] = {
+    "heun": lambda n: [range(n)],
+    "sequential-heun": lambda n: [[i] for i in range(n)],
+}
+"""Integrators of Euler's predictor and the trapezoidal corrector: the parts that each makes of n states."""
+STEPWISE = (*HEUN, "rk4")
+"""Integrators without error control, of one step from sample to sample."""
+
+
+def heun_step(
+    rate: Callable[[At, FloatArray], FloatArray],
+    now: At,
+    then: At,
+    z: FloatArray,
+    h: float,
+    parts: Parts,
+) -> FloatArray:
+    """Predict, then correct part by part: a part takes those before it as corrected, the rest as predicted.
+
+    Parameters
+    ----------
+    rate
+        Of the states (n, …), at `now` and at `then`: times, or numbers of samples.
+    z, h
+        States now, and the length of the step.
+    parts
+        Of the rows of z.
+    """
+    k = rate(now, z)
+    new: FloatArray = z + h * k
+    for part in parts:
+        new[part] = (z + h / 2 * (k + rate(then, new)))[part]
+    return new
+
+
+def _heun(name: str, system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
+    parts = [system.rows(states) for states in HEUN[name](system.nx)]
+    return heun_step(system, now, then, z, then - now, parts)
 
 
 def _rk4(system: Augmented, now: float, then: float, z: FloatArray) -> FloatArray:
@@ -210,6 +249,12 @@ INTEGRATORS: tuple[Method[Integrate], ...] = (
     Method("expm", "the exact solution of a linear model with constant coefficients", _exact),
     Method("dop853", "error control, for smooth models", partial(adaptive.integrate, method="dop853")),
     Method("lsoda", "error control, for stiff models", partial(adaptive.integrate, method="lsoda")),
-    Method("heun", "one step from sample to sample, as [Q]", _stepwise("heun", _heun)),
+    Method("heun", "one step from sample to sample", _stepwise("heun", partial(_heun, "heun"))),
+    Method(
+        "sequential-heun",
+        "the scheme of [Q], to repeat its tables: heun, but each state is corrected with those before it in "
+        "the model, whose order matters",
+        _stepwise("sequential-heun", partial(_heun, "sequential-heun")),
+    ),
     Method("rk4", "one step from sample to sample", _stepwise("rk4", _rk4)),
 )

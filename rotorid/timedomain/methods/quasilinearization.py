@@ -15,7 +15,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
-from rotorid.timedomain.integration.simulate import SimulationError, inputs_of
+from rotorid.timedomain.integration.simulate import HEUN, Parts, SimulationError, heun_step, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
 from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import LARGEST, Problem
@@ -32,8 +32,8 @@ def quasilinearization(
     Parameters
     ----------
     problem
-        Model, records and weights; its integrator "heun" takes one step per sample as [Q] does, with any
-        other the linear equations are solved by collocation.
+        Model, records and weights; its integrators of `HEUN` take one step per sample, "sequential-heun" as
+        [Q] does; with any other the linear equations are solved by collocation.
     start
         First parameters (n,).
     curves
@@ -108,8 +108,9 @@ def linear_solutions(
     if not model.states or len(t) == 1:
         table = np.broadcast_to(first, (len(t), *shape)).copy()
         return table, lambda at: np.broadcast_to(first, (*np.shape(at), *shape))
-    if problem.integrator == "heun":
-        table = _heun(model, theta, curve(t), record, first)
+    if problem.integrator in HEUN:
+        parts = HEUN[problem.integrator](len(model.states))
+        table = _heun(model, theta, curve(t), record, first, parts)
         flat = table.reshape(len(t), -1)
 
         def straight(at: FloatArray) -> FloatArray:
@@ -120,7 +121,9 @@ def linear_solutions(
     return _collocated(model, theta, curve, record, first)
 
 
-def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray) -> FloatArray:
+def _heun(
+    model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, first: FloatArray, parts: Parts
+) -> FloatArray:
     t, u = record.t, inputs_of(model, record)
     A = model.f_x(t, x, theta, u)
     b = model.f(t, x, theta, u) - np.einsum("tij,tj->ti", A, x)
@@ -129,9 +132,7 @@ def _heun(model: OdeModel, theta: FloatArray, x: FloatArray, record: Record, fir
     table[0] = w = first
     with np.errstate(all="ignore"):
         for i, h in enumerate(np.diff(t)):
-            slope = A[i] @ w + B[i]
-            w = w + h / 2 * (slope + A[i + 1] @ (w + h * slope) + B[i + 1])
-            table[i + 1] = w
+            table[i + 1] = w = heun_step(lambda j, w: A[j] @ w + B[j], i, i + 1, w, h, parts)
     if not np.isfinite(table).all():
         raise SimulationError(
             "the linearised equations have no finite solution; start from another trajectory"

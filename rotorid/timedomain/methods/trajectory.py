@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import gain
-from rotorid.timedomain.integration.simulate import inputs_of, simulate
+from rotorid.timedomain.integration.simulate import HEUN, inputs_of, simulate
 from rotorid.timedomain.methods.least_squares_problem import Problem
 from rotorid.timedomain.models.ode_model import OdeModel, ode_model
 from rotorid.timedomain.models.record import Record
@@ -63,7 +63,7 @@ def measured_trajectory(model: OdeModel, theta: FloatArray, record: Record) -> C
 
 
 def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
-    """The model's own solution over one of the records, smooth between its samples; of "heun" straight.
+    """The model's own solution over one of the records, smooth between its samples; of `HEUN` straight.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def own_trajectory(problem: Problem, theta: FloatArray, number: int) -> Curve:
     """
     model, record = problem.models[number], problem.records[number]
     t = record.t
-    if problem.integrator == "heun" or len(t) == 1 or not model.states:
+    if problem.integrator in HEUN or len(t) == 1 or not model.states:
         x = simulate(model, theta, record, method=problem.integrator, sensitivities=False).x
         return _straight(t, x)
     from scipy.interpolate import CubicHermiteSpline

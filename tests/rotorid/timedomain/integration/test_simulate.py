@@ -113,7 +113,7 @@ def test_damped_oscillator_and_its_sensitivities(method):
     np.testing.assert_allclose(run.y_theta[:, 0], damped_slopes(t, 2.0, 0.3), atol=tolerance)
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853", "lsoda", "heun", "rk4"])
+@pytest.mark.parametrize("method", ["auto", "dop853", "lsoda", "heun", "sequential-heun", "rk4"])
 @pytest.mark.parametrize("make", [q_model, chain, pendulum])
 def test_sensitivities_against_differences(make, method):
     """Those of Heun and Runge–Kutta are the derivatives of the scheme itself."""
@@ -177,7 +177,7 @@ def test_constant_rates_are_part_of_the_exact_solution():
     np.testing.assert_allclose(run.S[:, 0, 1], slope, rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.parametrize(("method", "order"), [("heun", 2), ("rk4", 4)])
+@pytest.mark.parametrize(("method", "order"), [("heun", 2), ("sequential-heun", 2), ("rk4", 4)])
 @pytest.mark.parametrize("what", ["x", "S"])
 def test_orders_of_fixed_steps(method, order, what):
     model = q_model()
@@ -199,6 +199,60 @@ def test_heun_is_the_scheme_of_the_reference():
         k = model.f(t[i], x, theta)
         x = x + h / 2 * (k + model.f(t[i + 1], x + h * k, theta))
         np.testing.assert_allclose(run.x[i + 1], x, rtol=1e-13)
+
+
+def q_in_closed_form(t):
+    """States (n, 2) of [Q] at θ = (1, −1, −1)."""
+    w, decay = np.sqrt(3) / 2, np.exp(-t / 2)
+    c, s = np.cos(w * t), np.sin(w * t)
+    return np.stack([np.sin(t) + decay * (1.5 * c + w * s), np.cos(t) - np.sqrt(3) * decay * s], axis=-1)
+
+
+def test_sequential_heun_by_hand_and_its_second_order():
+    """x1 from the prediction, x2 from the prediction and the new x1; towards the closed form as h²."""
+    model, errors = q_model(), []
+    for n in (30, 60, 120, 240):
+        t = np.linspace(0, np.pi, n + 1)
+        run = simulate(model, [1.0, -1.0, -1.0], t, method="sequential-heun")
+        a, b = 1.5, 1.0
+        for i, h in enumerate(np.diff(t)):
+            rate = b, -a - b + np.cos(t[i])
+            first, second = a + h * rate[0], b + h * rate[1]
+            a = a + h / 2 * (rate[0] + second)
+            b = b + h / 2 * (rate[1] - a - second + np.cos(t[i + 1]))
+            assert run.x[i + 1] == pytest.approx([a, b], rel=1e-13, abs=1e-15)
+            assert abs(a - first) > 0
+        errors.append(np.abs(run.x - q_in_closed_form(t)).max())
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2, atol=0.05)
+
+
+def test_sensitivities_of_sequential_heun_are_derivatives_of_its_states():
+    model, t = q_model(), np.linspace(0, np.pi, 31)
+    theta, e = np.array([0.9, -1.2, -0.8]), 1e-5
+    S = simulate(model, theta, t, method="sequential-heun").S
+    for k, step in enumerate(e * np.eye(3)):
+        pair = [simulate(model, theta + sign * step, t, method="sequential-heun").x for sign in (1, -1)]
+        np.testing.assert_allclose(S[..., k], (pair[0] - pair[1]) / (2 * e), rtol=0, atol=1e-8)
+
+
+def test_the_order_of_the_states_matters_to_sequential_heun_alone():
+    t, equations = np.linspace(0, np.pi, 31), {"x1": "a*x2", "x2": "-x1 - x2 + cos(t)"}
+    start = {"x1": 1.5, "x2": 1.0}
+    pair = [
+        ode_model(
+            {name: equations[name] for name in names},
+            initial={name: start[name] for name in names},
+            outputs={"y": "x1"},
+            estimate={"a": 1.0},
+        )
+        for names in (("x1", "x2"), ("x2", "x1"))
+    ]
+    apart = {
+        method: np.abs(np.subtract(*(simulate(model, [1.0], t, method=method).y for model in pair))).max()
+        for method in ("heun", "sequential-heun")
+    }
+    assert apart["heun"] < 1e-14
+    assert apart["sequential-heun"] > 1e-4
 
 
 @pytest.mark.parametrize("method", ["dop853", "lsoda", "expm"])
@@ -270,7 +324,7 @@ def test_curves_without_states():
     assert (run.method, run.x.shape, run.S.shape) == ("none", (7, 0), (7, 0, 2))
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853", "lsoda", "heun", "rk4"])
+@pytest.mark.parametrize("method", ["auto", "dop853", "lsoda", "heun", "sequential-heun", "rk4"])
 def test_without_sensitivities_the_states_are_the_same(method):
     model, t = pendulum(), np.linspace(0, 5, 21)
     plain = simulate(model, model.start, t, method=method, sensitivities=False)
@@ -318,8 +372,11 @@ def test_stiff_models_change_to_lsoda_by_themselves(stiffness):
 @pytest.mark.parametrize(
     ("rate", "method"),
     [
-        *(("a*x**2", method) for method in ("auto", "dop853", "lsoda", "heun", "rk4")),
-        *(("a*x", method) for method in ("auto", "expm", "dop853", "lsoda", "heun", "rk4")),
+        *(("a*x**2", method) for method in ("auto", "dop853", "lsoda", "heun", "sequential-heun", "rk4")),
+        *(
+            ("a*x", method)
+            for method in ("auto", "expm", "dop853", "lsoda", "heun", "sequential-heun", "rk4")
+        ),
         *(("-exp(a*x)", method) for method in ("auto", "dop853", "heun")),
         *(("-a*sqrt(x - 1/2)*x**4 - 1", method) for method in ("auto", "dop853", "lsoda", "heun")),
     ],
