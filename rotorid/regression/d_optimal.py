@@ -139,13 +139,7 @@ def designed(
     repeat: bool,
     unit: str,
 ) -> Design:
-    """The D-optimal n of the candidates (c,), from sensitivities as `d_optimal` takes them.
-
-    Raises
-    ------
-    ValueError
-        For n out of range.
-    """
+    """The D-optimal n of the candidates (c,), from J as `d_optimal` takes it; ValueError for another n."""
     if n < 1 or (n > len(candidates) and not repeat):
         count = len(candidates)
         raise ValueError(f"choose from 1 to {count} of the {count} candidate {_WORDS[unit][1]}, not {n}")

@@ -45,6 +45,11 @@ class Prior:
     def __len__(self) -> int:
         return len(self.place)
 
+    @property
+    def own(self) -> list[str]:
+        """Names of the p parameters."""
+        return [self.names[j] for j in self.place]
+
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (p,) at the parameters (n,)."""
         return np.asarray((theta[self.place] - self.value) / self.std)
@@ -70,10 +75,7 @@ def prior_rows(
 ) -> Prior:
     """Rows of what is known, or of a ridge λ at the start (n,), by the derivatives of the data there.
 
-    Raises
-    ------
-    ValueError
-        For both of them, and a λ that is not above 0.
+    ValueError for both of them, and a λ that is not above 0.
     """
     if not (np.isfinite(ridge) and ridge >= 0) or (ridge and known):
         raise ValueError("--ridge takes a number above 0, such as 0.01, and a model without [prior]")
@@ -87,22 +89,13 @@ def prior_rows(
 
 @dataclass(frozen=True, eq=False)
 class PriorEffect:
-    """What a prior or a ridge did to an estimate.
+    """What a prior or a ridge did to an estimate: `share` and `away` (p,), the rest once.
 
-    Attributes
-    ----------
-    rows
-        The prior.
-    share
-        (p,): how much of what is known of its parameters comes from the data, 1 − variance / prior variance.
-    away
-        (p,): standard deviations between the prior and all the rest; NaN where the data say nothing.
-    alone, lost, rank
-        What the data alone determine, in words, if that is not everything; what they do not.
-    best
-        Residuals (m,) of the data alone; a nonlinear model is linearised.
-    condition_numbers, residual_rms
-        Of the rows of the data without and with it.
+    `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
+    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
+    is what the data alone determine, in words, if that is not everything, `lost` what they do not, `rank` and
+    `best` their rank and residuals (m,). Condition numbers and rms are those without and with the prior; a
+    nonlinear model is linearised.
     """
 
     rows: Prior
@@ -122,7 +115,7 @@ class PriorEffect:
             return dict.fromkeys(self.lost, "by the ridge only")
         return dict.fromkeys(self.lost, "through the prior") | {
             name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
-            for name, share in zip(self._names, self.share, strict=True)
+            for name, share in zip(self.rows.own, self.share, strict=True)
             if share < 0.995
         }
 
@@ -142,13 +135,9 @@ class PriorEffect:
             return ()
         rest = "the data" if len(far) == 1 else "the data and the other priors"
         return (
-            f"{rest} contradict the prior {self._names[i]} = {self.rows.value[i]:.6g} ± "
+            f"{rest} contradict the prior {self.rows.own[i]} = {self.rows.value[i]:.6g} ± "
             f"{self.rows.std[i]:.2g} by {far[i]:.2g} standard deviations: one of these or the model is wrong",
         )
-
-    @property
-    def _names(self) -> list[str]:
-        return [self.rows.names[j] for j in self.rows.place]
 
     def judgement(self, words: str) -> str:
         """What is determined with it, and by the data alone."""
@@ -165,17 +154,17 @@ class PriorEffect:
 
     def to_dict(self) -> dict[str, Any]:
         """Part of a document, `prior` or `ridge`, as JSON types."""
-        each = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
+        numbers = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
         keys = ("value", "std", "data_share", "deviation")
-        known = [dict(zip(keys, numbers, strict=True)) for numbers in each]
-        own = {
-            **({"lambda": self.rows.ridge} if self.rows.ridge else {}),
-            "parameters": dict(zip(self._names, known, strict=True)),
+        each = (dict(zip(keys, four, strict=True)) for four in numbers)
+        told = {
+            "lambda": self.rows.ridge or None,
+            "parameters": dict(zip(self.rows.own, each, strict=True)),
             "data_alone": self.alone or None,
             "condition_number": dict(zip(("without", "with"), self.condition_numbers, strict=True)),
             "residual_rms": dict(zip(("without", "with"), self.residual_rms, strict=True)),
         }
-        return plain({"ridge" if self.rows.ridge else "prior": own})
+        return plain({"ridge" if self.rows.ridge else "prior": told})
 
 
 def effect(rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray) -> PriorEffect | None:

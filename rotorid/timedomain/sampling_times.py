@@ -26,18 +26,13 @@ def design_times(
 
     Parameters
     ----------
-    model
-        The initial values belong to its `t0`, or else to the first time of `driven_by`, or else to t = 0.
-    guess
-        Values of the parameters (n_p,); the choice is good as far as these are.
-    times
-        That could be sampled, s, shape (c,), rising; at each every output is read.
-    n
-        How many shall be.
-    sigma
-        Standard deviation of a sample of each output.
+    model, guess
+        The model and its parameters (n_p,); the choice is good as far as these are.
+    times, sigma
+        That could be sampled, s, shape (c,), rising; the standard deviation of a sample of each output.
     driven_by
-        A record with the inputs, where the model has any.
+        A record with the inputs, where the model has any. Its first time is that of the initial values, where
+        the model does not say; else they belong to t = 0.
 
     Raises
     ------
