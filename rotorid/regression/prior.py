@@ -2,8 +2,8 @@
 
 A prior θ_j = v ± s is the row θ_j / s = v / s beside rows that are divided by their errors. A ridge λ is a
 prior at the start with s = 1 / (√λ |K_j|), K_j the column of θ_j there: it minimises
-|K θ − Y|² + λ Σ |K_j|² (θ_j − v_j)², and adds λ times the diagonal of KᵀK at the start to KᵀK. [Q] 2.3 asks for
-regularisation where its information matrix (2.28) is ill-conditioned, and leaves open which.
+|K θ − Y|² + λ Σ |K_j|² (θ_j − v_j)², and adds λ times the diagonal of KᵀK at the start to KᵀK. [Q] 2.3
+asks for regularisation where its information matrix (2.28) is ill-conditioned, and leaves open which.
 """
 
 from __future__ import annotations
