@@ -95,7 +95,10 @@ def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) 
     """What needs the model simulated at the values found; SimulationError where it cannot be."""
     found, r = draft.estimate, draft.estimate.residuals
     J = problem.jacobian(found.solution)
-    draft.normal_matrix = normal_matrix(found.names, J)
+    s, V = found.singular_values, found.row_space
+    # of the step itself where it is known: that of quasilinearization is not about a solution of the model
+    own = not len(problem.prior) and len(s) == len(V)
+    draft.normal_matrix = normal_matrix(found.names, s[:, None] * V if own else J)
     draft.prior = effect(problem.prior, J, r, found.solution)
     if draft.prior is not None:
         draft.note(*draft.prior.warnings, spoils=problem.prior.ridge > 0)

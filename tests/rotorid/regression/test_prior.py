@@ -9,6 +9,7 @@ from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import prior_rows
+from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_ode_model
 from rotorid.timedomain import Record, ode_model
 from rotorid.timedomain.fit import fit
@@ -332,3 +333,15 @@ def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
     path.write_text('inputs = ["u"]\n' + time + more, encoding="utf-8")
     with pytest.warns(UserWarning, match="x0 stands in initial values only"):
         assert read_harmonic_model(path).prior == {"c": (2.0, 0.1)}
+
+
+def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():
+    """[Q] (2.35), without the minus signs that the scan has lost, to half a unit of its last digit."""
+    folder = sample_data() / "fit" / "quasilinearization"
+    options = FitOptions(method="quasilinearization", integrator="sequential-heun")
+    found = work(folder / "model.toml", folder / "record.csv", options)
+    printed = [[41.75, -78.46, 39.49], [-78.46, 340.4, -75.76], [39.49, -75.76, 70.04]]
+    assert found.to_dict()["normal_matrix"]["matrix"] == [
+        [pytest.approx(x, abs=0.05 if x == 340.4 else 0.005) for x in row] for row in printed
+    ]
+    assert "normal matrix of the last step, condition number 32.4" in found.answer.whole()
