@@ -108,7 +108,7 @@ class Design(Answered):
             (
                 Column(_WORDS[self.unit][0], self.candidates),
                 Column("chosen", counts),
-                *(Column(f"{name}_std", std) for name, std in alone),
+                *(Column(f"{name}_std", np.where(np.isfinite(std), std, np.nan)) for name, std in alone),
             )
         )
 

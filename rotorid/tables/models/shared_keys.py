@@ -108,7 +108,7 @@ def priors(section: Section | None, names: Collection[str]) -> dict[str, tuple[f
         value = section.take(name) if section else None
         numbers: list[float] = value if isinstance(value, list) and len(value) == 2 else [math.inf, 0.0]
         good = [isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in numbers]
-        if all(good) and numbers[1] > 0:
+        if all(good) and numbers[1] >= 1 / LARGEST:
             found[name] = float(numbers[0]), float(numbers[1])
         elif section:
             section.complain(name, "[value, standard deviation above 0], such as [1.0, 0.5]")

@@ -246,6 +246,24 @@ def test_output_error_covers_parameters_drawn_from_their_prior():
     assert warned <= 8
 
 
+def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    w, start = np.array([8.0, 9.0, 11.0]), {"c": 1200.0, "b": 30.0}
+    X = 10 / (1000 - 10 * w**2 + 20j * w) * np.array([1.01, 1 + 0.02j, 0.98])
+    data = experiments(model, w, {"X": X, "F": 10.0})
+    plain = identify(model, data, method="output-error")
+    found = [
+        identify(model, data, method="output-error", start=start, ridge=ridge) for ridge in (1e-10, 0.1, 1e8)
+    ]
+    c, b = np.array([one.values for one in found]).T
+    assert (c[0], b[0]) == pytest.approx(plain.values, rel=1e-6)
+    assert (c[2], b[2]) == pytest.approx((1200.0, 30.0), rel=1e-6)
+    assert plain.values[0] + 1 < c[1] < 1199
+    assert all(one.covariance is None and "biases" in one.warnings[-1] for one in found)
+    assert found[1].to_dict()["ridge"]["parameters"]["c"]["value"] == 1200.0
+    assert "no intervals: no errors" not in found[1].answer.whole()
+
+
 def test_identify_says_what_it_needs():
     model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
     data = experiments(model, [9.0, 11.0], {"X": [0.05 - 0.05j, -0.02 - 0.03j], "F": 10.0})
@@ -305,6 +323,7 @@ estimate = { a = 0.0, b = 0.0 }
     [
         ("b = 1.0", r"\[value, standard deviation above 0\], such as"),
         ("b = [1.0, 0.0]", "standard deviation above 0"),
+        ("b = [1.0, 1e-320]", "standard deviation above 0"),
         ("b = [1.0, inf]", "standard deviation above 0"),
         ('b = [1.0, "2"]', "standard deviation above 0"),
         ("b = [true, 2]", "standard deviation above 0"),

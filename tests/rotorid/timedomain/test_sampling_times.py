@@ -94,6 +94,7 @@ def test_the_command_takes_the_start_or_the_record():
     assert alone.to_dict()["design"]["parameters"]["theta2"]["guess"] == -1.0
     assert len(alone.design.where) == 4
     assert alone.to_frame()["chosen"].sum() == 4
+    assert alone.to_frame()["theta1_std"].isna().all()  # no time alone determines it
     with pytest.raises(ValueError, match="give a record after the model file"):
         alone.figure()
     both = work(model, record, FitOptions(sigma="auto", design=[1.0, 2.0, 3.0, 4.0]))
