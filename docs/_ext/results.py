@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,12 +50,21 @@ def validation_nodes(rows: Sequence[Mapping[str, Any]]) -> list[nodes.Node]:
     sources: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         sources.setdefault(row["source"], []).append(row)
-    wrong = [row for row in rows if row["status"] not in ("agrees", "erratum")]
+    count = Counter(row["status"] for row in rows)
+    wrong = [row for row in rows if row["status"] == "differs"]
     if wrong:
         raise ValueError(f"validation: {wrong[0]['source']}, {wrong[0]['quantity']}: {wrong[0]['status']}")
-    errata = sum(row["status"] == "erratum" for row in rows)
-    head = paragraph(f"{len(rows)} numbers: {len(rows) - errata} agree, {errata} are errata of the print.")
+    head = paragraph(
+        f"{len(rows) - count['given']} numbers can fail: {count['agrees']} agree, {count['erratum']} are "
+        f"misprints, {count['consequence']} follow from these; {count['given']} more are given values."
+    )
     return [head, *(_source(source, group) for source, group in sources.items())]
+
+
+def _status(row: Mapping[str, Any]) -> str:
+    """With the kind where the status does not tell it."""
+    kind = row.get("kind", "number")
+    return f"{row['status']}, {kind}" if kind in ("bound", "selected") else row["status"]
 
 
 def _source(source: str, rows: Sequence[Mapping[str, Any]]) -> nodes.section:
@@ -66,7 +76,7 @@ def _source(source: str, rows: Sequence[Mapping[str, Any]]) -> nodes.section:
             number(row["computed"], 8),
             number(row["difference"], 2),
             number(row["tolerance"], 2),
-            row["status"] + (f" ({notes.index(row['note']) + 1})" if row["note"] else ""),
+            _status(row) + (f" ({notes.index(row['note']) + 1})" if row["note"] else ""),
         )
         for row in rows
     ]

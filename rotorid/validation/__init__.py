@@ -9,11 +9,11 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 from rotorid.base.answer import Answer
 from rotorid.base.text import listing, sentence
-from rotorid.validation.row import AGREES, DIFFERS, ERRATUM, Row, Status, row, tables
+from rotorid.validation.row import AGREES, CONSEQUENCE, DIFFERS, ERRATUM, GIVEN, Row, Status, row, tables
 from rotorid.workflows.result_provenance import Outcome, provenance
 
 if TYPE_CHECKING:
@@ -27,10 +27,16 @@ PROVIDERS = {
     "rotor": "Rotor of 23 elements: critical speeds and mode shapes",
     "masses": "Equivalent masses of that rotor, formula (50)",
     "lessons": "Coefficients from amplitudes, frequencies and shapes",
+    "formulas": "Misprinted equations, at the true solution",
+    "closed_forms": "Closed forms: seal, damping, several speeds",
     "time_records": "Parameters from time records",
     "balancing": "Published balancing examples",
 }
+NAMES = tuple(PROVIDERS)
 WIDTH = 100
+HEADS = dict(zip(get_args(Status), ("agree", "misprint", "follow", "differ", "given"), strict=True))
+"""Every status with the head of its column."""
+SELECTED = "{} numbers of [F], whose print is damaged, were selected by agreement: consistent, but no proof"
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,7 @@ class Validation(Outcome):
 
     @property
     def counts(self) -> dict[Status, int]:
-        """How many rows agree, are errata, differ."""
+        """How many rows have each status."""
         return _counts(self.rows)
 
     @property
@@ -105,44 +111,47 @@ class Validation(Outcome):
         """The result in one line."""
         n = self.counts
         failed = listing([repr(group.name) for group in self.groups if group.failure], "and")
-        return f"{len(self.rows)} numbers: {n[AGREES]} agree, {n[ERRATUM]} errata, {n[DIFFERS]} differ" + (
-            f"; not computed: {failed}" if failed else ""
-        )
+        return (
+            f"{sum(n.values()) - n[GIVEN]} numbers can fail: {n[AGREES]} agree, {n[ERRATUM]} misprints, "
+            f"{n[CONSEQUENCE]} consequences, {n[DIFFERS]} differ; {n[GIVEN]} given, not counted"
+        ) + (f"; not computed: {failed}" if failed else "")
 
     @property
     def answer(self) -> Answer:
-        """Whether every number holds, and what differs; behind it sources, errata and wide tolerances."""
-        said = "Every printed number is met, or is known as an erratum of the print."
+        """Whether every number holds, and what differs; behind it sources, misprints and wide tolerances."""
+        said = "Every printed number is met, or is known as a misprint, or as what follows from one."
         differ = [r for r in self.rows if r.status == DIFFERS]
         failed = [
             f"{group.title}: FAILED, none of its numbers was computed: {group.failure}"
             for group in self.groups
             if group.failure
         ]
-        errata = [r for r in self.rows if r.status == ERRATUM]
+        selected = sum(r.kind == "selected" for r in self.rows)
         wide = [r for r in self.rows if r.reason]
+        wrong = [r for r in self.rows if r.status in (ERRATUM, CONSEQUENCE)]
         chapters = (
             self._sources(),
-            _chapter("Errata of the print", errata, _erratum),
+            _chapter("Misprints, and what follows from them", wrong, _erratum),
             _chapter("Tolerances other than half a unit of the last printed digit", wide, _tolerance),
         )
         return Answer(
             f"{said if self.holds else 'NOT every printed number is met.'}\n{self.last_line}.",
             "\n".join([*failed, *_chapter("Differ", differ, _difference)]),
+            notes=(SELECTED.format(selected),) if selected else (),
             tables=tuple("\n".join(lines) for lines in chapters if lines),
-            more="every source, errata, wide tolerances",
+            more="every source, misprints, wide tolerances",
         )
 
     def _sources(self) -> list[str]:
         """A line for each source, and where asked for each number."""
         width = max([len(source) for group in self.groups for source in group.sources()] or [0]) + 2
-        lines = [f"{'':{width}}{'numbers':>8}{'agree':>8}{'errata':>8}{'differ':>8}   worst agreement"]
+        lines = [f"{'':{width}}{''.join(f'{name:>9}' for name in HEADS.values())}    worst"]
         for group in self.groups:
             lines.append(group.title)
             for source, rows in group.sources().items():
                 lines.append(_source_line(source, rows, width))
                 lines += [_row_line(r) for r in rows] if self.every else []
-        said = "Worst agreement: the largest difference among those that agree, in percent of its tolerance."
+        said = "Worst: the largest difference among those that agree, in percent of its tolerance."
         return [*lines, "", said]
 
     def to_frame(self) -> pd.DataFrame:
@@ -187,7 +196,7 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
     Examples
     --------
     >>> validate(["rotor"]).last_line
-    '75 numbers: 75 agree, 0 errata, 0 differ'
+    '72 numbers can fail: 72 agree, 0 misprints, 0 consequences, 0 differ; 3 given, not counted'
     """
     chosen = list(PROVIDERS) if groups is None else list(groups)
     for name in chosen:
@@ -195,18 +204,21 @@ def validate(groups: Iterable[str] | None = None, options: ValidateOptions | Non
             raise ValueError(
                 f"there is no group {name!r} of printed numbers; groups are {', '.join(PROVIDERS)}"
             )
-    from rotorid.validation import balancing, formula_50, identification, rotor, time_records
+    from rotorid.validation import (
+        balancing,
+        closed_forms,
+        formula_50,
+        formulas,
+        identification,
+        rotor,
+        time_records,
+    )
 
-    rows = {
-        "rotor": rotor.rows,
-        "masses": formula_50.rows,
-        "lessons": identification.rows,
-        "time_records": time_records.rows,
-        "balancing": balancing.rows,
-    }
+    own = (rotor, formula_50, identification, formulas, closed_forms, time_records, balancing)
+    modules = dict(zip(NAMES, own, strict=True))
     options = options or ValidateOptions()
     return Validation(
-        groups=tuple(_group(name, rows[name]) for name in chosen),
+        groups=tuple(_group(name, modules[name].rows) for name in chosen),
         every=options.every,
         provenance=provenance(tables(), options),
     )
@@ -221,10 +233,7 @@ def _group(name: str, provider: Callable[[], Iterable[Row]]) -> Group:
 
 
 def _counts(rows: Sequence[Row]) -> dict[Status, int]:
-    found: dict[Status, int] = {AGREES: 0, ERRATUM: 0, DIFFERS: 0}
-    for r in rows:
-        found[r.status] += 1
-    return found
+    return {status: sum(r.status == status for r in rows) for status in HEADS}
 
 
 def _by(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
@@ -237,16 +246,14 @@ def _by(rows: Iterable[Row], key: Callable[[Row], Key]) -> dict[Key, list[Row]]:
 def _source_line(source: str, rows: Sequence[Row], width: int) -> str:
     n = _counts(rows)
     agreeing = [r.misfit for r in rows if r.status == AGREES]
-    worst = f"{100 * max(agreeing):10.0f} %" if agreeing else f"{'–':>10}"
-    return (
-        f"  {source:{width - 2}}{len(rows):>8}{n[AGREES]:>8}{n[ERRATUM]:>8}{n[DIFFERS]:>8}   {worst}".rstrip()
-    )
+    worst = f"{100 * max(agreeing):7.0f} %" if agreeing else f"{'–':>7}"
+    return f"  {source:{width - 2}}{''.join(f'{n[status]:>9}' for status in HEADS)}{worst}"
 
 
 def _row_line(r: Row) -> str:
     return (
         f"    {r.quantity:<44} {r.text:>24} {r.computed:>16.9g} {r.difference:>+11.2e}"
-        f" (± {r.tolerance:.1e})  {r.status}"
+        f" (± {r.tolerance:.1e})  {r.status}{f', {r.kind}' if r.kind in ('selected', 'bound') else ''}"
     )
 
 
@@ -255,7 +262,7 @@ def _chapter(title: str, rows: Sequence[Row], words: Callable[[Sequence[Row]], s
     if not rows:
         return []
     lines = [f"{title}:"]
-    for own in _by(rows, lambda r: (r.source, r.erratum, r.reason)).values():
+    for own in _by(rows, lambda r: (r.source, r.erratum, r.follows, r.reason)).values():
         lines += textwrap.wrap(words(own), WIDTH, initial_indent="  ", subsequent_indent="    ")
     return lines
 
@@ -282,7 +289,8 @@ def _difference(rows: Sequence[Row]) -> str:
 
 
 def _erratum(rows: Sequence[Row]) -> str:
-    return f"{_named(rows)}. {sentence(rows[0].erratum)}"
+    follows = f" (follows from {rows[0].follows})" if rows[0].follows else ""
+    return f"{_named(rows)}. {sentence(rows[0].erratum + follows)}"
 
 
 def _tolerance(rows: Sequence[Row]) -> str:

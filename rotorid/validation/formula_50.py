@@ -98,6 +98,7 @@ def _inputs(rotor: fem.Rotor, exact: Inputs) -> list[Row]:
         {
             **{f"a{i}, m from the left support": place for i, place in enumerate(places, start=1)},
             "l, distance of the supports, m": end - start,
+            "elements in the printed table": len(rotor.length),
             **{quantity: value[name] for name, quantity in _names().items()},
             "alpha22 of the running text, m/N": exact.alpha[1, 1],
         },
@@ -110,17 +111,11 @@ def _results(printed: Inputs, exact: Inputs) -> list[Row]:
     rounded = np.array([BOOK.number(ONE, f"{name}, rounded") for name in _masses(one)])
     first = printed.frequencies(rounded)
     second = printed.frequencies(np.array([BOOK.number(TWO, name) for name in _masses(two)]))
-    above = {"omega2 above that of the rotor, %": 100 * (first[1] / exact.omega[1] - 1)}
-    return [
-        *BOOK.rows(ONE, _masses(one)),
-        *BOOK.rows(ONE, {f"{name}, rounded": m for name, m in _masses(one).items()}),
-        *BOOK.rows(TWO, _masses(two)),
-        *BOOK.rows(ONE, _eigenvalues(first)),
-        *BOOK.rows(TWO, _eigenvalues(second)),
-        *BOOK.rows(ONE, _frequencies(first)),
-        *BOOK.rows(TWO, _frequencies(second)),
-        *BOOK.rows(ONE, above),
-    ]
+    numbers = {**_masses(one), **{f"{name}, rounded": m for name, m in _masses(one).items()}}
+    numbers |= _eigenvalues(first) | _frequencies(first)
+    numbers["omega2 above that of the rotor, %"] = 100 * (first[1] / exact.omega[1] - 1)
+    after = _masses(two) | _eigenvalues(second) | _frequencies(second)
+    return [*BOOK.rows(ONE, numbers), *BOOK.rows(TWO, after)]
 
 
 def _with_all_digits(exact: Inputs) -> list[Row]:
@@ -141,7 +136,9 @@ def _masses(values: FloatArray) -> dict[str, float]:
 
 
 def _eigenvalues(omega: FloatArray) -> dict[str, float]:
-    return {f"eigenvalue {k}, s^2": value**-2 for k, value in enumerate(omega.tolist(), start=1)}
+    found = {f"eigenvalue {k}, s^2": value**-2 for k, value in enumerate(omega.tolist(), start=1)}
+    rounded = {f"eigenvalue {k} as the root is taken of it, s^2": omega[k - 1] ** -2 for k in (1, 2)}
+    return found | rounded
 
 
 def _frequencies(omega: FloatArray) -> dict[str, float]:

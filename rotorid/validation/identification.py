@@ -6,8 +6,10 @@ problems, whose rounded results are the data, are computed with the parameters t
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +20,12 @@ from rotorid.harmonic import Experiments, HarmonicModel, Identification, harmoni
 from rotorid.harmonic.natural_frequencies import natural_modes
 from rotorid.harmonic.regression_rows import build_rows
 from rotorid.samples import sample_data
-from rotorid.tables import read_harmonic_model, read_measurements
+from rotorid.tables import HarmonicFile, read_harmonic_model, read_measurements
 from rotorid.validation.row import Printed, Row, row
 
 SECTION = "[S] section 1.8"
+SINGULAR = ("2_3", "3_2", "3_3", "4_1", "4_2", "4_3")
+"""Exercises whose unknowns the book counts; in most of them no data determine all."""
 TASKS = ("5_1", "5_2", "6_1", "6_2", "7_1", "7_2", "8_1", "8_2")
 BOOK = Printed("lessons.csv")
 Task = tuple[Identification, Mapping[str, Any]]
@@ -33,6 +37,7 @@ def rows() -> list[Row]:
     found = {task: _identified(f"task_{task}") for task in TASKS}
     return [
         *_feedback_1_8(),
+        *_unknowns(),
         *_one_mass(found["5_1"]),
         *_pump(found["5_2"]),
         *_feedback_6(found["6_1"], found["6_2"]),
@@ -41,11 +46,15 @@ def rows() -> list[Row]:
     ]
 
 
-def _identified(folder: str) -> Task:
-    """The exercise of a folder, identified, and what its `expected.toml` says."""
+def exercise(folder: str) -> tuple[Path, HarmonicFile, dict[str, Any]]:
+    """Folder, model and `expected.toml` of an exercise."""
     path = sample_data() / "identify" / folder
-    file = read_harmonic_model(path / "model.toml")
     expected = tomllib.loads((path / "expected.toml").read_text(encoding="utf-8"))
+    return path, read_harmonic_model(path / "model.toml"), expected
+
+
+def _identified(folder: str) -> Task:
+    path, file, expected = exercise(folder)
     return identify(file.model, read_measurements(path / "data.csv", file)), expected
 
 
@@ -66,6 +75,24 @@ def _worst(task: Task, *names: str) -> float:
     """Largest error of the estimates, percent of the parameters of the direct problem."""
     result, expected = task
     return 100 * max(abs(result.value(name) / float(expected["truth"][name]) - 1) for name in names)
+
+
+def _rounding(task: Task, name: str, exact: ComplexArray) -> float:
+    """Largest error of real and imaginary parts of the data, percent; parts that are 0 are exact."""
+    data = task[0].experiments.signals[name].view(float)
+    return 100 * float(np.abs(data[data != 0] / exact.view(float)[data != 0] - 1).max())
+
+
+def _unknowns() -> list[Row]:
+    """How many products of parameters a linear problem has, and how many of them data can determine."""
+    found = []
+    for task in SINGULAR:
+        model, source = _model(f"task_{task}"), f"[S] task {task.replace('_', '.')}"
+        n, determined = len(model.monomials), len(model.combinations.pivots)
+        counts = {"unknowns of the linear problem": n, "unknowns that can be estimated": determined}
+        counts |= {"columns of K": n, "experiments that this takes": math.ceil(n / 2)}
+        found += BOOK.rows(source, {q: count for q, count in counts.items() if (source, q) in BOOK.lines})
+    return found
 
 
 def _predicted(model: HarmonicModel, truth: Mapping[str, float], w: Sequence[float]) -> ComplexArray:
@@ -100,14 +127,11 @@ def _feedback_1_8() -> list[Row]:
     signals = {"S": np.array([complex(re_1, im_1), complex(re_2, im_2)]), "F": np.ones(2, dtype=complex)}
     tests = Experiments(("1", "2"), np.array([1.0, 2.0]), signals, np.zeros(2, dtype=bool))
     matrix, right, _ = build_rows(_model("task_6_1"), tests).real_rows()
-    numbers = {f"K({i + 1},{j + 1})": value for (i, j), value in np.ndenumerate(matrix)}
+    numbers: dict[str, float] = {f"K({i + 1},{j + 1})": x for (i, j), x in np.ndenumerate(matrix)}
     numbers |= {f"Y({i + 1})": value for i, value in enumerate(right)}
     task = _identified("section_1_8")
-    return [
-        *BOOK.rows(SECTION, amplitudes | numbers),
-        *_estimates(SECTION, task, ("", "")),
-        *BOOK.rows(SECTION, {"largest error, %": _worst(task, "T1", "T2")}),
-    ]
+    numbers["largest error, %"] = _worst(task, "T1", "T2")
+    return [*BOOK.rows(SECTION, amplitudes | numbers), *_estimates(SECTION, task, ("", ""))]
 
 
 def _feedback_6(task_1: Task, task_2: Task) -> list[Row]:
@@ -121,10 +145,11 @@ def _feedback_6(task_1: Task, task_2: Task) -> list[Row]:
         "Im S at omega = 2": at_2.imag,
     }
     return [
-        *BOOK.rows(first, said),
+        *BOOK.rows(first, said | {"rounding of the data, %": _rounding(task_1, "S", S)}),
         *_estimates(first, task_1, (", s", ", s")),
         *BOOK.rows(first, {f"error of {name}, %": _worst(task_1, name) for name in ("T1", "T2")}),
         *_estimates(second, task_2, ("", ", s")),
+        *BOOK.rows(second, {"K, in the text": task_2[0].value("K")}),
         *BOOK.rows(second, {f"error of {name}, %": _worst(task_2, name) for name in ("K", "T1")}),
     ]
 
@@ -136,28 +161,22 @@ def _one_mass(task: Task) -> list[Row]:
     source = "[S] task 5.1"
     w = (10.0, 20.0, 30.0)
     X = _predicted(task[0].model, {**task[1]["truth"], "F": 10.0}, w)
-    return [
-        *BOOK.rows(source, _amplitudes("X", w, X)),
-        *_estimates(source, task, (", N/m", ", kg/s")),
-        *BOOK.rows(source, {"largest error, %": _worst(task, "c", "alpha")}),
-    ]
+    said = _amplitudes("X", w, X) | {"rounding of the data, %": _rounding(task, "X", X)}
+    said["largest error, %"] = _worst(task, "c", "alpha")
+    return [*BOOK.rows(source, said), *_estimates(source, task, (", N/m", ", kg/s"))]
 
 
 def _pump(task: Task) -> list[Row]:
     source = "[S] task 5.2"
     w = (80.0, 100.0)
     Z = _predicted(task[0].model, {**task[1]["truth"], "F": 0.0}, w)
-    calculation = {"Re Z at omega = 80, calculation": Z[0].real}
-    after = {
+    said = _amplitudes("Z", w, Z) | {
+        "Re Z at omega = 80, calculation": Z[0].real,
         "c, N/m, in the text": task[0].value("c"),
         "b, kg/s, in the text": task[0].value("b"),
         "largest error, %": _worst(task, "c", "b"),
     }
-    return [
-        *BOOK.rows(source, _amplitudes("Z", w, Z) | calculation),
-        *_estimates(source, task, (", N/m", ", kg/s")),
-        *BOOK.rows(source, after),
-    ]
+    return [*BOOK.rows(source, said), *_estimates(source, task, (", N/m", ", kg/s"))]
 
 
 # Lesson 7: a chain of three masses
@@ -167,7 +186,11 @@ def _chain(task_1: Task, task_2: Task) -> list[Row]:
     first, second = "[S] task 7.1", "[S] task 7.2"
     result, expected = task_1
     truth = np.array([expected["truth"][name] for name in result.parameters])
-    direct = {f"omega{i}^2, 1/s^2": z for i, z in enumerate(_squares(result.model, truth), start=1)}
+    squares = _squares(result.model, truth)
+    data = result.experiments.frequencies**2
+    direct = {f"omega{i}^2, 1/s^2": z for i, z in enumerate(squares, start=1)}
+    direct |= {f"omega{i}^2 rounded, 1/s^2": z for i, z in enumerate(squares, start=1)}
+    direct["rounding of the data, %"] = 100 * np.abs(data / squares - 1).max()
     shapes = _shapes(result.model, truth, (1, 2), (150.0, 690.0, 2400.0))
     for name, values in zip(("A2", "A3"), shapes, strict=True):
         direct |= {f"{name}, mode {k}": value for k, value in enumerate(values, start=1)}
@@ -190,9 +213,11 @@ def _beam(task_1: Task, task_2: Task) -> list[Row]:
     result, expected = task_1
     truth = np.array([expected["truth"][name] for name in result.parameters])
     z = _squares(result.model, truth)
-    delta = _compliance()
+    shaft = beam()
+    delta = fem.compliance(shaft, (4, 7))
     (A2,) = _shapes(result.model, truth, (1,), (2.183e6, 4.581e7))
     direct = {
+        "EI, N m^2": (shaft.youngs_modulus * shaft.second_moment)[0],
         "delta11, m/N": delta[0, 0],
         "delta22, m/N": delta[1, 1],
         "delta12, m/N": delta[0, 1],
@@ -217,7 +242,7 @@ def _beam(task_1: Task, task_2: Task) -> list[Row]:
 
 
 def _model(folder: str) -> HarmonicModel:
-    return read_harmonic_model(sample_data() / "identify" / folder / "model.toml").model
+    return exercise(folder)[1].model
 
 
 def _squares(model: HarmonicModel, values: FloatArray) -> FloatArray:
@@ -242,7 +267,7 @@ def _shapes(
     return [found[name].real for name in part.outputs]
 
 
-def _compliance() -> FloatArray:
-    """Compliances of the steel beam of 1 m length and 0.1 m diameter on two supports at 0.3 and 0.6 m."""
-    supports = [fem.Support(node, 1e14) for node in (1, 11)]
-    return fem.compliance(fem.Rotor(np.full(10, 0.1), np.full(10, 0.1), supports=supports), (4, 7))
+def beam() -> fem.Rotor:
+    """The steel beam of 1 m length and 0.1 m diameter on rigid supports; the masses are at nodes 4 and 7."""
+    supports = [fem.Support(node, 1e18) for node in (1, 11)]
+    return fem.Rotor(np.full(10, 0.1), np.full(10, 0.1), supports=supports)

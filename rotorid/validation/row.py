@@ -6,16 +6,19 @@ import csv
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
-Status = Literal["agrees", "erratum", "differs"]
+Status = Literal["agrees", "erratum", "consequence", "differs", "given"]
+Kind = Literal["number", "bound", "selected", "given"]
 
 AGREES: Status = "agrees"
 ERRATUM: Status = "erratum"
+CONSEQUENCE: Status = "consequence"
 DIFFERS: Status = "differs"
+GIVEN: Status = "given"
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?P<decimals>\.\d*)?|(?P<bare>\.\d+))(?:[eE](?P<exponent>[+-]?\d+))?")
 
@@ -43,6 +46,11 @@ class Row:
     corrected
         The right number as text, for errata whose right number is known; the computed one must agree with it
         to half a unit of its last digit.
+    kind
+        ``number``; ``bound``: the print says that it is not exceeded; ``selected``: of a damaged print,
+        intact as its agreement tells; ``given``: an input, which is computed from nothing and cannot fail.
+    follows
+        Source and quantity of the erratum that this one follows from; else empty.
     """
 
     source: str
@@ -53,6 +61,8 @@ class Row:
     reason: str = ""
     erratum: str = ""
     corrected: str | None = None
+    kind: Kind = "number"
+    follows: str = ""
 
     @property
     def printed(self) -> float:
@@ -69,23 +79,30 @@ class Row:
         """The difference as a part of its tolerance (agrees up to 1); of errata that from the correction."""
         if self.erratum and self.corrected is not None:
             return _parts(self.computed, number(self.corrected), half_unit(self.corrected))
+        return self._from_print
+
+    @property
+    def _from_print(self) -> float:
+        """The difference as a part of its tolerance; of a bound the computed number as a part of it."""
+        if self.kind == "bound":
+            return abs(self.computed / self.printed)
         return _parts(self.computed, self.printed, self.tolerance)
 
     @property
     def status(self) -> Status:
-        """``agrees``, ``erratum`` (the print is wrong, and the reason is known) or ``differs``."""
+        """``agrees``, ``given``, ``differs``; ``erratum``, ``consequence``: wrong in print for a reason."""
         if not math.isfinite(self.computed):
             return DIFFERS
-        near = _parts(self.computed, self.printed, self.tolerance) <= 1
+        near = self._from_print <= 1
         if not self.erratum:
-            return AGREES if near else DIFFERS
+            return DIFFERS if not near else GIVEN if self.kind == "given" else AGREES
         wrong = self.corrected is not None and self.misfit > 1
-        return DIFFERS if near or wrong else ERRATUM
+        return DIFFERS if near or wrong else CONSEQUENCE if self.follows else ERRATUM
 
     @property
     def note(self) -> str:
         """Why it is an erratum, why the tolerance is wide, and what is wrong with a row that differs."""
-        parts = [self.erratum, self.reason]
+        parts = [self.erratum, f"follows from {self.follows}" if self.follows else "", self.reason]
         if self.status == DIFFERS and self.erratum and math.isfinite(self.computed):
             if self.corrected is not None and self.misfit > 1:
                 parts.append(f"the corrected number is {self.corrected}, and the computed one is not that")
@@ -108,6 +125,9 @@ class Row:
             "tolerance": self.tolerance,
             "corrected": None if self.corrected is None else number(self.corrected),
             "status": self.status,
+            "could_fail": self.kind != "given",
+            "kind": self.kind,
+            "follows": self.follows or None,
             "note": self.note,
         }
 
@@ -233,7 +253,7 @@ class Printed:
         return [self._row(self.lines[source, quantity], value) for quantity, value in computed.items()]
 
     def _row(self, line: Mapping[str, str], computed: float) -> Row:
-        return row(
+        made = row(
             line["source"],
             line["quantity"],
             line["printed"],
@@ -243,6 +263,8 @@ class Printed:
             line["erratum"],
             line["corrected"] or None,
         )
+        kind = cast("Kind", line.get("kind") or "number")
+        return replace(made, kind=kind, follows=line.get("follows") or "")
 
 
 def tables() -> list[Path]:

@@ -8,7 +8,9 @@ the printed record is compared, and what a fit finds from it.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from rotorid.timedomain import OdeModel, Record, Trajectory, ode_model, simulate
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
 from rotorid.timedomain.methods.quasilinearization import linear_solutions
-from rotorid.validation.row import Printed, Row, half_unit, number, printed_table, row
+from rotorid.validation.row import Kind, Printed, Row, half_unit, number, printed_table, row
 
 TRUTH_Q = (1.0, -1.0, -1.0)
 TRUTH_F = (0.14, 12.0, 28.0)
@@ -30,6 +32,9 @@ OUTPUTS = np.array([[1.0, 2.0], [2.0, 1.0]])
 """[Q] (2.25): y = C x."""
 BOOK = Printed("q_iterations.csv")
 RESTORED = ", sign restored"
+
+GIVEN = re.compile(r"[tu]\(\d+\)|x\d\(1\), .*|x1.*, iteration 0|theta\d, iteration 0|.*\(0\.0 s\).*")
+"""Times, inputs and starting values: quantities that are computed from nothing."""
 
 EXACT = "tighter than half a unit: the record is exact to ten digits, and so is the estimate"
 ZEROS = "the print drops trailing zeros: half a unit of the fifth significant digit"
@@ -50,7 +55,7 @@ def rows() -> list[Row]:
     truth = simulate(model, TRUTH_Q, np.linspace(0.0, math.pi, 31), sensitivities=False)
     record = Record(truth.t, {"y1": truth.y[:, 0], "y2": truth.y[:, 1]})
     chain = read_ode_model(sample_data() / "fit" / "three_masses" / "model.toml")
-    return [
+    made = [
         *_table_2_1(truth),
         *_iterations(model, record),
         *_differences(truth),
@@ -58,6 +63,12 @@ def rows() -> list[Row]:
         *_printed_record(chain),
         *_estimates(chain),
     ]
+    return [replace(r, kind=_kind(r)) for r in made]
+
+
+def _kind(r: Row) -> Kind:
+    """Given, or selected: of [F] only what agrees is known to be intact."""
+    return "given" if GIVEN.fullmatch(r.quantity) else "selected" if r.source.startswith("[F]") else r.kind
 
 
 def _book_model() -> OdeModel:
@@ -164,18 +175,8 @@ def _printed_record(chain: OdeModel) -> list[Row]:
         computed = trajectory.y[round(5 * float(line["t_s"])), chain.outputs.index(state)]
         sign = RESTORED if state == "y2" else ""
         fifth = fifth_digit(text)
-        short = fifth < half_unit(text)
-        quantity = f"{state}({line['t_s']} s){sign}"
-        made.append(
-            row(
-                "[F] record",
-                quantity,
-                text,
-                float(computed),
-                fifth if short else None,
-                ZEROS if short else "",
-            )
-        )
+        wide = (fifth, ZEROS) if fifth < half_unit(text) else (None, "")
+        made.append(row("[F] record", f"{state}({line['t_s']} s){sign}", text, float(computed), *wide))
     return made
 
 

@@ -26,8 +26,8 @@ def validate(options: ValidateOptions, to: Destination) -> None:
     Example: rotorid validate --output numbers.csv
 
     A number agrees within half a unit of its last printed digit, or within a stated tolerance that has its
-    reason; an erratum of the print has its reason, too. A group that fails is said, the others are
-    shown. Exit status 0 if no number differs and no group fails, else 1.
+    reason; misprints have theirs, what follows from one names it, given values are not counted. A group that
+    fails is said, the others are shown. Exit status 0 if no number differs and no group fails, else 1.
     """
     to = dataclasses.replace(to, table=to.table or options.every)
     proof = to.deliver("validation", lambda: work(options=options))

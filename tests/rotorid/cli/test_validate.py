@@ -7,7 +7,9 @@ import pytest
 
 from rotorid.validation import PROVIDERS, formula_50
 
-KEYS = {"source", "quantity", "printed", "computed", "difference", "tolerance", "status", "note"}
+KEYS = {"source", "quantity", "printed", "computed", "difference", "tolerance", "status", "note"} | {
+    "could_fail", "kind", "follows"
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -25,8 +27,10 @@ def test_json_has_every_row_and_none_differs(cli, tmp_path):
     assert set(document) >= {"rows", "groups", "counts", "provenance"}
     rows = document["rows"]
     assert all(set(r) >= KEYS for r in rows)
-    assert {r["status"] for r in rows} == {"agrees", "erratum"}
-    assert all(r["note"] for r in rows if r["status"] == "erratum")
+    assert {r["status"] for r in rows} == {"agrees", "erratum", "consequence", "given"}
+    assert all(r["note"] for r in rows if r["status"] in {"erratum", "consequence"})
+    assert all(r["follows"] for r in rows if r["status"] == "consequence")
+    assert {r["status"] for r in rows if not r["could_fail"]} == {"given"}
     assert document["counts"]["differs"] == 0
     assert document["counts"]["numbers"] == len(rows) >= 75 + 20 + 25 + 300 + 6 + 15
     assert document["provenance"]["inputs"]
@@ -40,11 +44,11 @@ def test_text_begins_with_the_counts(cli, some):
     outcome = cli("validate")
     assert outcome.code == 0, outcome.err
     lines = outcome.out.strip().splitlines()
-    assert lines[1].endswith(" errata, 0 differ.")
+    assert lines[1].endswith(" consequences, 0 differ; 3 given, not counted.")
     table, every = (cli("validate", option).out for option in ("--table", "--all"))
     for text in (table, every):
         assert text.splitlines()[:2] == lines[:2]
-        assert "\nErrata of the print:\n" in text
+        assert "\nMisprints, and what follows from them:\n" in text
         assert "\nTolerances other than half a unit of the last printed digit:\n" in text
     assert "mode 3, node 24" not in table
     assert "mode 3, node 24" in every

@@ -52,7 +52,7 @@ def test_rows_of_time_records(records):
         "[F] record": 164,
         "[F] from the intact printed values": 3,
     }
-    assert statuses(records) == {"agrees": 718, "erratum": 3}
+    assert statuses(records) == {"agrees": 718 - 81, "given": 81, "erratum": 1, "consequence": 2}
 
 
 def test_rows_of_published_balancing(examples):
@@ -96,7 +96,8 @@ def test_every_other_tolerance_has_its_reason_and_none_is_wide(every):
 def test_the_first_trajectory_and_the_first_iteration_agree_to_every_printed_digit(records):
     first = [r for r in records if r.quantity.endswith(("iteration 0", "iteration 1")) and r.printed]
     assert len(first) == 4 * 31 + 3
-    assert all(r.tolerance == half_unit(r.text) and r.status == "agrees" for r in first)
+    assert all(r.tolerance == half_unit(r.text) for r in first)
+    assert statuses(first) == {"agrees": 31 + 2 * 30 + 3 - 1, "given": 31 + 1 + 2}
 
 
 def test_the_tables_are_those_of_the_other_tests():
@@ -414,7 +415,7 @@ def test_a_wrong_step_of_quasilinearization_is_noticed(monkeypatch):
     monkeypatch.setattr(rotorid.timedomain.methods.quasilinearization, "_heun", euler)
     rows = time_records.rows()
     assert statuses(rows)["differs"] > 350
-    assert statuses(rows)["agrees"] > 270
+    assert statuses(rows)["agrees"] > 220
     sources = {r.source for r in rows if r.status == "differs"}
     assert sources == {"[Q] table 2.2", "[Q] table 2.3", *(f"[Q] (2.{n})" for n in range(29, 36))}
 
