@@ -179,7 +179,7 @@ class Identification(Answered, Uncertain):
             self.warnings[::-1],  # what speaks against the answer comes last there
             (*notes, *self.notes),
             (text(columns),) * known + ((self.normal_matrix.text(),) if self.normal_matrix else ()),
-            "what it leaves of each reading, the normal matrix",
+            "what it leaves of each reading, " * known + "the normal matrix",
         )
 
     def _judgement(self) -> str:
