@@ -30,7 +30,14 @@ ANSWERS = (
     ),
     *("split-drill", "trial-weight", "tolerance", "critical-rotor23", "campbell-compressor"),
     *("response-compressor", "influence-compressor", "reduce-report", "reduce-rank", "identify-task_5_1"),
-    *("identify-task_4_1", "fit-run_down", "validate", "demo-main"),
+    *(
+        "identify-task_4_1",
+        "identify-two-models",
+        "fit-run_down",
+        "simulate-lesson-5",
+        "validate",
+        "demo-main",
+    ),
 )
 """Stored outputs that `{answers}` counts: those of every command on its sample."""
 

@@ -24,6 +24,7 @@ from rotorid.cli.commands import (
     reduce,
     response,
     schema,
+    simulate,
     split,
     tolerance,
     trial_weight,
@@ -56,7 +57,11 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Identify coefficients": {"identify": identify.identify, "fit": fit.fit},
+    "Identify coefficients": {
+        "identify": identify.identify,
+        "fit": fit.fit,
+        "simulate": simulate.simulate,
+    },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
 for _job, _commands in _COMMANDS.items():
@@ -96,7 +101,6 @@ def _overview() -> str:
     lines = [
         "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
         "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
-        "",
     ]
     for job, commands in _COMMANDS.items():
         told = {name: command.__doc__ or "" for name, command in commands.items()}

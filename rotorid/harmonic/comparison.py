@@ -95,7 +95,7 @@ class Comparison:
             shape = self.measured[i].real
             mode = nearest_mode(z, v, float(self.experiments.frequencies[i]), shape)
             if mode is not None:
-                reference = _reference(shape)
+                reference = reference_amplitude(shape)
                 frequencies[i] = np.sqrt(mode[0])
                 Z[i] = mode[1] / mode[1][reference] * shape[reference]
         return Z, frequencies
@@ -140,7 +140,7 @@ class Comparison:
         parts = []
         for i, (A, dA, z, v) in zip(self.free, self._modes(theta), strict=True):
             shape, omega = self.measured[i].real, float(self.experiments.frequencies[i])
-            reference = _reference(shape)
+            reference = reference_amplitude(shape)
             others = np.flatnonzero(~np.isnan(shape) & (np.arange(len(shape)) != reference))
             mode = nearest_mode(z, v, omega, shape)
             if mode is None or mode[1][reference] == 0:
@@ -187,7 +187,7 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
         for part in ("amplitude", "phase")
     ]
     for i in free:
-        reference = _reference(measured[i].real)
+        reference = reference_amplitude(measured[i].real)
         rows.append((i, outputs[reference], "frequency"))
         rows += [(i, outputs[j], "shape") for j in np.flatnonzero(given[i]) if j != reference]
     return Comparison(
@@ -223,7 +223,7 @@ def _left_out(
     return tuple(words)
 
 
-def _reference(shape: FloatArray) -> int:
+def reference_amplitude(shape: FloatArray) -> int:
     """The first measured amplitude that is no node of the mode."""
     size = np.nan_to_num(np.abs(shape))
     return int(np.flatnonzero(size >= 0.1 * size.max())[0])

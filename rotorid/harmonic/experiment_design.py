@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,8 +11,8 @@ from numpy.typing import ArrayLike
 from rotorid.base.arrays import FloatArray
 from rotorid.harmonic.comparison import compare
 from rotorid.harmonic.experiments import AmplitudeErrors
-from rotorid.harmonic.experiments import experiments as gather
 from rotorid.harmonic.operator_model import HarmonicModel
+from rotorid.harmonic.simulated_measurements import forced_vibration
 from rotorid.regression.d_optimal import Design, designed
 
 
@@ -87,13 +88,8 @@ def _sensitivities(
     lost = [name for name in model.inputs if name not in inputs]
     if lost or not sensors:
         raise ValueError(f"give the amplitude of {', '.join(lost)}" if lost else "no output has a sensor")
-    loads = {name: np.full(len(w), complex(inputs[name])) for name in model.inputs}
-    table = np.stack(list(loads.values()), axis=1) if loads else np.zeros((len(w), 0), dtype=complex)
-    try:
-        Z, _ = model.forced(theta, w, table, slopes=False)
-    except np.linalg.LinAlgError:
-        raise ValueError("a candidate frequency is a resonance without damping: move it") from None
-    signals = {**loads, **{name: Z[:, model.outputs.index(name)] for name in sensors}}
-    plan = gather(model, w, signals, errors=errors, free=False)
+    exact = forced_vibration(model, theta, w.tolist(), inputs)
+    read = {name: exact.signals[name] for name in (*model.inputs, *sensors)}
+    plan = replace(exact, signals=read, errors=errors)
     J = compare(model, plan).jacobian(theta)
     return J.reshape(len(w), 2 * len(sensors), len(theta))

@@ -49,14 +49,24 @@ class AmplitudeErrors:
         The error along the amplitude is √((relative·|Z|)² + floor²), across it √((phase·|Z|)² + floor²).
         Where `real` (free vibration) there is no imaginary part and its variance is zero.
         """
+        along, across, turn = self._axes(amplitudes)
+        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
+        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack((along, across), -1), e)
+        covariance[np.broadcast_to(real, along.shape)] *= np.array([[1.0, 0.0], [0.0, 0.0]])
+        return np.asarray(covariance)
+
+    def drawn(self, amplitudes: ComplexArray, rng: np.random.Generator) -> ComplexArray:
+        """Readings (n,) of amplitudes (n,): normal errors along and across each, of that covariance."""
+        along, across, turn = self._axes(amplitudes)
+        errors = rng.standard_normal((2, len(turn))) * np.sqrt((along, across))
+        return np.asarray(amplitudes + turn * (errors[0] + 1j * errors[1]))
+
+    def _axes(self, amplitudes: ComplexArray) -> tuple[FloatArray, FloatArray, ComplexArray]:
+        """Variances along and across each amplitude, and its direction, (n,) each."""
         z = np.asarray(amplitudes, dtype=complex)
         size = np.abs(z)
         along, across = (self.relative * size) ** 2 + self.floor**2, (self.phase * size) ** 2 + self.floor**2
-        turn = np.exp(1j * np.angle(z))
-        e = np.stack((np.stack((turn.real, -turn.imag), -1), np.stack((turn.imag, turn.real), -1)), -2)
-        covariance = np.einsum("nij,nj,nkj->nik", e, np.stack((along, across), -1), e)
-        covariance[np.broadcast_to(real, size.shape)] *= np.array([[1.0, 0.0], [0.0, 0.0]])
-        return np.asarray(covariance)
+        return along, across, np.exp(1j * np.angle(z))
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,7 +122,7 @@ def _weights(system: System) -> FloatArray:
     """Matrix that makes the errors of the combinations independent and of size one (relative if unknown)."""
     if system.covariance is not None:
         std = np.sqrt(np.diag(system.covariance))
-        floor = 1e-14 * np.abs(system.values) + 1e-300
+        floor = 1e-14 * np.abs(system.values) + 1e-150
         scale = np.maximum(std, floor)
         correlation = system.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
         correlation[np.diag_indices(len(scale))] = np.maximum(np.diag(correlation), 1e-6)

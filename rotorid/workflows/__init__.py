@@ -14,6 +14,7 @@ from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
 from rotorid.workflows.result_provenance import Outcome
+from rotorid.workflows.simulate import SimulateOptions, Simulation, simulate
 from rotorid.workflows.split import SplitOptions, SplitWeight, split
 from rotorid.workflows.tolerance import PermissibleUnbalance, ToleranceOptions, tolerance
 from rotorid.workflows.trial_weight import TrialWeightOptions, TrialWeights, trial_weight
@@ -40,6 +41,8 @@ __all__ = [
     "ResponseOptions",
     "RotorInfluence",
     "RotorResponse",
+    "SimulateOptions",
+    "Simulation",
     "SplitOptions",
     "SplitWeight",
     "ToleranceOptions",
@@ -56,6 +59,7 @@ __all__ = [
     "influence",
     "reduce",
     "response",
+    "simulate",
     "split",
     "tolerance",
     "trial_weight",

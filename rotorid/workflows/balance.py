@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from warnings import catch_warnings
 
 from rotorid.base.answer import Answer, together
-from rotorid.workflows.balance_verdict import judge
 from rotorid.workflows.coefficients import KINDS, choose, used_planes
 from rotorid.workflows.input_checks import check_choices, file_of
 from rotorid.workflows.option_values import Names, Speeds, names, number, one_of, speeds
@@ -299,7 +298,7 @@ def balance(job: JobGiven, options: BalanceOptions | None = None) -> Balance:
         source=None if files is None else _with_limits(files, read, options),
         mounted=mounted,
         check=None if checked is None else compare_check(result, checked, *known),
-        verdict=judge(result, influence, read, tolerance, mounted),
+        verdict=_judge(result, influence, read, tolerance, mounted),
         tolerance=tolerance,
         subsets=subsets,
         curve=_trade_off(result, influence, read) if options.trade_off else None,
@@ -496,4 +495,42 @@ def _with_limits(source: JobSource, job: Job, options: BalanceOptions) -> JobSou
         source,
         max_weights=largest_weights(job, options.max_mass),
         limits=largest_amplitudes(job, options.limit),
+    )
+
+
+def _judge(
+    result: Correction, influence: Influence, job: Job, tolerance: Tolerance | None, mounted: Mounted | None
+) -> Verdict | None:
+    """Of the check run if there is one, else of the prediction; None without anything to judge by."""
+    import numpy as np
+
+    from balancing.correction.verdict import verdict_of_check, verdict_of_prediction
+    from rotorid.tables.reader.units import weight
+
+    limited = result.limits is not None and bool(np.isfinite(result.limits.residual).any())
+    if tolerance is None and not limited:
+        return None
+    radii = None
+    if tolerance is not None and weight(result.labels.weight_unit).kind == "mass":
+        radii = {p: job.radii[p] for p in result.planes if p in job.radii}
+        if lost := [p for p in result.planes if p not in radii]:
+            raise ValueError(
+                "a tolerance is one of unbalances, and the weights are masses: give the radius of every "
+                f"plane, radius_mm in [planes.{lost[0]}] of the job"
+            )
+    if job.check is not None:
+        return verdict_of_check(
+            influence,
+            job.check,
+            tolerance=tolerance,
+            radii=radii,
+            limits=job.limits_of(influence.planes),
+            planes=result.planes,
+        )
+    return verdict_of_prediction(
+        result,
+        tolerance=tolerance,
+        radii=radii,
+        mounted=None if mounted is None or mounted.on_top_of is not None else mounted.weights,
+        after=None if mounted is None else mounted.after,
     )

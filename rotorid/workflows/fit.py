@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorid.base.suggestions import did_you_mean, one_of
+from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
-from rotorid.workflows.option_values import Times, number, pairs, times
+from rotorid.workflows.option_values import Times, check_names, number, pairs, times
 from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
@@ -167,7 +167,7 @@ def fit(
         raise ValueError(_NO_RECORD)
     begin = None if options.start is None else _start(options.start, equations, max(len(records), 1))
     weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
-    deviations = None if weigh or options.sigma is None else _sigma(options.sigma, equations.outputs)
+    deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
     data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
     if not data:
         plan = _plan(equations, options, deviations, begin or {}, None)
@@ -208,7 +208,7 @@ def _plan(
         return None
     from rotorid.timedomain.sampling_times import design_times
 
-    candidates = times(options.design, "--design")
+    candidates = sorted(set(times(options.design, "--design")))
     if len(candidates) > MOST_CANDIDATES:
         raise ValueError(f"--design takes at most {MOST_CANDIDATES} times, not {len(candidates)}")
     if sigma is None:
@@ -300,9 +300,7 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
     }
 
     def inside(name: str, text: str) -> float:
-        if name not in limits:
-            hint = did_you_mean(name, limits) or f"; parameters are {listing(limits, 'and')}"
-            raise ValueError(f"--start: {name!r} is no parameter of the model{hint}")
+        check_names((name,), "--start", limits, "parameter")
         value, (low, high) = number(text), limits[name]
         if math.isnan(value):
             raise ValueError(f"--start: {name} = {text!r} is no number, such as 2 or 1e-3")
@@ -315,14 +313,12 @@ def _start(given: Values, model: OdeModel, count: int) -> dict[str, float]:
     return dict(sorted(found.items(), key=lambda item: item[0] not in model.parameters))
 
 
-def _sigma(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
+def sigmas(given: Values | float, outputs: Sequence[str]) -> dict[str, float]:
     """Standard deviations of outputs: "0.01" of every one, or "y1=0.01,y2=0.02"."""
     from rotorid.tables.reader.decimal_numbers import NotANumber, check_size
 
     def positive(name: str, text: str) -> float:
-        if name not in outputs:
-            hint = did_you_mean(name, outputs) or f"; outputs are {listing(outputs, 'and')}"
-            raise ValueError(f"--sigma: {name!r} is no output of the model{hint}")
+        check_names((name,), "--sigma", outputs, "output")
         value = number(text)
         with contextlib.suppress(NotANumber):
             check_size(value)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import Speeds, speeds
-from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Found, Parts, log, phase, provenance, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -123,7 +123,7 @@ def identify(
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
         model = read_harmonic_model(file_of(model, "a model"))
-    file = replace(model, errors=_errors(model.errors, options.amplitude_error, options.phase_error))
+    file = replace(model, errors=amplitude_errors(model.errors, options.amplitude_error, options.phase_error))
     result = None
     if data is not None:
         if not isinstance(data, Experiments):
@@ -147,6 +147,44 @@ def identify(
     )
 
 
+class TwoStructures(Found):
+    """The comparison of two models."""
+
+    def figure(self) -> Figure:
+        """None."""
+        raise ValueError("two models beside each other have no picture: --plot belongs to one model")
+
+
+@workflow
+def compare(
+    models: Sequence[Path | str], data: Path | str, options: IdentifyOptions | None = None
+) -> TwoStructures:
+    """Fit two structures to the same readings by output error, and test whether the smaller one is enough.
+
+    Errors of the readings are the only options; ValueError for models that do not predict the same readings.
+    """
+    from rotorid.harmonic.structure_comparison import Structure, compare_structures
+    from rotorid.tables import read_harmonic_model, read_measurements
+
+    options = options or IdentifyOptions()
+    if len(models) != 2:
+        raise ValueError(f"two models are compared, not {len(models)}")
+    refuse(options, {*vars(options)} - {"method", "amplitude_error", "phase_error"}, "belongs to one model")
+    pair = []
+    for model in models:
+        file = read_harmonic_model(model)
+        errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error)
+        rows = read_measurements(data, replace(file, errors=errors)).without_copies()[0]
+        pair.append(Structure(str(model), file.model, rows, file.bounds, file.start))
+    if pair[0].data.errors != pair[1].data.errors:
+        raise ValueError(
+            "the model files state different errors: give --amplitude-error and --phase-error for both"
+        )
+    with phase("comparison"):
+        found = compare_structures(pair)
+    return TwoStructures(found=found, provenance=provenance(map(Path, (*models, data)), options))
+
+
 def _check(options: IdentifyOptions, *, measured: bool) -> None:
     """Refuse names that are not known, no data, and options that do not go together."""
     check_choices(options, choices())
@@ -158,7 +196,7 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
         refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
 
 
-def _errors(
+def amplitude_errors(
     stated: AmplitudeErrors | None, percent: float | None, degrees: float | None
 ) -> AmplitudeErrors | None:
     """Errors of the model file, those of the options before them."""

@@ -7,11 +7,12 @@ quantities with units are read by `rotorid.workflows.option_quantities`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TypeVar, cast
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.base.suggestions import one_of as one_of
+from rotorid.base.text import listing
 
 _T = TypeVar("_T")
 Speeds = str | Sequence[float | str]
@@ -149,6 +150,18 @@ def numbers(
     return pairs(given, what, read, example)
 
 
+def check_names(
+    given: Collection[str], what: str, names: Collection[str], noun: str, needed: Collection[str] = ()
+) -> None:
+    """Refuse names that the model does not have, with the nearest, and the lack of a value."""
+    for name in given:
+        if name not in names:
+            hint = did_you_mean(name, names) or (f"; {noun}s are {listing(names, 'and')}" if names else "")
+            raise ValueError(f"{what}: {name!r} is no {noun} of the model{hint}")
+    if lost := [name for name in needed if name not in given]:
+        raise ValueError(f"{what}: the value of {listing(lost, 'and')} is missing, such as {lost[0]}=1")
+
+
 def band(given: Band | None, what: str = "--operating") -> tuple[float, float] | None:
     """Read "9000:10500rpm" as the lowest and highest speed of a range in rad/s; None stays None."""
     if given is None:
@@ -197,16 +210,14 @@ def speeds(given: Speeds, unit: str = "rad_s", what: str = "--speeds") -> list[f
     return _possible([v * factor for v, factor in zip(values, factors, strict=True)], what, given)
 
 
-def times(given: Times, what: str) -> list[float]:
-    """Read rising times, s: "0:10:0.5" (first:last:step) or "0,0.5,2"."""
-    sign = ":" if isinstance(given, str) and ":" in given else ","
-    found = [number(str(part)) for part in (given.split(sign) if isinstance(given, str) else given)]
-    good = all(map(math.isfinite, found)) and (sign == "," or len(found) == 3)
-    if good and sign == ":":
-        found = list(_range(found, what, str(given)))
-    if not (good and found) or any(after <= before for before, after in pairwise(found)):
-        raise ValueError(f"{what} {given!r}: use FIRST:LAST:STEP or a rising list with commas, in s")
-    return found
+def times(given: Times, what: str = "--times") -> list[float]:
+    """Read times, s: "0:50:0.2" (first:last:step) or "0,0.5,2"."""
+    parts = given.split(":" if ":" in given else ",") if isinstance(given, str) else given
+    found = [number(part) if isinstance(part, str) else part for part in parts]
+    ranged = isinstance(given, str) and ":" in given
+    if not found or not all(map(math.isfinite, found)) or (ranged and len(found) != 3):
+        raise ValueError(f"{what} {given!r}: use FIRST:LAST:STEP or a list with commas, in seconds")
+    return [float(f"{t:.12g}") for t in _range(found, what, given, "time")] if ranged else found
 
 
 def rising_speeds(given: Speeds, what: str = "--speeds") -> list[float]:
@@ -222,13 +233,15 @@ def one_speed(given: str | float, what: str) -> float:
     return values[0]
 
 
-def _range(ends: Sequence[float], what: str, given: str) -> tuple[float, ...]:
+def _range(ends: Sequence[float], what: str, given: object, noun: str = "speed") -> tuple[float, ...]:
     """First, last and step as all values between them."""
     first, last, step = ends
     if step <= 0 or last < first:
-        raise ValueError(f"{what} {given!r}: the step must be positive and the last not below the first")
+        raise ValueError(
+            f"{what} {given!r}: the step must be positive and the last {noun} not below the first"
+        )
     if (last - first) / step > 1e6:
-        raise ValueError(f"{what} {given!r} has more than a million steps")
+        raise ValueError(f"{what} {given!r} has more than a million {noun}s")
     return tuple(first + step * i for i in range(math.floor((last - first) / step * (1 + 1e-12) + 1e-9) + 1))
 
 

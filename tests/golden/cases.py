@@ -229,6 +229,15 @@ identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/t
 identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
+identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
+identify-two-designs        identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --design 5:40:1
+simulate-lesson-5           simulate {IDENTIFY}/task_5_1/model.toml --with c=1000,alpha=10 --frequencies 10,20,30 --inputs F=10 --digits 2 --output x.csv --verbose
+simulate-errors             simulate {IDENTIFY}/section_1_7/model.toml --with c=1e5,b=200,q=5000 --frequencies 600:1400:200rpm --inputs Ux=0.001,Uy=0.001@-90 --amplitude-error 2 --phase-error 1 --seed 1
+simulate-modes              simulate {IDENTIFY}/task_7_1/model.toml --with c1=1e4,c2=2e4,c3=5e3 --modes --digits 3
+simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.14,m1=12,m2=28 --times 0:50:2 --digits 5
+simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
+simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
+simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
@@ -290,7 +299,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "schema", "validate"),
 )
 
 MODELLED = {
@@ -314,6 +323,13 @@ PRIOR = {
         "[prior]\ntheta1 = [1.0, 0.004]\ntheta2 = [-0.9, 0.02]\n\n[estimate]",
     )
 }
+MASS = {
+    "mass.toml": (
+        f"{IDENTIFY}/task_5_1/model.toml",
+        'known = { m = 10.0 }\nestimate = ["c", "alpha"]',
+        'estimate = ["c", "alpha", "m"]',
+    )
+}
 EDITS = {
     "fit-prior": PRIOR,
     "fit-prior-auto": PRIOR,
@@ -329,6 +345,15 @@ EDITS = {
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {
         "misspelt.toml": (f"{IDENTIFY}/task_5_1/model.toml", "equations", "equation"),
+    },
+    "identify-two-models": MASS,
+    "identify-two-designs": MASS,
+    "simulate-resonance": {
+        "undamped.toml": (
+            f"{IDENTIFY}/task_5_1/model.toml",
+            '(m*p**2 + alpha*p + c)*X = F",\n]\nknown = { m = 10.0 }\nestimate = ["c", "alpha"]',
+            '(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]',
+        )
     },
     "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
     "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},

@@ -9,7 +9,7 @@ import typer
 
 from rotorid.cli.common_options import command
 from rotorid.cli.output import Destination
-from rotorid.workflows.identify import IdentifyOptions
+from rotorid.workflows.identify import IdentifyOptions, compare
 from rotorid.workflows.identify import identify as work
 
 
@@ -23,10 +23,11 @@ def identify(
         Path, typer.Argument(metavar="MODEL.toml", help="Equations, known numbers, what to estimate.")
     ],
     data: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Argument(
-            metavar="DATA",
-            help="Measured amplitudes, .csv or .xlsx; only --design does without.",
+            metavar="OTHER.toml DATA",
+            help="Measured amplitudes, .csv or .xlsx; only --design does without. A second model before them "
+            "is compared with the first: misfits and F test.",
         ),
     ] = None,
     *,
@@ -42,4 +43,8 @@ def identify(
     Example: rotorid identify sample_data/identify/task_5_1/model.toml sample_data/identify/task_5_1/data.csv
     --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
     """
-    to.deliver("identification", lambda: work(model, data, options))
+    *others, table = data or (None,)
+    if others and table:
+        to.deliver("comparison", lambda: compare([model, *others], table, options))
+    else:
+        to.deliver("identification", lambda: work(model, table, options))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from balancing.data.conventions import polar
+from rotorid.base import result
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
@@ -99,6 +100,16 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations)
     return rows
+
+
+def measurement_columns(data: Experiments, signals: Sequence[str]) -> tuple[result.Column, ...]:
+    """The table of some amplitudes as `read_measurements` reads it, frequencies in rad/s."""
+    columns = {"frequency_rad_s": data.frequencies, **data.varying}
+    for name in signals:
+        columns[f"{name}_re"] = data.signals[name].real
+        if not data.free.all():
+            columns[f"{name}_im"] = data.signals[name].imag
+    return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
 
 
 def _columns(signals: tuple[str, ...], varying: tuple[str, ...]) -> tuple[Column, ...]:

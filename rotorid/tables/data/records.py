@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotorid.base import result
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown
@@ -41,6 +42,7 @@ def read_record(
     *,
     allow_missing: bool = False,
     sigma: Mapping[str, float] | None = None,
+    measured: bool = True,
 ) -> Record:
     """Read a time record.
 
@@ -58,6 +60,8 @@ def read_record(
         Whether blank cells, NaN and absent columns of outputs mean "not measured". Inputs never may.
     sigma
         Standard deviations of outputs by name, for a record that has none of its own.
+    measured
+        False: times and inputs are all that is needed.
 
     Returns
     -------
@@ -81,9 +85,11 @@ def read_record(
     _explain_states(grid, model, problems)
     if allow_missing:
         grid = _blank(grid, (*model.outputs, *_deviations(model).values()))
-    table = problems.need(make_table(grid, _columns(model, allow_missing=allow_missing), problems))
+    optional = allow_missing or not measured
+    table = problems.need(make_table(grid, _columns(model, allow_missing=optional), problems))
     _complain_about_times(table)
-    _complain_about_outputs(table, model, allow_missing=allow_missing)
+    if measured:
+        _complain_about_outputs(table, model, allow_missing=allow_missing)
     _complain_about_deviations(table, model, stated=sigma is not None)
     problems.stop()
     t = table.numbers("t")
@@ -98,6 +104,15 @@ def read_record(
         str(path),
         Shown(f"time, {'µs' if unit.name == 'us' else unit.name}", unit.scale),
     )
+
+
+def record_columns(record: Record) -> tuple[result.Column, ...]:
+    """The table as `read_record` reads it: times in s, outputs, their standard deviations, inputs."""
+    columns = {"t_s": record.t, **record.outputs}
+    for name, std in (record.sigma or {}).items():
+        columns[f"{name}{STD}"] = np.broadcast_to(std, record.t.shape)
+    columns |= record.inputs
+    return tuple(result.Column(name, values, "{:.6g}".format) for name, values in columns.items())
 
 
 def _columns(model: OdeModel, *, allow_missing: bool) -> tuple[Column, ...]:

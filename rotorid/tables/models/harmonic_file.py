@@ -54,6 +54,8 @@ class HarmonicFile:
         Stated errors of the amplitudes, or None.
     path
         Where it was read.
+    unmeasured
+        Outputs that a model in time does not show.
     prior
         Value and standard deviation of parameters that are known beside the data.
     """
@@ -63,6 +65,7 @@ class HarmonicFile:
     start: Mapping[str, float] = field(default_factory=dict)
     errors: AmplitudeErrors | None = None
     path: Path | None = None
+    unmeasured: tuple[str, ...] = ()
     prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -146,7 +149,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         section.complain("equations", f"a usable model: {error}", value=False)
         problems.stop()
         raise
-    return HarmonicFile(model, bounds, start, said["errors"], path, prior)
+    return HarmonicFile(model, bounds, start, said["errors"], path, prior=prior)
 
 
 def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile:
@@ -183,7 +186,8 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         message = f"{path}: {lost} {stand} in initial values only, which amplitudes do not show: left out"
         warnings.warn(message, TableWarning, stacklevel=3)
     bounds, prior = ({n: two for n, two in each.items() if n in start} for each in (form.bounds, form.prior))
-    return HarmonicFile(model, bounds, start, form.errors, path, prior)
+    unmeasured = tuple({*own} & {*model.outputs})
+    return HarmonicFile(model, bounds, start, form.errors, path, unmeasured, prior)
 
 
 def _equations(section: Section, key: str) -> list[str] | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import TypeVar
@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import FloatArray, significant
 from rotorid.base.registry import Method, find
 from rotorid.timedomain.integration import adaptive, matrix_exponential
 from rotorid.timedomain.integration.sensitivity_equations import Augmented
@@ -137,6 +137,27 @@ def inputs_of(model: OdeModel, record: Record) -> FloatArray:
     if not model.inputs:
         return np.zeros((len(record.t), 0))
     return np.stack([record.inputs[name] for name in model.inputs], axis=1)
+
+
+def simulated_record(
+    model: OdeModel,
+    theta: FloatArray,
+    plan: Record,
+    sigma: Mapping[str, float] | None = None,
+    digits: int | None = None,
+    seed: int = 0,
+) -> Record:
+    """What would be read of a model's outputs at the times and with the inputs of a record.
+
+    Independent normal errors of standard deviations `sigma` are drawn, then samples are rounded to
+    significant digits. Errors as in `simulate`.
+    """
+    y = simulate(model, theta, plan, sensitivities=False).y
+    if sigma is not None:
+        drawn = np.random.default_rng(seed).standard_normal(y.shape)
+        y = y + drawn * [sigma[name] for name in model.outputs]
+    columns = y.T if digits is None else [significant(column, digits) for column in y.T]
+    return replace(plan, outputs=dict(zip(model.outputs, columns, strict=True)), sigma=sigma)
 
 
 def _start(

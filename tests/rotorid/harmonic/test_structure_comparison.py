@@ -1,0 +1,175 @@
+"""Two structures on the same readings: the F test raises its false alarms as often as it says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import f, ncf
+
+from rotorid.harmonic import AmplitudeErrors, harmonic_model
+from rotorid.harmonic.simulated_measurements import as_read, forced_vibration, free_vibration
+from rotorid.harmonic.structure_comparison import Structure, compare_structures
+from rotorid.samples import sample_data
+
+ERRORS = AmplitudeErrors(0.05, np.deg2rad(3))
+W = [7.0, 8.0, 9.0, 9.5, 10.0, 10.5, 11.0, 12.0, 13.0]
+DAMPED = "(m*p**2 + b*p + c)*X = F"
+
+
+def model(equation, estimate, **known):
+    return harmonic_model([equation], known=known, estimate=estimate)
+
+
+MASS = model(DAMPED, ["c", "b", "m"])
+FIXED = model(DAMPED, ["c", "b"], m=10.0)
+TASK = sample_data() / "identify" / "task_5_1"
+
+
+def readings(mass=10.0, seed=0, stated=True):
+    exact = forced_vibration(MASS, np.array([1000.0, 10.0, mass]), W, {"F": 10.0})
+    data = as_read(exact, ["X"], ERRORS, seed=seed)
+    return data if stated else replace(data, errors=None)
+
+
+def compared(small, large, data):
+    pair = Structure("small", small, data, {}, {}), Structure("large", large, data, {}, {})
+    return compare_structures(pair)
+
+
+def test_false_alarms_are_as_many_as_said():
+    """So many probabilities are below 5, 20 and 50 %, within 3 standard deviations of 100 tables."""
+    found = [compared(FIXED, MASS, readings(seed=seed, stated=False)) for seed in range(100)]
+    assert {one.special for one in found} == {0}
+    chance = np.array([one.f_test[1] for one in found])
+    for level in (0.05, 0.2, 0.5):
+        share = np.mean(chance < level)
+        assert abs(share - level) < 0.3 * np.sqrt(level * (1 - level)), (level, share)
+
+
+def test_a_wrong_mass_is_found_as_often_as_it_can_be():
+    """The power is that of the noncentral F whose parameter is (error of the mass / its std)²."""
+    found = [compared(FIXED, MASS, readings(10.4, seed)) for seed in range(50)]
+    std = np.mean([one.fits[1].std[2] for one in found])
+    power = ncf.sf(f.isf(0.05, 1, 15), 1, 15, (0.4 / std) ** 2)
+    assert 0.3 < power < 0.95
+    assert abs(np.mean([one.f_test[1] < 0.05 for one in found]) - power) < 3 * np.sqrt(
+        power * (1 - power) / 50
+    )
+
+
+def test_f_is_that_of_the_misfits_and_of_linear_regression():
+    """With errors that are the same for all readings, and a response linear in the parameters."""
+    flat = AmplitudeErrors(floor=0.02)
+    line, slope = model("X = k*F", ["k"]), model("X = (k + d*p)*F", ["k", "d"])
+    exact = forced_vibration(slope, np.array([1.0, 0.002]), W, {"F": 1.0})
+    data = as_read(exact, ["X"], flat, seed=4)
+    found = compared(line, slope, data)
+    z = data.signals["X"]
+    one = z - z.real.mean()
+    two = one - 1j * np.array(W) * (np.array(W) @ z.imag) / np.sum(np.square(W))
+    misfits = [np.sum(np.abs(r) ** 2) / 0.02**2 for r in (one, two)]
+    assert np.allclose(found.misfits, misfits, rtol=1e-9)
+    assert found.dof == (17, 16)
+    assert np.isclose(found.f_test[0], (misfits[0] - misfits[1]) / (misfits[1] / 16), rtol=1e-9)
+    assert np.isclose(found.f_test[1], f.sf(found.f_test[0], 1, 16), rtol=1e-9)
+
+
+def test_the_order_of_the_models_changes_nothing():
+    data = readings(10.2)
+    there, back = compared(FIXED, MASS, data), compared(MASS, FIXED, data)
+    assert (there.special, back.special) == (0, 1)
+    assert np.isclose(there.f_test[1], back.f_test[1], rtol=1e-6)
+
+
+def test_models_that_are_no_special_case_have_no_f_test():
+    """Another mass and no mass to estimate, or hysteresis in place of a damper: neither holds the other."""
+    heavy = model(DAMPED, ["c", "b"], m=11.0)
+    hysteretic = model("(m*p**2 + c + h*p**3)*X = F", ["c", "h", "m"])
+    for small, large in ((heavy, FIXED), (FIXED, hysteretic)):
+        found = compared(small, large, readings())
+        assert (found.special, found.f_test) == (None, None)
+        assert "the F test does not apply" in found.summary()
+
+
+def test_the_same_model_in_other_parameters_is_told():
+    other = model("(p**2 + d*p + k)*X = g*F", ["k", "d", "g"])
+    found = compared(other, MASS, readings())
+    assert np.isclose(*found.misfits, rtol=1e-9)
+    assert "no such readings tell them apart" in found.summary()
+
+
+def test_equations_multiplied_by_anything_give_the_same():
+    """Residuals of equations would not: these are a thousand times larger, and weighted by frequency."""
+    factor = model("1000*p**2*(m*p**2 + b*p + c)*X = 1000*p**2*F", ["c", "b", "m"])
+    data = readings(10.2, stated=False)
+    plain, multiplied = compared(FIXED, MASS, data), compared(FIXED, factor, data)
+    assert np.allclose(plain.misfits, multiplied.misfits, rtol=1e-9)
+    assert np.isclose(plain.f_test[0], multiplied.f_test[0], rtol=1e-6)
+
+
+def test_exact_readings_are_not_tested():
+    exact = forced_vibration(FIXED, np.array([1000.0, 10.0]), W, {"F": 10.0})
+    found = compared(FIXED, MASS, exact)
+    assert found.f_test is None
+    assert "no F test" in found.summary()
+
+
+def test_natural_modes_are_compared_too():
+    chain = ["(m1*p**2 + c1 + c2)*X1 - c2*X2 = 0", "-c2*X1 + (m2*p**2 + c2)*X2 = 0"]
+    known = harmonic_model(chain, known={"m1": 2.0, "m2": 1.0}, estimate=["c1", "c2"])
+    free = harmonic_model(chain, known={"m1": 2.0}, estimate=["c1", "c2", "m2"])
+    exact = free_vibration(free, np.array([100.0, 50.0, 1.0]), {})
+    data = replace(exact, signals={**exact.signals, "X2": exact.signals["X2"] * np.array([1.02, 0.99])})
+    found = compared(known, free, data)
+    assert found.special == 0
+    assert found.dof == (2, 1)
+    assert 0 < found.f_test[1] < 1
+
+
+UNDAMPED = 'equations = ["(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]\n'
+
+
+def test_the_command_prints_misfits_and_chooses_nothing(cli, tmp_path):
+    other = tmp_path / "undamped.toml"
+    other.write_text(UNDAMPED)
+    model, data = TASK / "model.toml", TASK / "data.csv"
+    found = cli("identify", other, model, data)
+    assert found.code == 0, found.err
+    assert "undamped.toml is a special case of the other model" in " ".join(found.out.split())
+    document = cli("identify", other, model, data, "--json").json
+    assert document["special_case"] == str(other)
+    assert [row["dof"] for row in document["models"]] == [5, 4]
+    assert document["probability"] < 1e-4
+    alone = cli("identify", model, data, "--method", "output-error", "--json").json
+    assert document["models"][1]["fit"]["parameters"] == alone["parameters"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--design", "1:2:1"], "--design belongs to one model"),
+        (["--loss", "huber"], "--loss belongs to one model"),
+        (["--plot", "x.png"], "have no picture"),
+    ],
+)
+def test_options_of_one_model_are_refused(cli, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "u.toml").write_text(UNDAMPED)
+    found = cli("identify", "u.toml", TASK / "model.toml", TASK / "data.csv", *words)
+    assert (found.code, found.out) == (2, "")
+    assert said in found.err
+    assert not (tmp_path / "x.png").exists()
+
+
+def test_models_must_read_the_same(cli, tmp_path):
+    (tmp_path / "e.toml").write_text(UNDAMPED + "[errors]\namplitude_percent = 1\n")
+    model, data = TASK / "model.toml", TASK / "data.csv"
+    assert "state different errors" in cli("identify", tmp_path / "e.toml", model, data).err
+    assert "two models are compared, not 3" in cli("identify", model, model, model, data).err
+    (tmp_path / "u.toml").write_text(UNDAMPED)
+    found = cli("identify", tmp_path / "u.toml", model, data, "--amplitude-error", "2", "--phase-error", "1")
+    assert "u.toml: the residuals at the starting values are not finite" in found.err
+    pair = [Structure(name, FIXED, readings(), {}, {}) for name in ("a", "b")]
+    pair[1] = replace(pair[1], data=pair[1].data.take([0, 1, 2]))
+    with pytest.raises(ValueError, match="the models predict different readings"):
+        compare_structures(pair)
