@@ -173,6 +173,8 @@ def compare(
     pair = []
     for model in models:
         file = read_harmonic_model(model)
+        if file.prior:
+            raise ValueError(f"{model}: two models are compared by the data alone, without [prior]")
         errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error)
         rows = read_measurements(data, replace(file, errors=errors)).without_copies()[0]
         pair.append(Structure(str(model), file.model, rows, file.bounds, file.start))

@@ -15,6 +15,7 @@ from rotorid.timedomain import Record, ode_model
 from rotorid.timedomain.fit import fit
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
+from rotorid.workflows.identify import compare
 
 T = np.linspace(0.0, 3.0, 25)
 K = np.column_stack((np.ones(25), T, np.exp(-T)))
@@ -352,6 +353,14 @@ def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
     path.write_text('inputs = ["u"]\n' + time + more, encoding="utf-8")
     with pytest.warns(UserWarning, match="x0 stands in initial values only"):
         assert read_harmonic_model(path).prior == {"c": (2.0, 0.1)}
+
+
+def test_two_models_are_compared_without_a_prior(tmp_path):
+    folder, path = sample_data() / "identify" / "task_5_1", tmp_path / "prior.toml"
+    text = (folder / "model.toml").read_text(encoding="utf-8")
+    path.write_text(f"{text}\n[prior]\nc = [1000, 10]\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"by the data alone, without \[prior\]"):
+        compare([folder / "model.toml", path], folder / "data.csv")
 
 
 def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():
