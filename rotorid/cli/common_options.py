@@ -18,6 +18,7 @@ from rotorid.cli.output import Destination
 Command = Callable[..., None]
 USUAL = ("plot", "output", "table", "json")
 WITH_REPORT = ("report", *USUAL)
+EQUATIONS = ("show", "latex")
 INPUT, OUTPUT = "Input", "Output"
 RotorArgument = Annotated[
     Path,

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import typer
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _R = TypeVar("_R", bound="Outcome")
 PICTURES = (".png", ".svg", ".pdf")
 TABLES = (".csv", ".xlsx")
+Show = Literal["equations"]
 STATE_SPACES = (".json", ".npz", ".mat")
 
 
@@ -43,6 +44,10 @@ class Destination:
         Table, .csv or .xlsx.
     report : FILE
         Sheet to print or to send, .html, one file.
+    show : equations
+        What was solved, in symbols and in numbers, instead of the answer; with --json beside it.
+    latex
+        The equations as a document of LaTeX.
     """
 
     json: bool = False
@@ -50,6 +55,8 @@ class Destination:
     plot: Path | None = None
     output: Path | None = None
     report: Path | None = None
+    show: Show | None = None
+    latex: bool = False
 
     def deliver(
         self,
@@ -81,6 +88,8 @@ class Destination:
         from rotorid.tables.reader.problems import printable
         from rotorid.tables.reader.table_writing import table_bytes, write_files
 
+        if self.latex and (self.show is None or self.json or self.table):
+            raise ValueError("--latex belongs to --show equations, without --json or --table")
         plot, output = self.plot, self.output
         files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = [
             (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
@@ -91,7 +100,10 @@ class Destination:
         check_targets([(path, endings) for path, endings, _ in files])
         with busy(what):
             found = work()
+        equations = found.equations if self.show else None
         document = found.document
+        if equations:
+            document["equations"] = equations.to_dict()
         note(document)
         targets = {path: build for path, _, build in files if path is not None}
         check_inputs(targets, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
@@ -100,9 +112,9 @@ class Destination:
             typer.echo(json_text(document))
         else:
             written = [f"written: {printable(str(path))}" for path in targets]
-            answer = found.answer
+            answer = equations.answer(found.answer) if equations else found.answer
             text = answer.whole() if self.table else answer.brief(LINES - len(written))
-            typer.echo("\n".join([text, *written]))
+            typer.echo("\n".join([equations.latex() if equations and self.latex else text, *written]))
         return found
 
 

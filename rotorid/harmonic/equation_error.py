@@ -83,10 +83,7 @@ def linear_fit(model: HarmonicModel, experiments: Experiments, bounds: Bounds | 
     """Regression of the equations, and the parameters that follow; errors as in `identify`."""
     rows = build_rows(model, experiments)
     groups = _groups(model, rows)
-    fixed = np.zeros(rows.coefficients.shape[1])
-    fixed[[_reference(rows, group) for group in groups]] = 1.0
-    if fixed.all():  # each unknown is alone with its factor: nothing is told relative to another
-        fixed[:] = 0.0
+    fixed = told_as_one(rows, groups)
     kept = np.flatnonzero(fixed == 0)
     estimate, solution, K, Y, experiment, settled = _regress(model, experiments, rows, fixed)
     picks = _determined(estimate)[: 0 if len(groups) and not fixed.any() else None]
@@ -268,6 +265,14 @@ def _groups(model: HarmonicModel, rows: Rows) -> tuple[IntArray, ...]:
         for part in parts
         if holds[part].any() and not known[part].any()
     )
+
+
+def told_as_one(rows: Rows, groups: Sequence[IntArray]) -> FloatArray:
+    """1 for each unknown that others are told relative to, else 0, (u,)."""
+    fixed = np.zeros(rows.coefficients.shape[1])
+    fixed[[_reference(rows, group) for group in groups]] = 1.0
+    # where each unknown is alone with its factor, nothing is told relative to another
+    return np.zeros_like(fixed) if fixed.all() else fixed
 
 
 def _reference(rows: Rows, group: IntArray) -> int:

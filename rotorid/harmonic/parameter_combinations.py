@@ -61,14 +61,15 @@ class Combinations:
         Shape (u, monomials): each combination's coefficients.
     pivots, scales
         A feature's share of combination i is its coefficient of monomial `pivots[i]` over `scales[i]`.
-    words
-        Such as "b*(1 - delta)".
+    symbolic, words
+        Coefficients by monomial, with the names of the known; in words such as "b*(1 - delta)".
     """
 
     monomials: tuple[Monomial, ...]
     rows: FloatArray
     pivots: tuple[int, ...]
     scales: FloatArray
+    symbolic: tuple[Mapping[Monomial, Polynomial], ...]
     words: tuple[str, ...]
 
 
@@ -189,15 +190,16 @@ def merge(
     exact = [[f.exact.get(m, Fraction(0)) for m in monomials] for f in features]
     table = [[QQ(x.numerator, x.denominator) for x in row] for row in exact]
     reduced, pivots = DomainMatrix(table, (len(table), len(monomials)), QQ).to_sparse().rref()
-    rows, words = np.zeros((len(pivots), len(monomials))), []
+    rows, told = np.zeros((len(pivots), len(monomials))), []
     for i, row in enumerate(reduced.to_Matrix().tolist()[: len(pivots)]):
         wanted = {m: Fraction(int(x.p), int(x.q)) for m, x in zip(monomials, row, strict=True) if x}
         symbolic = _own_words(wanted, features)
         for m, part in symbolic.items():
             rows[i, monomials.index(m)] = float(insert(part, known))
-        words.append(combination_words(symbolic))
+        told.append(symbolic)
     scales = rows[np.arange(len(pivots)), pivots]
-    return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(words))
+    words = tuple(map(combination_words, told))
+    return Combinations(tuple(monomials), rows, tuple(pivots), scales, tuple(told), words)
 
 
 def _own_words(
@@ -275,16 +277,19 @@ def ratio_words(above: Polynomial, below: Polynomial) -> str:
     """
     import sympy
 
-    def expression(polynomial: Polynomial) -> Any:  # noqa: ANN401 - sympy has no types
-        return sympy.Add(
-            *(
-                sympy.Rational(x.numerator, x.denominator)
-                * sympy.Mul(*(sympy.Symbol(name) ** e for name, e in monomial))
-                for monomial, x in polynomial.items()
-            )
-        )
-
     return str(sympy.factor(sympy.cancel(expression(above) / expression(below))))
+
+
+def expression(polynomial: Polynomial) -> Any:  # noqa: ANN401 - sympy has no types
+    """A polynomial in symbols of sympy."""
+    from sympy import Add, Mul, Rational, Symbol
+
+    return Add(
+        *(
+            Rational(x.numerator, x.denominator) * Mul(*(Symbol(name) ** e for name, e in monomial))
+            for monomial, x in polynomial.items()
+        )
+    )
 
 
 def _sum_words(terms: Sequence[tuple[Monomial, Monomial, Fraction]]) -> str:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         Verdict,
     )
     from rotorid.base.registry import Method
+    from rotorid.report.equations import Equations
     from rotorid.tables import Job
     from rotorid.tables.job.job_as_written import JobSource
     from rotorid.workflows.option_quantities import Amount, Amplitudes, Positions, Weights
@@ -212,6 +213,13 @@ class Balance(Parts):
     def to_frame(self) -> pd.DataFrame:
         """The weights, or what goes into each hole."""
         return self.result.to_frame() if self.mounted is None else self.mounted.to_frame()
+
+    @property
+    def equations(self) -> Equations:
+        """The stretched W D = −Y."""
+        from rotorid.report.equations_of_results import correction_equations
+
+        return correction_equations(self.result, self.influence)
 
     def figure(self) -> Figure:
         """The correction, or what was asked for beside it: discs with holes, tolerances, the trade-off."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
+    from rotorid.report.equations import Equations
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -49,6 +50,11 @@ class Outcome(Answered):
     @abstractmethod
     def to_frame(self) -> pd.DataFrame:
         """The main table."""
+
+    @property
+    def equations(self) -> Equations:
+        """What was solved, in symbols and in numbers."""
+        raise ValueError(f"{type(self).__name__} has no equations")
 
     def figure(self) -> Figure:
         """The main picture."""
@@ -77,6 +83,13 @@ class Parts(Outcome):
         """As JSON types, without the provenance."""
         known = {key: part.to_dict() for key, part in self.parts.items() if part is not None}
         return {**known.pop("", {}), **known}
+
+    @property
+    def equations(self) -> Equations:
+        """Those of the first."""
+        from rotorid.report.equations_of_results import equations_of
+
+        return equations_of(next(iter(self.parts.values())))
 
     @property
     def answer(self) -> Answer:

@@ -195,6 +195,7 @@ trial-weight-model-all      trial-weight {MODEL_JOB} --output t.csv --plot t.png
 trial-weight-turbo          trial-weight {TURBO}/job.toml --share 30
 trial-weight-tried          trial-weight sample_data/bk_two_plane/job.toml --mass 2g --max-mass 3g
 trial-weight-nothing        trial-weight --speed 3000rpm
+balance-equations           balance {TURBO}/job.toml --method least-squares --show equations --table
 """
 
 MODEL_COMMANDS = f"""
@@ -256,6 +257,12 @@ fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy
 fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
 fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
 fit-design                  fit {FIT}/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1 --sigma 0.02 --design 0:10:0.5 --choose 4
+identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
+identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
+identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
+identify-latex-alone        identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --latex
+reduce-equations            {GIVEN} --modes 2 --seals 12=2e6 --show equations
+fit-equations               fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --show equations
 validate                    validate --output numbers.csv
 validate-all                validate --all
 """

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, WITH_REPORT, command
+from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import TABLES, Destination, check_targets
 from rotorid.workflows.balance import BalanceOptions
 from rotorid.workflows.balance import balance as work
@@ -35,7 +35,7 @@ from rotorid.workflows.balance import balance as work
         OUTPUT: "save_influence template",
         "Expert": "model_error ridge truncate split_seconds",
     },
-    to=WITH_REPORT,
+    to=(*WITH_REPORT, *EQUATIONS),
 )
 def balance(
     files: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, command
+from rotorid.cli.common_options import EQUATIONS, OUTPUT, USUAL, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
@@ -24,6 +24,7 @@ from rotorid.workflows.fit import fit as work
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",
     },
+    to=(*USUAL, *EQUATIONS),
 )
 def fit(
     model: Annotated[

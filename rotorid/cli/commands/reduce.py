@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
-from rotorid.cli.common_options import OUTPUT, WITH_REPORT, command
+from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import STATE_SPACES, Destination
 from rotorid.workflows.reduce import ReduceOptions, View
 from rotorid.workflows.reduce import reduce as work
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         OUTPUT: "view",
         "Expert": "normalise rows nonnegative supports_apart",
     },
-    to=WITH_REPORT,
+    to=(*WITH_REPORT, *EQUATIONS),
 )
 def reduce(
     rotor: Annotated[

@@ -40,6 +40,14 @@ def real(expr: Any) -> Any:  # noqa: ANN401  sympy has no types
     return expr.replace(sympy.Abs, real_abs).replace(sympy.sign, real_sign)
 
 
+def usual(expr: Any) -> Any:  # noqa: ANN401
+    """The expression with sympy's own |x| and sign(x), to be read."""
+    import sympy
+
+    real_abs, real_sign = _real_functions()
+    return expr.replace(real_abs, sympy.Abs).replace(real_sign, sympy.sign)
+
+
 def signs(expr: Any) -> set[Any]:  # noqa: ANN401
     """Its parts sign(…)."""
     return set(expr.atoms(_real_functions()[1]))

@@ -1,0 +1,203 @@
+"""Equations of a result as a textbook writes them, in symbols and in numbers: text, LaTeX and JSON.
+
+Sympy sorts the factors of a product by name: a name that begins with `BEHIND` comes last, as ω and the
+amplitudes do in a book. No text shows that letter.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.arrays import FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, text
+from rotorid.base.text import cut
+
+Expression = Any
+"""Of sympy, which has no types."""
+Terms = Sequence[tuple[Expression, Expression]]
+"""A sum of products: coefficient and factor of each."""
+
+BEHIND = "\ue000"
+_LONGEST = 20
+_GREEK = re.compile("[α-ωΑ-Ω]")
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_DOCUMENT = r"""\documentclass{article}
+\usepackage{amsmath,booktabs,longtable}
+\usepackage[landscape,margin=1.5cm]{geometry}
+\allowdisplaybreaks
+\begin{document}
+\begin{align*}
+%s
+\end{align*}
+%s
+\end{document}"""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One equation in symbols, left = right; its name says which."""
+
+    name: str
+    left: Terms
+    right: Terms
+
+    def written(self, *, latex: bool = False) -> str:
+        """As a line of text, or as a formula of LaTeX."""
+        return " = ".join(_sum(side, latex=latex) for side in (self.left, self.right))
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """What a command solved.
+
+    Attributes
+    ----------
+    title
+        What they are, and where the book has them.
+    symbolic
+        In symbols, before any weighting.
+    names
+        Of the matrix, the unknowns and the right side.
+    rows, columns
+        Words for each row of the matrix (m,) and for each unknown (n,).
+    matrix, right
+        Exactly as they were solved, (m, n) and (m,); m is 0 where the solution follows from no such rows.
+    solution
+        (n,), NaN where the data do not determine it.
+    notes
+        Units, weighting, and what else is to be known, in words.
+    """
+
+    title: str
+    symbolic: Sequence[Row]
+    names: tuple[str, str, str]
+    rows: Sequence[str]
+    columns: Sequence[str]
+    matrix: FloatArray
+    right: FloatArray
+    solution: FloatArray
+    notes: Sequence[str] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types."""
+        symbols = [
+            {"row": row.name, "text": row.written(), "latex": row.written(latex=True)}
+            for row in self.symbolic
+        ]
+        numbers = {name: getattr(self, name) for name in ("rows", "columns", "matrix", "right", "solution")}
+        return plain({"title": self.title, "symbolic": symbols, **numbers, "notes": self.notes})
+
+    def answer(self, told: Answer) -> Answer:
+        """In place of what a result tells, whose judgement and remarks stay."""
+        width = max((len(row.name) for row in self.symbolic), default=0)
+        symbols = [f"  {row.name:<{width}}  {row.written()}" for row in self.symbolic]
+        # no line ends inside "Re X1": an answer writes this blank as any other
+        symbols = [re.sub(r"\b(Re|Im) (?!eq)", "\\1\u00a0", line) for line in symbols]
+        found = ["\n".join([f"{self.title}:", *symbols]), *self._tables(), self._solution()]
+        return Answer(told.judgement, "\n\n".join(found), told.warnings, (*self.notes, *told.notes))
+
+    def latex(self) -> str:
+        """A whole document: symbols, the matrix beside the right side, the solution, notes."""
+        rows = "\\\\\n".join(
+            rf"\text{{{row.name}}}\quad & {row.written(latex=True)}" for row in self.symbolic
+        )
+        said = Column(self.title, (self._solution(), *self.notes))
+        tables = [_latex_table(self._system())] if self.rows else []
+        tables.append(_latex_table([said], r"p{0.9\linewidth}"))
+        body = _GREEK.sub(lambda c: rf"\ensuremath{{{_formula_of(c[0])}}}", "\n".join(tables))
+        return _DOCUMENT % (rows, body)
+
+    def _system(self) -> list[Column]:
+        """Name of each row, the matrix, the right side."""
+        matrix, unknowns, right = self.names
+        columns = zip(
+            (*self.columns, f"| {right}"), np.column_stack((self.matrix, self.right)).T, strict=True
+        )
+        numbers = [Column(name, values, "{:.6g}".format, cut(name, _LONGEST)) for name, values in columns]
+        return [Column(f"{matrix} {unknowns} = {right}", self.rows, str), *numbers]
+
+    def _tables(self) -> list[str]:
+        """The same in parts, each with as many columns as fit."""
+        if not self.rows:
+            return []
+        names, *numbers = self._system()
+        wide = max(12, *(len(one.title or "") for one in numbers))
+        each = max((COLUMNS - 4 - max(map(len, self.rows))) // (wide + 2), 1)
+        parts = [numbers[k : k + each] for k in range(0, len(numbers), each)]
+        return [text((names, *part), width=COLUMNS) for part in parts]
+
+    def _solution(self) -> str:
+        found = zip(self.columns, self.solution, strict=True)
+        told = (f"{name} = {x:.6g}" if x == x else f"{name} not determined" for name, x in found)
+        return f"{self.names[1]}: {', '.join(told)}"
+
+
+def _latex_table(columns: Sequence[Column], layout: str | None = None) -> str:
+    """A table that may go over pages, every text in it escaped."""
+    how: dict[str, Any] = {"index": False, "float_format": "%.6g", "column_format": layout}
+    return str(frame(columns).to_latex(escape=True, longtable=True, **how))
+
+
+def _words(expression: Expression) -> str:
+    """As text: `m1·ω²`."""
+    from sympy import sstr
+
+    told = sstr(_decimals(expression)).replace(BEHIND, "").replace("Abs(", "abs(")
+    told = re.sub(r"\*\*(\d+)", lambda found: found[1].translate(_RAISED), told)
+    return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
+
+
+def _formula(expression: Expression) -> str:
+    from sympy import latex
+
+    names = {symbol: _formula_of(symbol.name) for symbol in expression.free_symbols}
+    return str(latex(_decimals(expression), symbol_names=names))
+
+
+def _decimals(expression: Expression) -> Expression:
+    """Long fractions as decimals."""
+    from sympy import Float, Rational
+
+    return expression.xreplace({q: Float(q, 6) for q in expression.atoms(Rational) if q.q > 100})
+
+
+def _sum(terms: Terms, *, latex: bool) -> str:
+    """Coefficient times factor, term by term; 0 and 1 are not written."""
+    write, times, brackets = (_formula, r" \cdot ", r"\left({}\right)") if latex else (_words, "·", "({})")
+    told = []
+    for parts in terms:
+        if 0 in parts:
+            continue
+        inside = [one for one in parts if one not in (1, -1)]
+        sign = "-" if len([one for one in parts if one == -1]) == 1 else ""
+        alone = len(inside) == 1 and not sign
+        whole = (alone or not (one.is_Add or (one.is_Mul and one is parts[1])) for one in inside)
+        forms = zip(("{}" if bare else brackets for bare in whole), map(write, inside), strict=True)
+        told.append(sign + (times.join(form.format(shown) for form, shown in forms) or "1"))
+    return " + ".join(told).replace("+ -", "- ") or "0"
+
+
+def _formula_of(name: str) -> str:
+    """LaTeX of a name: a parameter, "Re X", a derivative "∂x/∂k", "dx/dt" or "d(∂x/∂k)/dt"."""
+    from sympy import Symbol, latex
+
+    if found := re.fullmatch(f"{BEHIND}*(R|I)[em] (.+)", name):
+        return rf"{{{_formula_of(found[2])}}}^{{({found[1].lower()})}}"
+    if found := re.fullmatch(r"d\(?(.+?)\)?/dt", name):
+        return rf"\frac{{d}}{{dt}} {_formula_of(found[1])}"
+    if found := re.fullmatch("∂(.+)/∂(.+)", name):
+        return rf"\frac{{\partial {_formula_of(found[1])}}}{{\partial {_formula_of(found[2])}}}"
+    return str(latex(Symbol(_GREEK.sub(_spelt, name.replace(BEHIND, "")))))
+
+
+def _spelt(letter: re.Match[str]) -> str:
+    name = unicodedata.name(letter[0]).split()[-1]
+    return name.title() if letter[0].isupper() else name.lower()

@@ -1,0 +1,189 @@
+"""The equations behind each result: K θ = Y of [S] (9), its (31)–(40) and (50), (3.6)–(3.7) of [F]."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+
+import numpy as np
+from sympy import Add, I, Integer, Matrix, Symbol, collect, eye, factor_terms
+
+from balancing import Correction, Influence
+from balancing.coefficients.baseline import match_speeds
+from balancing.correction.selected_planes import plane_indices
+from rotorid.base.text import counted
+from rotorid.expressions import names, parse
+from rotorid.harmonic import Experiments, HarmonicModel, Identification
+from rotorid.harmonic.equation_error import linear_fit, told_as_one
+from rotorid.harmonic.parameter_combinations import CONSTANT, expression
+from rotorid.harmonic.polynomial import ONE, Monomial
+from rotorid.reduction import Reduction
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design
+from rotorid.regression.linear import stretch
+from rotorid.report.equations import BEHIND, Equations, Expression, Row
+from rotorid.timedomain import OdeModel
+from rotorid.timedomain.models.compiled import real, usual
+from rotorid.timedomain.result import Fit
+
+PARTS = ("Re", "Im")
+_WEIGHTED = (
+    "the numbers are after weighting: the rows of an experiment times the inverse Cholesky factor of the "
+    "covariance that the stated errors give them; the symbols are before it"
+)
+
+
+@singledispatch
+def equations_of(found: object) -> Equations:
+    """What was solved to get this result; ValueError where it has no such equations."""
+    raise ValueError("--show equations needs one model and its data: there is nothing else that was solved")
+
+
+@equations_of.register
+def _(found: Identification) -> Equations:
+    """K θ = Y of a linear regression: real and imaginary parts of the equations at p = iω."""
+    if found.method != "equation-error":
+        raise ValueError(f"--show equations needs linear equations, which --method {found.method} has not")
+    model, tests = found.model, found.experiments
+    fit = linear_fit(model, tests)
+    ones = told_as_one(fit.rows, fit.groups)
+    once = len({*tests.frequencies.tolist()}) == len(tests)
+    at = [
+        f"ω = {omega:.6g} rad/s" + ("" if once else f", experiment {name}")
+        for omega, name in zip(tests.frequencies, tests.names, strict=True)
+    ]
+    labels = [f"{PARTS[part]} eq. {e + 1}, {at[i]}" for i, e, part in np.argwhere(fit.rows.used)]
+    notes = [f"{model.combinations.words[i]} = 1: the others are relative to it" for i in ones.nonzero()[0]]
+    notes += [_WEIGHTED] if tests.stated else []
+    rows, found_as = _rows_in_symbols(model, tests, ones.tolist()), fit.estimate
+    title = f"K θ = Y, [S] (9): {counted(len(labels), 'real row')}, {counted(len(found_as.names), 'unknown')}"
+    names = "K", "θ", "Y"
+    return Equations(title, rows, names, labels, found_as.names, fit.K, fit.Y, found_as.values, notes)
+
+
+def _rows_in_symbols(model: HarmonicModel, tests: Experiments, ones: list[float]) -> list[Row]:
+    """Parts of each equation; amplitudes that are real in all tests are one symbol, unknowns of `ones` 1."""
+    combos, free = model.combinations, bool(tests.free.all())
+    pivots = [combos.monomials[k] for k in combos.pivots]
+    amplitude = {CONSTANT: Integer(1)}
+    for name in model.signals:
+        re, im, whole = (Symbol(f"{BEHIND}{BEHIND}{part}{name}") for part in ("Re ", "Im ", ""))
+        amplitude[name] = re + I * im if np.nan_to_num(tests.signals[name]).imag.any() else whole
+    signals = {symbol for each in amplitude.values() for symbol in each.free_symbols}
+
+    def total(e: int, part: int, monomial: Monomial) -> Expression:
+        """What stands at a product of parameters."""
+        terms = [Integer(0)]
+        for f in model.features:
+            if f.equation == e and monomial in f.symbolic:
+                factor = (I * Symbol(f"{BEHIND}ω")) ** f.power * amplitude[f.signal]
+                terms.append(expression(f.symbolic[monomial]) * expression({f.varying: Integer(1)}) * factor)
+        return Add(*terms).expand().coeff(I, part)
+
+    rows = []
+    for e, part in np.ndindex(len(model.equations), 1 if free else 2):
+        told = zip(pivots, combos.symbolic, strict=True)
+        left = [factor_terms(total(e, part, m) / expression(by[m])) for m, by in told]
+        known = total(e, part, ONE) + sum(c for c, one in zip(left, ones, strict=True) if one)
+        right = collect((-known).expand(), signals, evaluate=False)
+        unknown = zip(left, map(parse, combos.words), ones, strict=True)
+        terms = [(c, word) for c, word, one in unknown if not one]
+        name = f"eq. {e + 1}" if free else f"{PARTS[part]} eq. {e + 1}"
+        given = [(factor_terms(right[signal]), signal) for signal in sorted(right, key=str)]
+        rows.append(Row(name, terms, given))
+    return rows
+
+
+def correction_equations(found: Correction, influence: Influence) -> Equations:
+    """The stretched W D = −Y of all speeds and sensors, [S] (29)–(33), (40), in the units of the job."""
+    labels, planes, factors = found.labels, found.planes, np.ones(found.before.size)
+    at = match_speeds(found.speeds, influence.speeds)
+    W = influence.part(at, None, plane_indices(influence, planes)).W.reshape(-1, len(planes))
+    notes = [
+        f"D in {labels.weight_in}, Y in {labels.vibration_in or 'the unit of the readings'}; phases lead and "
+        "angles count with the rotation, whatever the job writes"
+    ]
+    if found.method == "weighted":
+        notes.append("the rows are before weighting, which follows from the errors of W and Y, and from D")
+    elif found.row_weights is not None:
+        factors = found.row_weights
+        notes.append("the rows are after weighting: times the weights of sensors and speeds")
+    if found.method != "least-squares" or found.active:
+        how = f"{found.method}, within limits" if found.active else found.method
+        notes.append(f"D by another way ({how}): plain least squares of these rows may give other weights")
+    w, d = ([Symbol(f"{x} {y}{p + 1}") for p in range(len(planes)) for x in PARTS] for y in "WD")
+    real = [((-1) ** j * w[j], d[j]) for j in range(len(d))]
+    imaginary = [(w[j ^ 1], d[j]) for j in range(len(d))]
+    rows = [Row("Re", real, [(-1, Symbol("Re Y"))]), Row("Im", imaginary, [(-1, Symbol("Im Y"))])]
+    places = [f"{sensor}, {labels.speed_words(speed)}" for speed in found.speeds for sensor in found.sensors]
+    stacked = [f"{part} {place}" for place in places for part in PARTS]
+    unknowns = [f"{part} {plane}" for plane in planes for part in PARTS]
+    matrix = stretch(factors[:, None] * W * labels.vibration_scale / labels.weight_scale)
+    right = stretch(-factors * found.before.ravel() * labels.vibration_scale)
+    title = f"W D = -Y of each reading, stretched, [S] (31)–(33), (40): {counted(len(stacked), 'real row')}"
+    weights = stretch(found.weights * labels.weight_scale)
+    return Equations(title, rows, ("W", "D", "-Y"), stacked, unknowns, matrix, right, weights, notes)
+
+
+@equations_of.register
+def _(found: Reduction) -> Equations:
+    """The rows B m = D of formula (50), mode by mode, as `design` makes them."""
+    n, k, how, seals = len(found.nodes), found.modes, found.choices, found.seal_stiffness
+    modes = found.rotor_frequencies[:k], found.rotor_shapes[:, :k]
+    B, D = design(found.compliance, *modes, seal_stiffness=seals, normalise=how.normalise, rows=how.rows)
+    relative, gap = how.rows == "relative", "," if n > 9 else ""
+    units = "B in 1/kg, D without unit" if relative else "B in m/N, D in s²"
+    at = ", ".join(map(str, found.nodes))
+    notes = [f"{units}, masses in kg; λ = 1/ω² of a mode; m1, m2, … stand at {at}"]
+    if how.nonnegative:
+        notes.append("no mass may be below 0: plain least squares of these rows may give another answer")
+    rows = []
+    for mode, i in np.ndindex(k, n):
+        U = [Symbol(f"U{j + 1}{gap}{mode + 1}") for j in range(n)]
+        U[0] = Integer(1) if how.normalise == "first" else U[0]
+        alpha = [Symbol(f"α{min(i, j) + 1}{gap}{max(i, j) + 1}") for j in range(n)]
+        scale = Symbol(f"λ{mode + 1}")
+        load = U[i] + sum(alpha[j] * Symbol(f"c{j + 1}") * U[j] for j in np.flatnonzero(seals))
+        left = [(alpha[j] * U[j] / (scale if relative else 1), Symbol(f"m{j + 1}")) for j in range(n)]
+        rows.append(Row(f"mass {i + 1}, mode {mode + 1}", left, [(1 if relative else scale, load)]))
+    labels = [f"mass at {node}, mode {mode + 1}" for mode in range(k) for node in found.nodes]
+    title, m = f"B m = D, [S] (50): {counted(n * k, 'row')}, {counted(n, 'unknown')}", found.masses
+    return Equations(title, rows, ("B", "m", "D"), labels, m.names, B, D, m.solution, notes)
+
+
+@equations_of.register
+def _(found: Fit) -> Equations:
+    """Sensitivities ∂x/∂θ of the states and ∂y/∂θ of the outputs, [F] (3.6), (3.7), in symbols."""
+    model, n = found.model, len(found.model.states)
+    x, thetas = ([Symbol(name) for name in names] for names in (model.states, model.parameters))
+    E, velocities = Matrix(n, n, getattr(model, "inertia", eye(n))), [Symbol(f"d{state}/dt") for state in x]
+    equations, starts, outputs = [], [], []
+
+    def chain(f: Expression, by: Expression, S: list[Expression]) -> list[tuple[Expression, Expression]]:
+        slopes = [usual(f.diff(symbol)) for symbol in (*x, by)]
+        return [*zip(slopes, (*S, 1), strict=True)]
+
+    rates, initial, observed = _as_written(model)
+    for theta in thetas:
+        S = [Symbol(f"∂{state}/∂{theta}") for state in x]
+        for i, (s, f, start) in enumerate(zip(S, rates, initial, strict=True)):
+            left = [(E[i, j], Symbol(f"d({other})/dt")) for j, other in enumerate(S)]
+            moved = zip(-E[i, :].diff(theta), velocities, strict=True)
+            equations.append(Row("rate", left, [*chain(f, theta, S), *moved]))
+            starts.append(Row("start", [(1, s)], chain(start, theta, S)))
+        for name, f in zip(model.outputs, observed, strict=True):
+            if f != Symbol(name):  # an output that is no state as it is
+                outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
+    rows, none = [*equations, *starts, *outputs], np.zeros((0, len(thetas)))
+    title = f"Sensitivities, [F] (3.6), (3.7), of {counted(n, 'state')}"
+    return Equations(
+        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values
+    )
+
+
+def _as_written(model: OdeModel) -> list[list[Expression]]:
+    """Rates, initial values, outputs: with the names of the known where the model still has its own texts."""
+    groups = {"state": model.states, "initial": model.states, "output": model.outputs}
+    read = [[real(parse(model.texts[f"{kind} {name}"])) for name in of] for kind, of in groups.items()]
+    told = {name for group in read for e in group for name in names(e)}
+    if {*model.parameters} <= told and not hasattr(model, "inertia"):
+        return read
+    return [[*model.rates], [*model.initial], [*model.observed]]

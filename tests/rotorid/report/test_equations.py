@@ -1,0 +1,656 @@
+"""`--show equations`: rows as derived by hand, numbers as they were solved, LaTeX that can be read."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy
+from harmonic_cases import simulate as simulate_harmonic
+from harmonic_cases import two_masses
+from matplotlib.mathtext import MathTextParser
+
+from rotorid.expressions import parse
+from rotorid.harmonic import harmonic_model
+from rotorid.harmonic.experiments import AmplitudeErrors, experiments
+from rotorid.report.equations import BEHIND, Equations, Row
+from rotorid.samples import sample_data
+from rotorid.tables import read_harmonic_model, read_job, read_measurements
+from rotorid.timedomain import Record, ode_model, second_order, simulate
+from rotorid.workflows import BalanceOptions, balance
+from rotorid.workflows.fit import fit
+from rotorid.workflows.identify import IdentifyOptions, identify
+from rotorid.workflows.reduce import ReduceOptions, reduce
+
+IDENTIFY, FIT = sample_data() / "identify", sample_data() / "fit"
+ROTOR = sample_data() / "rotor23.csv"
+TASK_9 = sample_data() / "book_task_9"
+TASKS = sorted(path.name for path in IDENTIFY.iterdir() if path.is_dir())
+
+
+def files(task):
+    return IDENTIFY / task / "model.toml", sorted((IDENTIFY / task).glob("data*.csv"))[0]
+
+
+def plain(name):
+    """The name that a hand-derived row has: X1r, X1i, w."""
+    name = name.replace(BEHIND, "").replace("ω", "w")
+    return re.sub(r"^(Re|Im) (\w+)$", lambda found: found[2] + found[1][0].lower(), name)
+
+
+def side(terms):
+    total = sympy.Add(*(sympy.sympify(c) * sympy.sympify(factor) for c, factor in terms))
+    return total.xreplace({symbol: sympy.Symbol(plain(symbol.name)) for symbol in total.free_symbols})
+
+
+def same(row, text):
+    """Whether both sides are those of this text, multiplied out."""
+    sides = (parse(part) for part in text.split(" = "))
+    return all(sympy.expand(side(a) - b) == 0 for a, b in zip((row.left, row.right), sides, strict=True))
+
+
+CHAIN_RIGHT = (
+    "F + (m1*w**2 - (c1 + c2))*X1r + c2*X2r",
+    "(m1*w**2 - (c1 + c2))*X1i + c2*X2i",
+    "c2*X1r + (m2*w**2 - c2)*X2r",
+    "c2*X1i + (m2*w**2 - c2)*X2i",
+)
+CHAIN_DAMPERS = (
+    "-w*X1i*a1 + w*(X2i - X1i)*a12",
+    "w*X1r*a1 + w*(X1r - X2r)*a12",
+    "w*(X1i - X2i)*a12 - w*X2i*a2",
+    "w*(X2r - X1r)*a12 + w*X2r*a2",
+)
+CHAIN_SPRINGS = (
+    "X1r*c1 + (X1r - X2r)*c2",
+    "X1i*c1 + (X1i - X2i)*c2",
+    "(X2r - X1r)*c2",
+    "(X2i - X1i)*c2",
+)
+CHAIN_INERTIA = ("F + m1*w**2*X1r", "m1*w**2*X1i", "m2*w**2*X2r", "m2*w**2*X2i")
+GAP = "(1 - T0*T2*w**2)"  # of fig. 9 without T1
+DERIVED = {
+    # task 1.1 prints a third row with −ω X2i in the place of a1 and 0 in that of a2
+    "task_1_1": [f"{left} = {right}" for left, right in zip(CHAIN_DAMPERS, CHAIN_RIGHT, strict=True)],
+    "task_1_2": [
+        f"{a} + {b} = {c}" for a, b, c in zip(CHAIN_SPRINGS, CHAIN_DAMPERS, CHAIN_INERTIA, strict=True)
+    ],
+    "task_2_1": [
+        "-w**2*Xr*a1 - w*Xi*a2 + Xr*a3 = F - w**3*Xi",
+        "-w**2*Xi*a1 + w*Xr*a2 + Xi*a3 = w**3*Xr",
+    ],
+    # 2.2 and 2.3 print F T2 for ω² F T2
+    "task_2_2": [
+        "Sr*K + (-w**2*T2*Sr + w**3*T0*T2*Si + w**2*T2*F)*T1 = w**2*T0*T2*Sr + w*T2*Si",
+        "Si*K - w**2*(w*T0*T2*Sr + T2*Si)*T1 = w*(-T2*Sr + w*T0*T2*Si + T2*F)",
+    ],
+    "task_2_3": [
+        "Sr*K + T2*w**2*(F - Sr)*T1 - w**2*T2*Sr*T0 + w**3*T2*Si*T0*T1 = w*T2*Si",
+        "Si*K - w**2*T2*Si*T1 - w**2*T2*Si*T0 - w**3*T2*Sr*T0*T1 = w*T2*(F - Sr)",
+    ],
+    "task_3_1": [
+        "Sr*K + (-w**2*(T0 + T2)*Sr + w**2*T2*F + (w**3*T0*T2 - w)*Si)*T1"
+        " = (w**2*T2*T0 - 1)*Sr + w*(T0 + T2)*Si + F",
+        "Si*K + ((w - w**3*T0*T2)*Sr - w**2*(T0 + T2)*Si - w*F)*T1"
+        " = -w*(T0 + T2)*Sr + (w**2*T2*T0 - 1)*Si + w*T2*F",
+    ],
+    # 3.2 prints + ω S(i) at T2 and ω² (1 + K) on the right
+    "task_3_2": [
+        "(w**2*(F - Sr) + w**3*T0*Si)*T1*T2 - w*(w*T0*Sr + Si)*(T1 + T2) = F - (1 + K)*Sr + w*T0*Si",
+        "-(w*T0*Sr + Si)*w**2*T1*T2 + (w*Sr - w**2*T0*Si - w*F)*(T1 + T2) = -w*T0*Sr - (1 + K)*Si",
+    ],
+    "task_3_3": [
+        "w**3*Si*T0*T1*T2 - w*Si*(T0 + T1 + T2) - w**2*Sr*T0*(T1 + T2) + w**2*(F - Sr)*T1*T2"
+        " = F - (1 + K)*Sr",
+        "-w**3*Sr*T0*T1*T2 + w*Sr*T0 + w*(Sr - F)*(T1 + T2) - w**2*Si*T0*(T1 + T2) - w**2*Si*T1*T2"
+        " = -(1 + K)*Si",
+    ],
+    "task_4_1": [
+        "Zr*c - w*Zi*b + w*Zi*delta*b = m*w**2*(e + Zr)",
+        "Zi*c + w*Zr*b - w*Zr*delta*b = m*w**2*Zi",
+    ],
+    "task_4_2": [
+        "-w*K*Si*T1 + (T0**2*w**3 - w)*Si*T2 - 2*T0*w*Si*zeta - 2*T0*w**2*Sr*zeta*T2"
+        " = F - (1 + K - T0**2*w**2)*Sr",
+        "w*K*Sr*T1 + ((w - T0**2*w**3)*Sr - F*w)*T2 + 2*T0*w*Sr*zeta - 2*T0*w**2*Si*zeta*T2"
+        " = (w**2*T0**2 - (1 + K))*Si",
+    ],
+    # 4.3 prints − S(r) K in the first row, S(i) for S(r) at T2 in the second, and a sign on the right
+    "task_4_3": [
+        "(T0**2*w**2 - 1)*w*Si*T2 + Sr*K - 2*T0*w*Si*zeta - 2*T0*w**2*Sr*zeta*T2 - w*Si*K*T1"
+        " = F + (T0**2*w**2 - 1)*Sr",
+        "-((T0**2*w**2 - 1)*w*Sr + F*w)*T2 + Si*K + 2*T0*w*Sr*zeta - 2*T0*w**2*Si*zeta*T2 + w*Sr*K*T1"
+        " = (T0**2*w**2 - 1)*Si",
+    ],
+}
+UNKNOWNS = {
+    "task_1_1": ["a1", "a12", "a2"],
+    "task_2_3": ["K", "T1", "T0", "T0*T1"],
+    "task_3_2": ["T1 + T2", "T1*T2"],
+    "task_3_3": ["T0", "T1 + T2", "T0*(T1 + T2)", "T1*T2", "T0*T1*T2"],
+    "task_4_1": ["c", "b*(1 - delta)"],
+    "task_4_2": ["K*T1 + 2*T0*zeta", "T2", "T2*zeta"],
+}
+
+
+@pytest.mark.parametrize("task", DERIVED)
+def test_the_rows_of_lessons_1_to_4(task):
+    shown = identify(*files(task)).equations
+    assert len(shown.symbolic) == len(DERIVED[task])
+    wrong = [
+        row.written() for row, text in zip(shown.symbolic, DERIVED[task], strict=True) if not same(row, text)
+    ]
+    assert wrong == []
+    assert list(shown.columns) == UNKNOWNS.get(task, list(shown.columns))
+
+
+def test_the_printed_third_row_of_lesson_1_is_another():
+    third = identify(*files("task_1_1")).equations.symbolic[2]
+    assert not same(third, "-w*X2i*a1 + w*(X1i - X2i)*a12 = c2*X1r + (m2*w**2 - c2)*X2r")
+
+
+def test_formula_23_with_the_coupling_where_it_prints_c1_and_c2():
+    model, truth, w, inputs = two_masses()
+    shown = identify(model, simulate_harmonic(model, truth, w, inputs)).equations
+    right = (
+        "F1 + (m1*w**2 - c1)*X1r - c*X2r",
+        "(m1*w**2 - c1)*X1i - c*X2i",
+        "-c*X1r + (m2*w**2 - c2)*X2r",
+        "(m2*w**2 - c2)*X2i - c*X1i",
+    )
+    left = ("-w*X1i*a1 - w*X2i*a", "w*X1r*a1 + w*X2r*a", "-w*X2i*a2 - w*X1i*a", "w*X2r*a2 + w*X1r*a")
+    for row, a, b in zip(shown.symbolic, left, right, strict=True):
+        assert same(row, f"{a} = {b}")
+    np.testing.assert_allclose(shown.solution, truth, rtol=1e-9)
+
+
+def test_formula_27_turned_by_the_phase():
+    model = harmonic_model(
+        ["(m*p**2 + b*p + c)*Z - q*p/omega*Z = -m*e*p**2"],
+        known={"m": 10.0, "e": 1e-4},
+        estimate=["c", "b", "q"],
+        varying=["omega"],
+    )
+    w = np.array([80.0, 100.0, 120.0])
+    Z = np.array([1.4e-6 - 16e-6j, -20e-6j, -1.8e-6 - 24e-6j])
+    tests = experiments(model, w, {"Z": Z, "omega": w})
+    real, imaginary = identify(model, tests).equations.symbolic
+    Z, phi, omega = sympy.symbols("Z phi omega")
+    put = {sympy.Symbol("Zr"): Z * sympy.cos(phi), sympy.Symbol("Zi"): Z * sympy.sin(phi)}
+    re, im = (side(row.left).subs(put) - side(row.right).subs(put) for row in (real, imaginary))
+    turned = [re * sympy.cos(phi) + im * sympy.sin(phi), re * sympy.sin(phi) - im * sympy.cos(phi)]
+    m, c, b, q, e = sympy.symbols("m c b q e")
+    printed = [  # the term b of the second row lacks its ω in the print of the theory: −Z ω b
+        Z * c - Z * omega**2 * m - m * e * omega**2 * sympy.cos(phi),
+        -Z * omega * b + Z * q - m * e * omega**2 * sympy.sin(phi),
+    ]
+    for got, wanted in zip(turned, printed, strict=True):
+        assert sympy.simplify(got.subs(sympy.Symbol("w"), omega) - wanted) == 0
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_symbols_with_numbers_put_in_are_the_matrix_that_gives_the_estimate(task):
+    model, data = files(task)
+    found = identify(model, data)
+    shown, tests = found.equations, found.identification.experiments
+    file = read_harmonic_model(model)
+    told = iter(zip(shown.rows, shown.matrix, shown.right, strict=True))
+    for i, w in enumerate(tests.frequencies):
+        values = {"w": w, **file.model.known, **{name: v[i] for name, v in tests.varying.items()}}
+        for name, z in tests.signals.items():
+            values |= {name: z[i].real, f"{name}r": z[i].real, f"{name}i": z[i].imag}
+        put = {sympy.Symbol(name): float(value) for name, value in values.items()}
+        for row in shown.symbolic:
+            label, own, right = next(told)
+            assert row.name in label
+            assert f"ω = {w:.6g} rad/s" in label
+            numbers = [float(side([(c, 1)]).subs(put)) for c, _ in row.left]
+            np.testing.assert_allclose(numbers, own, rtol=1e-9, atol=1e-12 * np.abs(own).max())
+            np.testing.assert_allclose(float(side(row.right).subs(put)), right, rtol=1e-9, atol=1e-12)
+    assert next(told, None) is None
+    solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(solved, shown.solution, rtol=1e-6)
+
+
+def test_stated_errors_weight_the_rows_and_it_is_said():
+    options = IdentifyOptions(amplitude_error=2.0, phase_error=1.0)
+    model, data = files("task_5_1")
+    shown = identify(model, data, options).equations
+    found = identify(model, data, options).identification
+    solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(solved, found.values, rtol=1e-9)
+    covariance = np.linalg.inv(shown.matrix.T @ shown.matrix)  # unit variance: the rows are whitened
+    np.testing.assert_allclose(covariance, found.covariance, rtol=1e-9)
+    assert "after weighting" in shown.notes[0]
+    assert identify(model, data).equations.notes == []
+
+
+def test_an_unknown_that_the_others_are_relative_to():
+    model = harmonic_model(["(m*p**2 + c)*X = 0"], estimate=["m", "c"])
+    tests = experiments(model, [10.0, 10.0], {"X": [1.0, 2.0]}, free=True)
+    found = identify(model, tests)
+    shown = found.equations
+    assert found.identification.unidentifiable
+    assert shown.notes[0] == "m = 1: the others are relative to it"
+    assert [row.written() for row in shown.symbolic] == ["X·c = ω²·X"]
+    assert shown.columns == ("c",)
+    np.testing.assert_allclose(np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0], [100.0])
+    assert "experiment" in shown.rows[0]  # the frequency alone does not tell the rows apart
+
+
+def test_what_has_no_such_rows_is_refused(cli, tmp_path):
+    model, data = files("task_4_1")
+    guessed = tmp_path / "model.toml"
+    start = "\n[start]\nc = 1e5\nb = 1e4\ndelta = 0.5\n"
+    guessed.write_text(model.read_text(encoding="utf-8") + start, encoding="utf-8")
+    errors = ("--amplitude-error", 2, "--phase-error", 1)
+    for words, said in (
+        ((model, data, "--method", "output-error", "--show", "equations"), "--method output-error has not"),
+        (
+            (guessed, *errors, "--design", "80:120:5", "--show", "equations"),
+            "--show equations needs one model and",
+        ),
+        ((model, *files("task_4_1"), "--show", "equations"), "--show equations needs one model and"),
+        ((model, data, "--latex"), "--latex belongs to --show equations"),
+        ((model, data, "--show", "equations", "--latex", "--json"), "without --json or --table"),
+        ((model, data, "--show", "equation"), "is not one of 'equations'"),
+    ):
+        done = cli("identify", *words)
+        assert done.code == 2
+        assert done.out == ""
+        assert said in " ".join(done.err.split()), done.err
+
+
+# -- balancing
+
+JOB = sample_data() / "turbo_job" / "job.toml"
+
+
+def test_the_stretched_rows_give_the_weights():
+    found = balance(JOB, BalanceOptions(method="least-squares"))
+    shown, result = found.equations, found.result
+    N, P = result.before.size, len(result.planes)
+    assert shown.matrix.shape == (2 * N, 2 * P)
+    D = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(D, shown.solution, rtol=1e-9)
+    size, angle = result.labels.weight(result.weights)  # as the sheet says them
+    assert result.labels.angle_sign == 1
+    np.testing.assert_allclose(D[::2] + 1j * D[1::2], size * np.exp(1j * np.radians(angle)), rtol=1e-9)
+    left = shown.right - shown.matrix @ D
+    rms = np.sqrt(np.sum(left**2) / N)
+    np.testing.assert_allclose(
+        rms, np.sqrt(np.mean(result.labels.vibration(result.after)[0] ** 2)), rtol=1e-9
+    )
+    assert not any("another way" in note for note in shown.notes)
+
+
+def test_blocks_and_names_of_the_stretched_rows():
+    found = balance(JOB, BalanceOptions(method="least-squares"))
+    shown, result = found.equations, found.result
+    W = shown.matrix
+    np.testing.assert_array_equal(W[::2, ::2], W[1::2, 1::2])  # [[Re, −Im], [Im, Re]]
+    np.testing.assert_array_equal(W[::2, 1::2], -W[1::2, ::2])
+    sensor, speed = result.sensors[1], result.labels.speed_words(result.speeds[0])
+    assert shown.rows[2:4] == [f"Re {sensor}, {speed}", f"Im {sensor}, {speed}"]
+    assert shown.columns[:2] == [f"Re {result.planes[0]}", f"Im {result.planes[0]}"]
+    values = {f"Re W{p + 1}": W[2, 2 * p] for p in range(len(result.planes))}
+    values |= {f"Im W{p + 1}": W[3, 2 * p] for p in range(len(result.planes))}
+    for k, row in enumerate(shown.symbolic):
+        numbers = [float(sympy.sympify(c).subs(values)) for c, _ in row.left]
+        np.testing.assert_allclose(numbers, W[2 + k])
+
+
+def test_weights_of_readings_and_other_methods():
+    job = read_job(JOB)
+    counts = np.ones((len(job.trials.speeds), len(job.trials.sensors)))
+    counts[0] = 0.25
+    found = balance(replace(job, row_weights=counts), BalanceOptions(method="least-squares"))
+    shown = found.equations
+    D = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(D, shown.solution, rtol=1e-9)
+    assert "after weighting" in shown.notes[1]
+    weighted = balance(JOB).equations
+    assert "before weighting" in weighted.notes[1]
+    plain = balance(JOB, BalanceOptions(method="least-squares")).equations
+    np.testing.assert_array_equal(weighted.matrix, plain.matrix)
+    limited = balance(JOB, BalanceOptions(method="least-squares", max_mass="300g_mm")).equations
+    assert "least-squares, within limits" in limited.notes[-1]
+    assert "minmax" in balance(JOB, BalanceOptions(method="minmax")).equations.notes[-1]
+
+
+# -- formula (50)
+
+
+def test_the_printed_matrices_of_formula_50_with_a_seal():
+    options = ReduceOptions(
+        compliance=TASK_9 / "compliance.csv", measured=TASK_9 / "modes.csv", modes=2, seals="12=2e6"
+    )
+    found = reduce(None, options)
+    shown = found.equations
+    left = [[f"α{min(i, j)}{max(i, j)}" for j in (1, 2, 3)] for i in (1, 2, 3)]
+    right = ["λ{k}*(1 + α12*c2*U2{k})", "λ{k}*U2{k}*(1 + α22*c2)", "λ{k}*(U3{k} + α23*c2*U2{k})"]
+    for row, (k, i) in zip(shown.symbolic, ((k, i) for k in (1, 2) for i in (0, 1, 2)), strict=True):
+        a = left[i]
+        text = f"{a[0]}*m1 + {a[1]}*U2{k}*m2 + {a[2]}*U3{k}*m3 = {right[i].format(k=k)}"
+        assert same(row, text), row.written()
+    m = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(m, found.result.masses.values, rtol=1e-9)
+    result = found.result
+    U = result.rotor_shapes / result.rotor_shapes[0]
+    values = {f"α{i + 1}{j + 1}": result.compliance[i, j] for i in range(3) for j in range(i, 3)}
+    values |= {f"U{i + 1}{k + 1}": U[i, k] for i in range(3) for k in range(2)}
+    values |= {f"λ{k + 1}": result.rotor_frequencies[k] ** -2 for k in range(2)} | {"c2": 2e6}
+    for row, own, D in zip(shown.symbolic, shown.matrix, shown.right, strict=True):
+        np.testing.assert_allclose(
+            [float(sympy.sympify(c).subs(values)) for c, _ in row.left], own, rtol=1e-12
+        )
+        np.testing.assert_allclose(float(side(row.right).subs(values)), D, rtol=1e-12)
+
+
+def test_the_masses_of_the_readme_of_the_book():
+    shown = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=1)).equations
+    np.testing.assert_allclose(
+        np.linalg.solve(shown.matrix, shown.right), [140.357, 191.941, 160.680], atol=1e-3
+    )
+    assert shown.rows[0] == "mass at 7, mode 1"
+
+
+def test_other_rows_of_formula_50():
+    relative = reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=2, rows="relative", normalise="largest"))
+    shown = relative.equations
+    assert shown.symbolic[1].written() == "U11·α12/λ1·m1 + U21·α22/λ1·m2 + U31·α23/λ1·m3 = U21"
+    m = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(m, shown.solution, rtol=1e-9)
+    assert "1/kg" in shown.notes[0]
+    assert "below 0" in reduce(ROTOR, ReduceOptions(nodes="7,12,18", nonnegative=True)).equations.notes[-1]
+
+
+# -- sensitivities
+
+
+def written(shown, name):
+    return [row.written() for row in shown.symbolic if row.name == name]
+
+
+def test_formula_37_of_the_three_masses():
+    shown = fit(FIT / "three_masses" / "model.toml", FIT / "three_masses" / "record.csv").equations
+    A = [
+        ["0", "1", "0", "0", "0", "0"],
+        ["-(c2 + c1)/m1", "0", "c2/m1", "0", "0", "0"],
+        ["0", "0", "0", "1", "0", "0"],
+        ["c2/m2", "0", "-(c2 + c3)/m2", "0", "c3/m2", "0"],
+        ["0", "0", "0", "0", "0", "1"],
+        ["0", "0", "c3/m3", "0", "-(c4 + c3)/m3", "0"],
+    ]
+    y = ["y1", "v1", "y2", "v2", "y3", "v3"]
+    rate = [sum(parse(a) * sympy.Symbol(x) for a, x in zip(row, y, strict=True)) for row in A]
+    rows = iter(shown.symbolic)
+    for theta in ("c1", "m1", "m2"):
+        for i, name in enumerate(y):
+            U = [sympy.Symbol(f"∂{x}/∂{theta}") for x in y]
+            wanted = sum(parse(a) * u for a, u in zip(A[i], U, strict=True))
+            wanted += sympy.diff(rate[i], sympy.Symbol(theta))
+            row = next(rows)
+            assert [(c, str(d)) for c, d in row.left if c != 0] == [(1, f"d(∂{name}/∂{theta})/dt")]
+            assert sympy.simplify(side(row.right) - wanted) == 0
+    assert len(written(shown, "start")) == 18
+    assert all(text.endswith(" = 0") for text in written(shown, "start"))
+    assert "d(∂v1/∂c1)/dt = (-c1 - c2)/m1·∂y1/∂c1 + c2/m1·∂y2/∂c1 - y1/m1" in written(shown, "rate")
+    np.testing.assert_allclose(shown.solution, [0.13999975, 11.99998962, 28.00000273], rtol=1e-6)
+    assert shown.rows == ()
+
+
+def test_symbols_are_what_is_integrated():
+    model = ode_model(
+        {"x": "v", "v": "-k*x**3 - d*v*abs(v) + g*sin(2*t)"},
+        estimate={"k": 2.0, "d": 0.1, "x0": 0.5},
+        initial={"x": "x0", "v": "3*x0**2"},
+        outputs={"a": "x + k*v", "x": "x"},
+        known={"g": 0.7},
+    )
+    record = simulated(model)
+    shown = fit(model, [record]).equations
+    theta, t, x = np.array([2.0, 0.1, 0.5]), 0.3, np.array([0.4, -0.6])
+    S = np.arange(1.0, 7.0).reshape(2, 3)
+    values = {"t": t, "x": x[0], "v": x[1], "g": 0.7} | dict(zip(model.parameters, theta, strict=True))
+    values |= {
+        f"∂{name}/∂{p}": S[i, j]
+        for i, name in enumerate(model.states)
+        for j, p in enumerate(model.parameters)
+    }
+    numbers = {sympy.Symbol(name): value for name, value in values.items()}
+    assert any("d·sign(v)" in text or "abs(v)" in text for text in written(shown, "rate"))
+    assert not any("Real" in row.written() + row.written(latex=True) for row in shown.symbolic)
+
+    def value(row):
+        total = side(row.right).subs(numbers)
+        return float(total.replace(lambda f: f.is_Function, known_functions))
+
+    rates = [value(row) for row in shown.symbolic if row.name == "rate"]
+    augmented = model.augmented(t, np.concatenate((x, S.ravel())), theta, np.zeros(0))[2:].reshape(2, 3)
+    np.testing.assert_allclose(np.reshape(rates, (3, 2)).T, augmented, rtol=1e-9)
+    starts = [value(row) for row in shown.symbolic if row.name == "start"]
+    np.testing.assert_allclose(np.reshape(starts, (3, 2)).T, model.x0_theta(theta), rtol=1e-9)
+    outputs = [value(row) for row in shown.symbolic if row.name == "output"]
+    wanted = model.h_x(t, x, theta) @ S + model.h_theta(t, x, theta)
+    np.testing.assert_allclose(outputs, wanted[0], rtol=1e-9)  # the other one is a state
+
+
+def known_functions(f):
+    name, x = f.func.__name__, float(f.args[0])
+    return {"RealAbs": abs, "RealSign": np.sign, "sin": np.sin, "cos": np.cos}[name](x)
+
+
+def simulated(model, n=60):
+    t = np.linspace(0, 3, n)
+    found = simulate(model, model.start, t)
+    return Record(t, dict(zip(model.outputs, found.y.T, strict=True)))
+
+
+def test_a_model_of_matrices_keeps_its_masses_on_the_left():
+    model = second_order(
+        [["m", 0.0], [0.0, 2.0]],
+        [[0.2, 0.0], [0.0, 0.3]],
+        [[4.0, -1.0], [-1.0, "k"]],
+        estimate={"m": 1.5, "k": 3.0},
+        initial={"y1": 1.0},
+    )
+    shown = fit(model, [simulated(model)]).equations
+    told = written(shown, "rate")
+    assert "m·d(∂v_y1/∂m)/dt = -4·∂y1/∂m - 1/5·∂v_y1/∂m + ∂y2/∂m - dv_y1/dt" in told
+    assert "2·d(∂v_y2/∂k)/dt = ∂y1/∂k - k·∂y2/∂k - 3/10·∂v_y2/∂k - y2" in told
+
+
+def test_a_parameter_of_each_record_has_its_own_name():
+    model = ode_model({"x": "-a*x"}, estimate={"a": 0.5, "x0": 1.0}, initial={"x": "x0"}, per_record=["x0"])
+    one = ode_model({"x": "-a*x"}, estimate={"a": 0.5, "x0": 1.0}, initial={"x": "x0"})
+    shown = fit(model, [simulated(one), simulated(one, 40)]).equations
+    assert "∂x/∂x0_1 = 1" in written(shown, "start")
+    assert list(shown.columns) == ["a", "x0_1", "x0_2"]
+
+
+# -- text and LaTeX
+
+
+def results():
+    return {
+        "identify": identify(*files("task_4_2")),
+        "free": identify(*files("task_7_2")),
+        "balance": balance(JOB),
+        "reduce": reduce(ROTOR, ReduceOptions(nodes="7,12,18", modes=2, rows="relative")),
+        "fit": fit(FIT / "quasilinearization" / "model.toml", FIT / "quasilinearization" / "record.csv"),
+    }
+
+
+FOUND = results()
+MATHTEXT = MathTextParser("path")
+
+
+def readable(formula):
+    """Raises ValueError for what is no LaTeX: braces, brackets, unknown commands, double exponents."""
+    MATHTEXT.parse(f"${formula}$")
+
+
+def document_faults(text):
+    """What is unbalanced: braces, environments, cells of a table, letters that LaTeX does not know."""
+    bare = re.sub(r"\\[{}]", "", text)
+    found = [] if bare.count("{") == bare.count("}") else ["braces"]
+    begun = []
+    for kind, name in re.findall(r"\\(begin|end)\{(\w+\*?)\}", text):
+        if kind == "begin":
+            begun.append(name)
+        elif not begun or begun.pop() != name:
+            found.append(f"end of {name}")
+    found += begun
+    for layout, body in re.findall(r"\\begin\{longtable\}\{(l?r*)\}(.*?)\\end\{longtable\}", text, re.DOTALL):
+        cells = [
+            line.count(" & ") + 1
+            for line in body.splitlines()
+            if line.endswith(r" \\") and "multi" not in line
+        ]
+        found += [] if {*cells} == {len(layout)} else ["cells"]
+    return found + re.findall(r"[^\x00-\x7f²·…–µ]", text)  # these are known without a further package
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_latex_can_be_read(name):
+    shown = FOUND[name].equations
+    for row in shown.symbolic:
+        readable(row.written(latex=True))
+    text = shown.latex()
+    assert text.startswith(r"\documentclass")
+    assert text.endswith(r"\end{document}")
+    assert document_faults(text) == []
+    assert text.count(r"\\" + "\n" + r"\text{") == len(shown.symbolic) - 1
+
+
+@pytest.mark.parametrize("broken", [r"\frac{a}{b", r"\left(a", "a_{1}_{2}", r"\nocommand{a}", "a^"])
+def test_what_is_broken_is_found(broken):
+    with pytest.raises(ValueError):
+        readable(broken)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        (r"\end{align*}", "", "end of document"),
+        (r"\end{document}", r"\end{document}}", "braces"),
+        (" & ", "  ", "cells"),
+        (r"\ensuremath{\omega}", "ω", "ω"),
+    ],
+)
+def test_a_broken_document_is_found(old, new, fault):
+    text = FOUND["identify"].equations.latex()
+    assert fault in document_faults(text.replace(old, new))
+
+
+@pytest.mark.parametrize(
+    ("name", "formula"),
+    [
+        ("alpha12", r"\alpha_{12}"),
+        ("λ1", r"\lambda_{1}"),
+        ("Ω", r"\Omega"),
+        ("Re X1", r"{X_{1}}^{(r)}"),
+        ("∂v1/∂c1", r"\frac{\partial v_{1}}{\partial c_{1}}"),
+        ("d(∂x/∂k)/dt", r"\frac{d}{dt} \frac{\partial x}{\partial k}"),
+        ("T_0", "T_{0}"),
+    ],
+)
+def test_names_in_latex(name, formula):
+    assert Row("", [(1, sympy.Symbol(name))], []).written(latex=True) == f"{formula} = 0"
+
+
+def test_terms_keep_their_signs_and_brackets():
+    a, b, x = sympy.symbols("a b x")
+    row = Row("", [(-1, x), (a - b, a * x), (0, b)], [(1, a + b), (-1, a - b), (-a, x)])
+    assert row.written() == "-x + (a - b)·(a·x) = a + b - (a - b) - a·x"
+    assert Row("", [(1, 1)], [(-1, 1)]).written() == "1 = -1"
+    assert Row("", [(a**2, x)], [(a**-2, 1)]).written() == "a²·x = a**(-2)"
+    long = sympy.Rational(12345678, 10**7)
+    assert Row("", [(long * a, x)], [(sympy.Rational(3, 10), x)]).written() == "1.23457·a·x = 3/10·x"
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_the_document_has_what_was_solved(name):
+    shown = FOUND[name].equations
+    told = json.loads(json.dumps(shown.to_dict(), allow_nan=False))
+    assert np.array_equal(np.array(told["matrix"]).reshape(shown.matrix.shape), shown.matrix)
+    assert told["right"] == shown.right.tolist()
+    assert told["solution"] == shown.solution.tolist()
+    assert BEHIND not in json.dumps(told, ensure_ascii=False)
+    assert [row["row"] for row in told["symbolic"]] == [row.name for row in shown.symbolic]
+
+
+@pytest.mark.parametrize("name", FOUND)
+def test_the_answer_is_brief_and_the_table_whole(name):
+    found = FOUND[name]
+    shown = found.equations
+    answer = shown.answer(found.answer)
+    brief, whole = answer.brief().splitlines(), answer.whole()
+    assert len(brief) <= 24
+    assert max(map(len, (*brief, *whole.splitlines()))) <= 100
+    assert brief[0] == found.answer.brief().splitlines()[0]
+    flat = " ".join(whole.split())
+    for row in shown.symbolic:
+        assert " ".join(row.written().split()) in flat
+    for label in shown.rows:
+        assert label in whole
+    places = [whole.index(part) for part in (shown.title, *shown.rows[:1], f"{shown.names[1]}: ")]
+    assert places == sorted(places)
+
+
+def test_text_and_latex_have_the_numbers_of_the_matrix():
+    shown = FOUND["identify"].equations
+    wanted = np.column_stack((shown.matrix, shown.right))
+    whole, latex = shown.answer(FOUND["identify"].answer).whole(), shown.latex()
+    for label, numbers in zip(shown.rows, wanted, strict=True):
+        line = next(line for line in whole.splitlines() if line.strip().startswith(label))
+        np.testing.assert_allclose([float(x) for x in line.split(label)[1].split()], numbers, rtol=1e-5)
+        escaped = label.replace("ω", r"\ensuremath{\omega}")
+        cells = next(line for line in latex.splitlines() if line.startswith(escaped)).split(" & ")[1:]
+        np.testing.assert_allclose([float(x.rstrip(" \\")) for x in cells], numbers, rtol=1e-5)
+
+
+def test_a_long_name_of_an_unknown_is_cut_over_its_column_only():
+    names = [f"{letter * 60}{k}" for k in (1, 2) for letter in "ab"]
+    shown = Equations("t", [], ("K", "θ", "Y"), ["r"], names, np.ones((1, 4)), np.ones(1), np.ones(4))
+    whole = shown.answer(FOUND["fit"].answer).whole()
+    assert max(map(len, whole.splitlines())) <= 100
+    assert whole.count("a" * 19 + "…") == 2
+    assert all(f"{name} = 1" in whole and name in shown.latex() for name in names)
+
+
+def test_an_undetermined_unknown_is_said():
+    nothing = Equations(
+        "t", [], ("K", "θ", "Y"), ["r"], ["a", "b"], np.ones((1, 2)), np.ones(1), np.array([1, np.nan])
+    )
+    assert nothing.answer(FOUND["fit"].answer).whole().count("θ: a = 1, b not determined") == 1
+    assert "b not determined" in nothing.latex()
+    assert nothing.to_dict()["solution"] == [1.0, None]
+
+
+def test_the_command_prints_text_table_latex_and_json(cli):
+    model, data = files("task_1_1")
+    done = cli("identify", model, data, "--show", "equations")
+    assert "-ω·Im X1·a1 + ω·(-Im X1 + Im X2)·a12 = F + (-c1 - c2 + m1·ω²)·Re X1 + c2·Re X2" in done.out
+    assert "θ: a1 = 22.34, a12 = 29.6787, a2 = 10.3553" in done.out
+    assert "Re eq. 2, ω = 45 rad/s" in cli("identify", model, data, "--show", "equations", "--table").out
+    latex = cli("identify", model, data, "--show", "equations", "--latex").out
+    assert latex.rstrip().endswith(r"\end{document}")
+    with_it = cli("identify", model, data, "--show", "equations", "--json").json
+    without = cli("identify", model, data, "--json").json
+    assert with_it.pop("equations")["columns"] == ["a1", "a12", "a2"]
+    for document in (with_it, without):
+        document["provenance"].pop("date")
+    assert with_it == without
+
+
+def test_stated_errors_of_the_model_count_too():
+    model, data = files("task_1_1")
+    file = read_harmonic_model(model)
+    stated = replace(read_measurements(data, file), errors=AmplitudeErrors(relative=0.02, phase=0.02))
+    shown = identify(file.model, stated).equations
+    solved = np.linalg.lstsq(shown.matrix, shown.right, rcond=None)[0]
+    np.testing.assert_allclose(solved, shown.solution, rtol=1e-9)
+    assert "after weighting" in shown.notes[0]
