@@ -167,7 +167,7 @@ class Identification(Answered, Uncertain):
         notes = [f"left out: {row}" for row in self.left_out]
         if self.covariance is None and self.converged and not self.prior:
             notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
-        columns = self._misfit()
+        columns = self.misfit
         left = np.array(columns[-1].values)
         said = f"{self._judgement()} Method: {HEADINGS.get(self.method, self.method)}."
         if known := bool(np.isfinite(left).any()):
@@ -198,7 +198,8 @@ class Identification(Answered, Uncertain):
             return False
         return len({round(s[name], 12) for s in self.solutions if np.isfinite(s[name])}) > 1
 
-    def _misfit(self) -> tuple[Column, ...]:
+    @property
+    def misfit(self) -> tuple[Column, ...]:
         """Size of measured and predicted amplitudes, and their difference as a share of the measured one."""
         names = [name for name in self.model.outputs if name in self.predicted]
         n, e = len(self.experiments), len(names)

@@ -87,7 +87,7 @@ def parameter_text(names: Sequence[str], found: Uncertain, why: Mapping[str, str
     """A table of the parameters: estimate, ±, 95 % interval, and why there is none."""
     lines = [["parameter", "estimate", "±", "%", "95 %: from", "to", ""]]
     for name, value, std, *ends in zip(*(c.values for c in parameter_columns(names, found)), strict=True):
-        digits = _digits(value, std)
+        digits = value_digits(value, std)
         numbers = [f"{x:.{digits}g}" for x in (value, *ends)]
         share = percent(std / abs(value)) if value else ""
         reason = "" if np.isnan(value) else why.get(name, "")
@@ -266,7 +266,7 @@ def coverage_factor(dof: float | None) -> float | None:
     return float(stdtrit(dof, 0.975)) if dof > 0 else None
 
 
-def _digits(value: float, std: float | None) -> int:
+def value_digits(value: float, std: float | None) -> int:
     """Significant digits of a value that show two of its standard deviation, from six to ten."""
     if std is None or not (std > 0 and np.isfinite(std)) or value == 0:
         return 6

@@ -141,9 +141,9 @@ class Equations:
 
 
 def _latex_table(columns: Sequence[Column], layout: str | None = None) -> str:
-    """A table that may go over pages, every text in it escaped."""
+    """A table that may go over pages, every text in it escaped; the bar of plain text is left out."""
     how: dict[str, Any] = {"index": False, "float_format": "%.6g", "column_format": layout}
-    return str(frame(columns).to_latex(escape=True, longtable=True, **how))
+    return str(frame(columns).to_latex(escape=True, longtable=True, **how)).replace("& | ", "& ")
 
 
 def _words(expression: Expression) -> str:

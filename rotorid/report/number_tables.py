@@ -6,13 +6,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rotorid.report.document import Cells
+import numpy as np
+
+from rotorid.base.result import Column
+from rotorid.report.document import NOTHING, Cells
 
 if TYPE_CHECKING:
     from rotorid.report.rotor_figures import Drawing
 
-NARROW = 6
-"""Columns that a telephone shows side by side; rows of wider tables become blocks there."""
+NARROW, LETTERS = 6, 50
+"""Columns and letters that a telephone shows side by side; rows of wider tables become blocks there."""
 
 
 def words(head: str, cells: Iterable[object]) -> Cells:
@@ -24,6 +27,20 @@ def figures(head: str, values: Iterable[object]) -> Cells:
     """A column of numbers that are not from the document, with up to six digits, without trailing zeros."""
     shown = (f"{v:.6g}".replace("-", "−") if isinstance(v, float) else str(v) for v in values)
     return Cells(head, tuple(shown))
+
+
+def shown(columns: Sequence[Column], rows: Iterable[int] | None = None) -> tuple[Cells, ...]:
+    """Columns of a result as its text prints them; of these rows, None: of all."""
+    printed = [(one, one.shown) for one in columns if one.shown is not None]
+    picked = [*range(len(columns[0].values))] if rows is None else [*rows]
+    return tuple(
+        Cells(
+            one.name if one.title is None else one.title,
+            tuple(NOTHING if value != value else show(value) for value in np.asarray(one.values)[picked]),
+            words=show is str,
+        )
+        for one, show in printed
+    )
 
 
 def numbered(head: str, count: int) -> Cells:
@@ -74,8 +91,11 @@ class Grid:
 
     @property
     def wide(self) -> bool:
-        """Whether it has more columns than a telephone shows side by side."""
-        return len(self.columns) > NARROW
+        """Whether it has more columns or letters than a telephone shows side by side."""
+        from markupsafe import Markup
+
+        cells = [[len(Markup(cell).striptags()) for cell in (one.head, *one.cells)] for one in self.columns]
+        return len(cells) > NARROW or sum(map(max, cells)) > LETTERS
 
     @property
     def whole(self) -> bool:
@@ -95,12 +115,15 @@ class Part:
         Sentences before the tables; texts, or markup with numbers of the document.
     tables, drawings
         In this order.
+    listing
+        Text of a file, behind them.
     """
 
     heading: str
     said: tuple[str, ...] = ()
     tables: tuple[Grid, ...] = ()
     drawings: tuple[Drawing, ...] = ()
+    listing: str = ""
 
 
 def every_warning(document: Mapping[str, Any]) -> list[str]:

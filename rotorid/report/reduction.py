@@ -68,7 +68,7 @@ def reduce_report(
         _compliance(document),
     ]
     return render_report(
-        "rotor.html",
+        "parts.html",
         document,
         title=f"Rotor reduced to {counted(len(document['nodes']), 'mass', 'masses')}",
         warnings=every_warning(document),

@@ -69,7 +69,7 @@ def critical_report(
         Part("Mode shapes", tables=_shapes(document, modes)),
     ]
     return render_report(
-        "rotor.html",
+        "parts.html",
         document,
         title="Critical speeds",
         warnings=[*_inside(document), *every_warning(document)],
@@ -134,7 +134,7 @@ def response_report(
         Part("Readings", tables=_readings(document)),
     ]
     return render_report(
-        "rotor.html",
+        "parts.html",
         document,
         title="Unbalance response",
         warnings=[*_margins(document), *every_warning(document)],

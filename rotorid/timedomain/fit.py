@@ -13,12 +13,12 @@ from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.fit_methods import METHODS, Search, Trajectories
-from rotorid.timedomain.methods.iteration_history import Path, half_square
+from rotorid.timedomain.methods.iteration_history import Path, Stop, half_square
 from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
 from rotorid.timedomain.methods.multiple_starts import Minimum, merge, spread_starts
 from rotorid.timedomain.models.ode_model import OdeModel
 from rotorid.timedomain.models.record import Record
-from rotorid.timedomain.models.several_records import for_copies
+from rotorid.timedomain.models.several_records import for_copies, recorded_starts
 from rotorid.timedomain.residual_tests import output_errors, settled
 from rotorid.timedomain.result import Fit
 
@@ -43,7 +43,7 @@ def fit(  # noqa: PLR0913
     trajectory: Trajectories | None = None,
     pieces: int | None = None,
     max_iterations: int = 100,
-    tolerance: float = 1e-9,
+    tolerance: float | None = None,
     rtol: float = RTOL,
     seed: int = 0,
     weigh: bool = False,
@@ -79,7 +79,8 @@ def fit(  # noqa: PLR0913
     max_iterations
         At most.
     tolerance
-        Relative change of the parameters below which Gauss–Newton and quasilinearization stop.
+        Relative change of each parameter, or of the sum of squares, below which Gauss–Newton and
+        quasilinearization stop; None: where no further step would matter.
     rtol
         Of the integration.
     seed
@@ -134,14 +135,15 @@ def fit(  # noqa: PLR0913
     problem = Problem(model, several, integrator, rtol, seconds=max_seconds)
     names = problem.model.parameters
     limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
-    begin = _start(problem.model, for_copies(model, len(several), start or {}))
+    recorded = recorded_starts(model, problem.records)
+    begin = _start(problem.model, recorded | for_copies(model, len(several), start or {}))
     begin = inside(begin, limits[:, 0], limits[:, 1])
     prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
     if ridge or not weigh:
         problem.prior = prior
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
-    search = Search(way, limits, loss, kind, pieces, max_iterations, tolerance)
+    search = Search(way, limits, loss, kind, pieces, max_iterations, Stop(tolerance))
     path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
     if weigh:
         problem, path = _weighed(search, problem, path, prior)

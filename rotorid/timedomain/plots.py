@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.plot_style import BLUE, DARK, MARKERS, QUIET, TEXT, look, new_figure, plain
 from rotorid.base.text import counted
 from rotorid.regression.interval_plot import ROOM, draw_intervals
+from rotorid.timedomain.models.record import record_names
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -83,7 +83,7 @@ def draw_residuals(result: Fit, name: str, axes: Axes) -> None:
     found = [
         (k, record, run.y[:, j] - record.outputs[name])
         for k, (record, run) in enumerate(zip(result.records, result.simulations, strict=False))
-        if name in record.outputs
+        if not np.isnan(record.outputs.get(name, np.nan)).all()
     ]
     if not found:
         words = "nothing measured" if result.simulations else "the states diverge: no residuals"
@@ -192,23 +192,3 @@ def _refined(record: Record) -> Record:
     # a step that is rounding alone would be no step for an integrator
     t = t[np.diff(t, prepend=-np.inf) > 1e-9 * max(1e-300, float(np.ptp(record.t)))]
     return Record(t, inputs={name: np.interp(t, record.t, u) for name, u in record.inputs.items()})
-
-
-def record_names(names: Sequence[str]) -> list[str]:
-    """Short names of records that tell them apart: ends of paths, numbers where they are the same.
-
-    Examples
-    --------
-    >>> record_names(["a/run_1.csv", "a/run_2.csv"]), record_names(["a/x.csv", "b/x.csv"])
-    (['run_1.csv', 'run_2.csv'], ['a/x.csv', 'b/x.csv'])
-    >>> record_names(["the record", "the record"])
-    ['record 1', 'record 2']
-    """
-    if len(set(names)) < len(names):
-        return [f"record {k + 1}" for k in range(len(names))]
-    parts = [PurePath(name).parts or (name,) for name in names]
-    for depth in range(1, max(len(part) for part in parts) + 1):
-        short = ["/".join(part[-depth:]) for part in parts]
-        if len(set(short)) == len(short):
-            return short
-    return list(names)

@@ -10,7 +10,7 @@ import numpy as np
 from rotorid.base.answer import Answer, Answered
 from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
-from rotorid.base.result import Column, frame
+from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
 from rotorid.regression.normal_matrix import NormalMatrix
@@ -19,7 +19,7 @@ from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.methods.iteration_history import Path
 from rotorid.timedomain.methods.multiple_starts import Minimum
 from rotorid.timedomain.models.ode_model import OdeModel
-from rotorid.timedomain.models.record import Record
+from rotorid.timedomain.models.record import Record, record_names
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,9 +35,9 @@ class Fit(Answered, Path):
         What was fitted to what: one model for each record, all with the same parameters.
     method, integrator, loss
         How; the integrator is the one that was used ("none": the model has no states).
-    history, costs, trajectories
+    history, costs, trajectories, stopped_by
         Parameters at the start and after each iteration, (k + 1, n), half the sum of squared residuals at
-        each, and the states of each record that quasilinearization went through.
+        each, the states of each record that quasilinearization went through, and what ended the iteration.
     converged, message, at_bounds
         Whether a minimum was reached, and in words; parameters that stand at a bound.
     estimate
@@ -91,6 +91,27 @@ class Fit(Answered, Path):
         """Names of the parameters."""
         return self.model.parameters
 
+    @property
+    def series(self) -> tuple[Column, ...]:
+        """Of each output of each record: number and rms of its samples, and rms of what the model leaves."""
+        each = [
+            (short, name, record.outputs[name], run.y[:, j] - record.outputs[name])
+            for short, record, run in zip(
+                record_names([one.name for one in self.records]), self.records, self.simulations, strict=False
+            )
+            for j, name in enumerate(self.model.outputs)
+            if not np.isnan(record.outputs.get(name, np.nan)).all()
+        ]
+        names, outputs, y, left = zip(*each, strict=True) if each else [()] * 4
+        rms = [[float(np.sqrt(np.nanmean(x**2))) for x in table] for table in (y, left)]
+        return (
+            Column("record", names, str if len(self.records) > 1 else None),
+            Column("output", outputs, str),
+            Column("samples", [int(np.isfinite(x).sum()) for x in y], "{:d}".format),
+            Column("rms", rms[0], "{:.4g}".format),
+            Column("residual_rms", rms[1], "{:.4g}".format, "left, rms"),
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON types; what is unknown is None."""
         names, change = self.parameters, self.integration_change
@@ -106,12 +127,14 @@ class Fit(Answered, Path):
                     "converged": self.converged,
                     "message": self.message,
                     "reliable": self.reliable,
+                    "stopped_by": self.stopped_by,
                     "iterations": self.iterations,
                     "history": [
                         {"cost": cost, "parameters": dict(zip(names, row, strict=True))}
                         for row, cost in zip(self.history, self.costs, strict=True)
                     ],
                     "errors": self.errors,
+                    "series": rows(self.series),
                     "at_bounds": self.at_bounds,
                     "minima": [
                         {"parameters": m.values, "cost": m.cost, "starts": m.starts} for m in self.minima

@@ -13,7 +13,7 @@ from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import Times, check_names, number, pairs, times
-from rotorid.workflows.result_provenance import Parts, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Parts, log, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,6 +52,9 @@ class FitOptions:
         Other places to start from; default: 0.
     max_iterations : N
         At most; levenberg-marquardt does not count its undamped Gauss–Newton steps.
+    tolerance : X
+        Of gauss-newton and quasilinearization: end where a step is below this part of each parameter, or
+        changes the sum of squares by less than this part of it, [F]; default: where no step matters.
     max_seconds : S
         Limit of the search; what it has found by then has no intervals.
     trajectory : model|data
@@ -83,6 +86,7 @@ class FitOptions:
     starts: int = 1
     seed: int | None = None
     max_iterations: int = 100
+    tolerance: float | None = None
     max_seconds: float = 60.0
     trajectory: str | None = None
     pieces: int | None = None
@@ -105,10 +109,11 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordFit(Parts):
-    """What the fit found, and which times to sample; one of them may be missing."""
+    """What the fit found, which times to sample, of which one may be missing, and the text of the model."""
 
     fit: Fit | None
     design: Design | None = None
+    model: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -126,6 +131,14 @@ class RecordFit(Parts):
         if self.fit is None:
             raise ValueError(_NO_RECORD)
         return figure_fit(self.fit)
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.estimation import fit_report
+
+        if self.fit is None:
+            raise ValueError(_NO_RECORD)
+        return fit_report(self.to_dict(), self.fit, provenance=self.provenance, model=self.model)
 
 
 @workflow
@@ -183,6 +196,7 @@ def fit(
             starts=options.starts,
             seed=options.seed or 0,
             max_iterations=options.max_iterations,
+            tolerance=options.tolerance,
             max_seconds=options.max_seconds,
             trajectory=options.trajectory,
             pieces=options.pieces,
@@ -193,7 +207,7 @@ def fit(
     log.info("degrees_of_freedom = %s", found.estimate.dof)
     log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))
     plan = _plan(equations, options, deviations or found.errors, begin or {}, found)
-    return RecordFit(fit=found, design=plan, provenance=provenance(files, options))
+    return RecordFit(fit=found, design=plan, model=text_of(model), provenance=provenance(files, options))
 
 
 def _plan(
@@ -219,6 +233,8 @@ def _plan(
     if found:
         values = zip(model.parameters, found.values.tolist(), strict=True)
         guess |= {name: value for name, value in values if math.isfinite(value)}
+    if lost := [name for name, value in guess.items() if math.isnan(value)]:
+        raise ValueError(f"--design needs a guess of {listing(lost, 'and')}: --start {lost[0]}=1")
     number = options.choose or min(max(2, len(guess)), len(candidates))
     record = found.records[0] if found else None
     theta = [guess[name] for name in model.parameters]
@@ -232,6 +248,8 @@ def _check(options: FitOptions) -> None:
         one_of(options.trajectory, "--trajectory", ("model", "data"))
         if options.method not in ("quasilinearization", "multiple-shooting"):
             raise ValueError("--trajectory belongs to --method quasilinearization or multiple-shooting")
+    if options.method not in ("gauss-newton", "quasilinearization"):
+        refuse(options, ("tolerance",), "belongs to --method gauss-newton or quasilinearization")
     if options.method != "multiple-shooting":
         refuse(options, ("pieces",), "belongs to --method multiple-shooting")
     if options.starts == 1:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
 from rotorid.workflows.option_values import Speeds, speeds
-from rotorid.workflows.result_provenance import Found, Parts, log, phase, provenance, workflow
+from rotorid.workflows.result_provenance import Found, Parts, log, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,10 +67,11 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Coefficients(Parts):
-    """What data told, and which frequencies to measure next; one of them may be missing."""
+    """What data told, and which frequencies to measure next, one perhaps missing; the text of the model."""
 
     identification: Identification | None
     design: Design | None
+    model: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
@@ -88,6 +89,14 @@ class Coefficients(Parts):
         if self.identification is None:
             raise ValueError(_NO_DATA)
         return figure_identification(self.identification)
+
+    def sheet(self) -> bytes:
+        """To print or to send, one HTML file."""
+        from rotorid.report.estimation import identification_report
+
+        return identification_report(
+            self.to_dict(), self.identification, self.design, provenance=self.provenance, model=self.model
+        )
 
 
 @workflow
@@ -119,6 +128,7 @@ def identify(
     options = options or IdentifyOptions()
     _check(options, measured=data is not None)
     files = [Path(given) for given in (model, data) if isinstance(given, Path | str)]
+    text = text_of(model)
     if isinstance(model, HarmonicModel):
         model = HarmonicFile(model)
     elif not isinstance(model, HarmonicFile):
@@ -143,6 +153,7 @@ def identify(
     return Coefficients(
         identification=result,
         design=None if options.design is None else _plan(file, result, options.design, options.choose),
+        model=text,
         provenance=provenance(files, options),
     )
 
@@ -153,6 +164,10 @@ class TwoStructures(Found):
     def figure(self) -> Figure:
         """None."""
         raise ValueError("two models beside each other have no picture: --plot belongs to one model")
+
+    def sheet(self) -> bytes:
+        """None."""
+        raise ValueError("two models beside each other have no sheet: --report belongs to one model")
 
 
 @workflow

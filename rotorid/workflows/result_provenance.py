@@ -166,6 +166,13 @@ def provenance(
     }
 
 
+def text_of(file: object) -> str:
+    """Text of a file that was read; nothing, where what was given is none."""
+    from rotorid.tables.reader.input_file import file_content
+
+    return file_content(Path(file)).decode("utf-8-sig", "replace") if isinstance(file, Path | str) else ""
+
+
 @contextmanager
 def phase(what: str) -> Iterator[None]:
     """Log how long a part of the work takes."""

@@ -228,6 +228,7 @@ identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/t
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
 identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
+identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
 identify-two-models         identify {IDENTIFY}/task_5_1/model.toml mass.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1
@@ -250,6 +251,11 @@ fit-robust                  fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-starts                  fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --starts 3 --seed 1
 fit-three-masses-auto       fit {FIT}/three_masses/model.toml {FIT}/three_masses/record.csv --sigma auto
 fit-limit-cycle-shooting    fit {FIT}/limit_cycle/model.toml {FIT}/limit_cycle/record.csv --method multiple-shooting
+fit-from-record             fit {FIT}/three_masses/from_record.toml {FIT}/three_masses/record.csv --sigma auto --report fit.html
+fit-tolerance               fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --integrator rk4 --tolerance 1e-3
+fit-tolerance-coarse        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 0.9
+fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --tolerance 1e-3
+fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
 fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02
@@ -363,6 +369,13 @@ EDITS = {
         )
     },
     "balance-misspelt-key": {f"{TURBO}/misspelt.toml": (f"{TURBO}/job.toml", "[errors]", "[error]")},
+    "fit-not-measured": {
+        "unmeasured.toml": (
+            f"{FIT}/three_masses/from_record.toml",
+            "[estimate]",
+            "[nuisance]\noffset = true\n[estimate]",
+        ),
+    },
     "identify-no-column": {"misspelt.csv": (f"{IDENTIFY}/task_5_1/data.csv", "X_re", "Y_re")},
     "balance-missing-run": {"short.csv": (f"{TURBO}/weights.csv", "trial 3", "trial 4")},
     "balance-undetermined": ALIKE,

@@ -38,8 +38,21 @@ COMMANDS = {
     "reduce apart": "reduce rotor23.csv --nodes 7,12,18 --supports-apart --nonnegative --rows relative",
     "reduce measured": "reduce --compliance book_task_9/compliance_printed.csv --measured "
     "book_task_9/modes_printed.csv --modes 1",
+    "fit from record": "fit fit/three_masses/from_record.toml fit/three_masses/record.csv --sigma auto",
+    "fit two records": "fit fit/quasilinearization/model.toml fit/quasilinearization/record.csv "
+    "fit/quasilinearization/record_noisy.csv --method gauss-newton --tolerance 1e-3",
+    "fit stopped": "fit fit/quasilinearization/model.toml fit/quasilinearization/record_noisy.csv "
+    "--max-iterations 1",
+    "identify": "identify identify/section_1_6/model.toml identify/section_1_6/data.csv --amplitude-error 2 "
+    "--phase-error 1",
+    "identify several": "identify identify/task_3_3/model.toml identify/task_3_3/data.csv",
+    "identify singular": "identify identify/task_4_1/model.toml identify/task_4_1/data.csv",
+    "identify shapes": "identify identify/task_7_2/model.toml identify/task_7_2/data.csv",
+    "identify design": "identify identify/task_5_1/model.toml identify/task_5_1/data.csv --amplitude-error 2 "
+    "--phase-error 1 --design 5:40:1 --choose 3",
 }
 """Sheets by name: the command, its files in the sample data, _ for a blank in a name."""
+ESTIMATES = tuple(name for name in COMMANDS if name.split()[0] in ("fit", "identify"))
 
 NUMBER = re.compile(r"[+-]?\d+(\.\d+)?(e[+-]?\d+)?")
 ROUNDED = 3  # significant digits that a whole number with zeros at its end has at least
@@ -169,6 +182,16 @@ class Sheet:
     @property
     def keys(self):
         return {element.key for element in self.shown}
+
+
+def rows_of(sheet, caption):
+    """Cells of the table with this caption, tags taken away."""
+    table = next(part for part in sheet.text.split("<table")[1:] if f"<caption>{caption}" in part)
+    body = table.split("<tbody>")[1].split("</tbody>")[0]
+    return [
+        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", row, re.DOTALL)]
+        for row in body.split("</tr>")[:-1]
+    ]
 
 
 def read_sheet(html):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, OUTPUT, USUAL, command
+from rotorid.cli.common_options import EQUATIONS, OUTPUT, WITH_REPORT, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
@@ -20,11 +20,11 @@ from rotorid.workflows.fit import fit as work
         "Input": "sigma start allow_missing",
         "Method": "method loss starts ridge",
         "Next record": "design choose",
-        "Limits": "max_seconds max_iterations",
+        "Limits": "max_seconds max_iterations tolerance",
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",
     },
-    to=(*USUAL, *EQUATIONS),
+    to=(*WITH_REPORT, *EQUATIONS),
 )
 def fit(
     model: Annotated[

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from rotorid.cli.common_options import EQUATIONS, USUAL, command
+from rotorid.cli.common_options import EQUATIONS, WITH_REPORT, command
 from rotorid.cli.output import Destination
 from rotorid.workflows.identify import IdentifyOptions, compare
 from rotorid.workflows.identify import identify as work
@@ -17,7 +17,7 @@ from rotorid.workflows.identify import identify as work
     IdentifyOptions,
     least={"choose": 1},
     panels={"Method": "method loss ridge", "Next test": "design choose"},
-    to=(*USUAL, *EQUATIONS),
+    to=(*WITH_REPORT, *EQUATIONS),
 )
 def identify(
     model: Annotated[

@@ -80,15 +80,16 @@ class TimeForm:
 def read_ode_model(path: str | Path) -> OdeModel:
     """Read a model file (`ode.toml`).
 
-    Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number, or an
-    expression of parameters), `[outputs]` (name = "expression"; default: the states), `[estimate]` (name =
-    starting value; empty where a model is only to be simulated), optional `[known]` (name = number),
-    `[bounds]` (name = [lowest, highest]) and `[prior]` (name = [value, standard deviation]), `inputs`, a list
-    of measured inputs (columns of the record), and `per_record`, a list of parameters (such as unknown
-    initial values) that every one of several records has for itself. `t0` of `[initial]` is the time to
-    which the initial values belong (or "first"); `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a
-    frequency or several) of the sensors to every output, with factors to be estimated for every record.
-    Without states the outputs are functions of the time.
+    Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number,
+    an expression of parameters, or "record": as measured at the first time, with its error), `[outputs]`
+    (name = "expression"; default: the states), `[estimate]` (name = starting value; empty where a model
+    is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
+    `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
+    record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
+    records has for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first");
+    `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
+    output, with factors to be estimated for every record. Without states the outputs are functions of the
+    time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
@@ -306,8 +307,10 @@ def _initial(
         elif isinstance(value, (int, float)) and not isinstance(value, bool):
             found[name] = inner.number(name, 0.0) or 0.0
         else:
-            inner.complain(name, "a number, or an expression of parameters in quotes")
+            inner.complain(name, 'a number, an expression of parameters in quotes, or "record"')
     texts = {name: value for name, value in found.items() if isinstance(value, str) and name in states}
+    if "record" not in constants:
+        texts = {name: text for name, text in texts.items() if text != "record"}
     _readable(section, "initial", texts, constants, problems)
     for name in states if complete else ():
         if name not in given and not any(did_you_mean(key, [name]) for key in given if key not in states):
@@ -377,9 +380,10 @@ _OUTPUTS = (
     Key(
         "initial",
         TEXTS,
-        "name = number, or an expression of parameters; `t0`: the time they belong to, in s, perhaps before "
-        'the record, or `"first"`: the first time of each record (the default, which asks where a record '
-        "does not begin at 0)",
+        'name = number, or an expression of parameters, or `"record"`: the first sample of the output that '
+        "equals this state, with its error (a parameter `NAME_0` of each record); `t0`: the time they belong "
+        'to, in s, perhaps before the record, or `"first"`: the first time of each record (the default, '
+        "which asks where a record does not begin at 0)",
     ),
 )
 FORCE = (Key("force", TEXTS, 'with matrices: coordinate = "expression" of time and inputs'),)

@@ -277,5 +277,5 @@ INTEGRATORS: tuple[Method[Integrate], ...] = (
         "the model, whose order matters",
         _stepwise("sequential-heun", partial(_heun, "sequential-heun")),
     ),
-    Method("rk4", "one step from sample to sample", _stepwise("rk4", _rk4)),
+    Method("rk4", "one step from sample to sample, as [F]", _stepwise("rk4", _rk4)),
 )

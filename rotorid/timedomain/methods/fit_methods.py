@@ -12,7 +12,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import Method
 from rotorid.regression.nonlinear import nonlinear_least_squares
 from rotorid.timedomain.methods.gauss_newton import gauss_newton
-from rotorid.timedomain.methods.iteration_history import Path, at, half_square
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square
 from rotorid.timedomain.methods.least_squares_problem import OutOfTime, Problem
 from rotorid.timedomain.methods.quasilinearization import quasilinearization
 from rotorid.timedomain.methods.shooting import shoot
@@ -31,7 +31,7 @@ class Search:
     trajectory: Trajectories
     pieces: int | None
     max_iterations: int
-    tolerance: float
+    stop: Stop
 
     def __call__(self, problem: Problem, theta: FloatArray) -> Path:
         """Search from these parameters (n,); the best so far where the time runs out."""
@@ -61,7 +61,7 @@ def _levenberg_marquardt(search: Search, problem: Problem, start: FloatArray) ->
 
 
 def _gauss_newton(search: Search, problem: Problem, start: FloatArray) -> Path:
-    return gauss_newton(problem, start, max_iterations=search.max_iterations, tolerance=search.tolerance)
+    return gauss_newton(problem, start, max_iterations=search.max_iterations, stop=search.stop)
 
 
 def _quasilinearization(search: Search, problem: Problem, start: FloatArray) -> Path:
@@ -70,7 +70,7 @@ def _quasilinearization(search: Search, problem: Problem, start: FloatArray) -> 
         start,
         _curves(problem, start, search.trajectory),
         max_iterations=search.max_iterations,
-        tolerance=search.tolerance,
+        stop=search.stop,
     )
 
 

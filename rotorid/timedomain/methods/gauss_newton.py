@@ -7,11 +7,11 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import counted
 from rotorid.timedomain.integration.simulate import SimulationError
-from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import Problem
 
 
-def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, tolerance: float) -> Path:
+def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, stop: Stop) -> Path:
     """Solve K δ = −r with the sensitivities K = ∂y/∂θ, and add δ; again, until δ is negligible.
 
     The whole step is taken, without safeguards, and without bounds: from a bad start it may diverge, which
@@ -25,8 +25,8 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
         First parameters (n,).
     max_iterations
         Steps at most.
-    tolerance
-        A step below this, relative to the parameters, is negligible.
+    stop
+        When to end.
 
     Raises
     ------
@@ -38,6 +38,7 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
     history, costs = [theta], [half_square(r, problem.prior.residual(theta))]
     found = problem.linear_fit(K, -r, theta)
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
+    ended: str | None = None
     for _ in range(max_iterations):
         new = theta + found.solution
         try:
@@ -50,13 +51,13 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, to
         step, theta = found.solution, new
         history.append(theta)
         costs.append(half_square(r, problem.prior.residual(theta)))
-        small = negligible(step, theta, found, tolerance)
+        met = stop.met(negligible(step, theta, found, stop.short), costs)
         found = problem.linear_fit(K, -r, theta)
-        if small:
-            # a minimum, not only a short step: the next one is no longer either
-            converged = negligible(found.solution, theta, found, 10 * tolerance)
-            message = f"converged in {counted(len(history) - 1, 'iteration')}"
-            if converged:
-                break
+        # a minimum, not only a short step: the next one is no longer either
+        converged = met is not None and negligible(found.solution, theta, found, stop.near)
+        if met and (converged or stop.tolerance is not None):
+            ended, message = met, stop.words(met, len(history) - 1, converged)
+            break
     r, _ = problem.evaluate(theta)
-    return Path(at(found, theta, r), np.array(history), np.array(costs), converged, message)
+    path, size = np.array(history), np.array(costs)
+    return Path(at(found, theta, r), path, size, converged, message, stopped_by=ended)

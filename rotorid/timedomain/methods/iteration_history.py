@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
+from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
 
@@ -19,9 +21,12 @@ class Path(NonlinearEstimate):
     ----------
     trajectories
         Quasilinearization: the states (n, n_x) of each record at the start and after each iteration.
+    stopped_by
+        What ended Gauss–Newton or quasilinearization: "step" |Δβ| or "cost" I(β), see `Stop`; None: neither.
     """
 
     trajectories: tuple[tuple[FloatArray, ...], ...] = ()
+    stopped_by: str | None = None
 
     def after(self, before: FloatArray) -> Path:
         """The same, as the continuation of earlier steps, (k, n)."""
@@ -36,8 +41,50 @@ def at(found: Estimate, theta: FloatArray, residuals: FloatArray) -> Estimate:
     return replace(found, values=values, solution=theta, residuals=residuals, chi_square=chi)
 
 
+@dataclass(frozen=True)
+class Stop:
+    """When an iteration ends: where no step matters (None), or with [F] at Δβ < ε or I(β) < ε.
+
+    Here ε, the `tolerance`, is a part of each parameter, and of I(β), half the sum of squares, its change.
+    """
+
+    tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.tolerance is not None and not 0 < self.tolerance < 1:
+            raise ValueError(f"the tolerance is a number between 0 and 1, not {self.tolerance:g}")
+
+    @property
+    def near(self) -> tuple[float, float]:
+        """Limits of a next step that no longer matters, see `negligible`."""
+        return (1e-8, 1e-5) if self.tolerance is None else (1e-6, 0.1)
+
+    @property
+    def short(self) -> tuple[float, float]:
+        """Limits of the step that ends it."""
+        return (1e-9, 1e-5) if self.tolerance is None else (self.tolerance, 0.0)
+
+    def met(self, short: bool, costs: Sequence[float]) -> str | None:
+        """Which condition a step meets, "step" or "cost"; whether it is `short`, and the costs up to it."""
+        if short or self.tolerance is None:
+            return "step" if short else None
+        return "cost" if abs(costs[-1] - costs[-2]) < self.tolerance * costs[-1] else None
+
+    def words(self, by: str, iterations: int, converged: bool) -> str:
+        """How it ended."""
+        said, ε = f"converged in {counted(iterations, 'iteration')}", self.tolerance
+        if ε is None:
+            return said
+        said += f": |Δβ| is below {ε:g} |β|" if by == "step" else f": I(β) changes by less than {ε:g} of it"
+        return said if converged else f"not {said}, but the next step still matters; lower --tolerance"
+
+
 def negligible(
-    step: FloatArray, theta: FloatArray, found: Estimate, tolerance: float, before: FloatArray | None = None
+    step: FloatArray,
+    theta: FloatArray,
+    found: Estimate,
+    limits: tuple[float, float],
+    before: FloatArray | None = None,
 ) -> bool:
     """Whether what follows a step no longer matters: relative to the parameters, or to their errors.
 
@@ -48,9 +95,9 @@ def negligible(
     size, value = np.abs(step), np.abs(theta)
     if before is not None:
         size = size * min(1.0, float(size.max()) / max(float(np.abs(before).max()), 1e-300))
-    limit = tolerance * np.maximum(value, 1e-6 * float(value.max()))
+    limit = limits[0] * np.maximum(value, 1e-6 * float(value.max()))
     if found.std is not None:
-        limit = np.maximum(limit, 1e-5 * np.nan_to_num(found.std))
+        limit = np.maximum(limit, limits[1] * np.nan_to_num(found.std))
     return bool((size <= limit).all())
 
 

@@ -17,7 +17,7 @@ from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
 from rotorid.timedomain.integration.simulate import HEUN, Parts, SimulationError, heun_step, inputs_of
 from rotorid.timedomain.methods.collocation import solve_linear
-from rotorid.timedomain.methods.iteration_history import Path, at, half_square, negligible
+from rotorid.timedomain.methods.iteration_history import Path, Stop, at, half_square, negligible
 from rotorid.timedomain.methods.least_squares_problem import LARGEST, Problem
 from rotorid.timedomain.methods.trajectory import Curve
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -25,7 +25,7 @@ from rotorid.timedomain.models.record import Record
 
 
 def quasilinearization(
-    problem: Problem, start: FloatArray, curves: Sequence[Curve], *, max_iterations: int, tolerance: float
+    problem: Problem, start: FloatArray, curves: Sequence[Curve], *, max_iterations: int, stop: Stop
 ) -> Path:
     """Iterate linear fits about the last trajectory until neither it nor the parameters change.
 
@@ -40,8 +40,8 @@ def quasilinearization(
         First trajectory of each record.
     max_iterations
         Steps at most.
-    tolerance
-        A step below this, relative to the parameters, is negligible.
+    stop
+        When to end.
 
     Raises
     ------
@@ -56,6 +56,7 @@ def quasilinearization(
     found: Estimate | None = None
     step: FloatArray | None = None
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
+    ended: str | None = None
     for _ in range(max_iterations):
         if found is not None and problem.late:
             message = (
@@ -80,8 +81,11 @@ def quasilinearization(
         costs.append(half_square(found.residuals, problem.prior.residual(theta)))
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
-        if negligible(step, theta, found, tolerance, last) and change < 1e-3:
-            converged, message = True, f"converged in {counted(len(history) - 1, 'iteration')}"
+        earlier = last if stop.tolerance is None else None
+        met = stop.met(negligible(step, theta, found, stop.short, earlier), costs)
+        converged = bool(met) and change < 1e-3 and negligible(step, theta, found, stop.near, last)
+        if met and (converged or stop.tolerance is not None):
+            ended, message = met, stop.words(met, len(history) - 1, converged)
             break
     if found is None:
         raise ValueError("max_iterations must be at least 1")
@@ -89,7 +93,7 @@ def quasilinearization(
     if not np.isfinite(r).all():
         converged, message, r = False, f"not converged: {problem.failure}", -found.residuals
     path, size = np.array(history), np.array(costs)
-    return Path(at(found, theta, r), path, size, converged, message, (), tuple(trajectories))
+    return Path(at(found, theta, r), path, size, converged, message, (), tuple(trajectories), ended)
 
 
 def linear_solutions(

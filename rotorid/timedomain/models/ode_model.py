@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -47,6 +47,9 @@ class OdeModel:
         Parameters that every one of several records has for itself.
     t0
         Time to which the initial values belong, s; "first" or None (not stated): the first of each record.
+    recorded
+        Parameters that are initial states as the record says, each with the output that measures it; their
+        starting values are NaN here, see `recorded_starts`.
     prior
         Value and standard deviation of parameters that are known beside the records, by name.
     """
@@ -64,6 +67,7 @@ class OdeModel:
     observed: tuple[Expression, ...] = field(repr=False)
     per_record: tuple[str, ...] = ()
     t0: float | str | None = None
+    recorded: Mapping[str, str] = field(default_factory=dict)
     prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rates_alone: ClassVar[bool] = True
     """Whether `rates` are the whole right side."""
@@ -314,7 +318,9 @@ def ode_model(
         Parameters to be estimated, with starting values.
     initial
         Value of each state at the first time of a record: a number, or an expression of parameters (the name
-        of one: an unknown initial state). "t0": the time to which they belong instead, s, or "first".
+        of one: an unknown initial state), or "record": as measured by the output that equals this state, a
+        parameter of each record, x_0 of the state x. "t0": the time to which they belong instead, s, or
+        "first".
     outputs
         What is measured; by default the states.
     known
@@ -331,7 +337,7 @@ def ode_model(
     ------
     ValueError
         Names that are used twice, are missing or are none; expressions that cannot be read
-        (`ExpressionError`); starting values out of bounds.
+        (`ExpressionError`); starting values out of bounds; a state from the record that no output measures.
 
     Examples
     --------
@@ -360,19 +366,47 @@ def ode_model(
     numbers = finite_numbers(known, "known value", "value")
     exact = {name: Fraction(repr(float(v))) for name, v in zip(known, numbers, strict=True)}
     everything = {"t", *states, *estimate, *inputs}
+    taken = _recorded(initial, outputs, {*everything, *known})
+    initial |= {state: parameter for state, (parameter, _) in taken.items()}
+    recorded = dict(taken.values())
+    limits = bound_table(bounds or {}, estimate)
     read = Reader(exact)
     return OdeModel(
         states=tuple(states),
-        parameters=tuple(estimate),
+        parameters=(*estimate, *recorded),
         outputs=tuple(outputs),
         inputs=tuple(inputs),
-        start=start,
+        start=np.append(start, np.full(len(recorded), np.nan)),
         known=dict(zip(known, numbers.tolist(), strict=True)),
-        bounds=bound_table(bounds or {}, estimate),
+        bounds=np.vstack((limits, np.tile([-np.inf, np.inf], (len(recorded), 1)))),
         rates=tuple(read(e, f"state {name}", everything) for name, e in states.items()),
-        initial=tuple(read(initial[name], f"initial {name}", set(estimate)) for name in states),
+        initial=tuple(read(initial[name], f"initial {name}", {*estimate, *recorded}) for name in states),
         observed=tuple(read(e, f"output {name}", everything) for name, e in outputs.items()),
         texts=read.texts,
-        per_record=tuple(dict.fromkeys(per_record)),
+        per_record=(*dict.fromkeys(per_record), *recorded),
         t0=t0,
+        recorded=recorded,
     )
+
+
+def _recorded(
+    initial: Mapping[str, float | str], outputs: Mapping[str, str], names: Collection[str]
+) -> dict[str, tuple[str, str]]:
+    """New parameter, and the output that measures it, of each state that begins as the record says."""
+    import sympy
+
+    found: dict[str, tuple[str, str]] = {}
+    wanted = [x for x, value in initial.items() if value == "record" and "record" not in names]
+    told = {expressions.parse(str(e), where=f"output {y}"): y for y, e in outputs.items()} if wanted else {}
+    for state in wanted:
+        output = told.get(sympy.Symbol(state))
+        if output is None:
+            raise ValueError(
+                f'initial {state}: "record" needs an output that is {state} alone, without factor, offset or '
+                "other states; give a number, or a parameter to be estimated"
+            )
+        parameter = f"{state}_0"
+        while parameter in names:
+            parameter += "_"
+        found[state] = parameter, output
+    return found

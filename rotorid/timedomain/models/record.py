@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -127,6 +128,26 @@ def from_t0(model: OdeModel, record: Record) -> Record:
     outputs = {name: longer(column, np.nan) for name, column in record.outputs.items()}
     inputs = {name: longer(column, column[0]) for name, column in record.inputs.items()}
     return replace(record, t=longer(record.t, model.t0), outputs=outputs, inputs=inputs, sigma=sigma)
+
+
+def record_names(names: Sequence[str]) -> list[str]:
+    """Short names of records that tell them apart: ends of paths, numbers where they are the same.
+
+    Examples
+    --------
+    >>> record_names(["a/run_1.csv", "a/run_2.csv"]), record_names(["a/x.csv", "b/x.csv"])
+    (['run_1.csv', 'run_2.csv'], ['a/x.csv', 'b/x.csv'])
+    >>> record_names(["the record", "the record"])
+    ['record 1', 'record 2']
+    """
+    if len(set(names)) < len(names):
+        return [f"record {k + 1}" for k in range(len(names))]
+    parts = [PurePath(name).parts or (name,) for name in names]
+    for depth in range(1, max(len(part) for part in parts) + 1):
+        short = ["/".join(part[-depth:]) for part in parts]
+        if len(set(short)) == len(short):
+            return short
+    return list(names)
 
 
 def _column(value: ArrayLike, what: str) -> FloatArray:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from rotorid.timedomain.models.ode_model import OdeModel
+from rotorid.timedomain.models.record import Record
 
 T = TypeVar("T")
 
@@ -45,6 +47,33 @@ def models_of(model: OdeModel, count: int) -> tuple[OdeModel, ...]:
         }
         out.append(replace(model, **common, **parts))
     return tuple(out)
+
+
+def recorded_starts(model: OdeModel, records: Sequence[Record]) -> dict[str, float]:
+    """What the first samples say of initial states taken from the record, by name of the copies.
+
+    They are starting values alone. [F] holds y(t0) at its sample ȳ0 = y0 + e, so that the estimate of θ
+    carries e without saying so. Here y0 is estimated, too: the row of the sample, (y0 − ȳ0)/σ0, is its
+    measurement, and a prior of the same value would count it twice. With A = ∂y/∂θ and V = ∂y/∂y0 of all
+    samples over their σ the covariance of θ is the inverse of AᵀA − AᵀV (VᵀV)⁻¹ VᵀA, never less than
+    (AᵀA)⁻¹, which takes y0 as known. From an exact record this finds what [F] finds.
+
+    Raises
+    ------
+    ValueError
+        A record without that sample.
+    """
+    copies, found = _names(model, len(records)), {}
+    for name, output in model.recorded.items():
+        for copy, record in zip(copies[name], records, strict=True):
+            first = float(record.outputs[output][0]) if output in record.outputs else math.nan
+            if math.isnan(first):
+                raise ValueError(
+                    f"{record.name}: {output} has no sample at the first time, t = {record.t[0]:g} s, where "
+                    f"[initial] takes it from the record; give a number there, or a parameter"
+                )
+            found[copy] = first
+    return found
 
 
 def for_copies(model: OdeModel, count: int, given: Mapping[str, T]) -> dict[str, T]:

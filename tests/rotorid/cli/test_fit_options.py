@@ -125,6 +125,8 @@ def test_seeds_choose_other_places(cli, tmp_path):
         (("--sigma", "much"), "--sigma: x = much is no number above 0"),
         (("--sigma", "1,2"), "'1' is no NAME=VALUE; use y1=0.01,y2=0.02"),
         (("--seed", "3"), "--seed belongs to --starts N"),
+        (("--tolerance", "1e-3"), "--tolerance belongs to --method gauss-newton or quasilinearization"),
+        (("--tolerance", "2", "--method", "gauss-newton"), "a number between 0 and 1, not 2"),
         (("--max-iterations", "0"), "--max-iterations"),
     ],
 )

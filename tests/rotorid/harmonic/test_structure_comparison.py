@@ -150,6 +150,7 @@ def test_the_command_prints_misfits_and_chooses_nothing(cli, tmp_path):
         (["--design", "1:2:1"], "--design belongs to one model"),
         (["--loss", "huber"], "--loss belongs to one model"),
         (["--plot", "x.png"], "have no picture"),
+        (["--report", "x.html"], "have no sheet"),
     ],
 )
 def test_options_of_one_model_are_refused(cli, tmp_path, monkeypatch, words, said):

@@ -1,5 +1,6 @@
 """The proof table of time records and of published balancing: its rows, its reasons, and wrong formulas."""
 
+import dataclasses
 from collections import Counter
 from pathlib import Path
 
@@ -51,8 +52,9 @@ def test_rows_of_time_records(records):
         "[Q] parameters of the record": 3,
         "[F] record": 164,
         "[F] from the intact printed values": 3,
+        "[F] the same, steps 1 to 5": 3,
     }
-    assert statuses(records) == {"agrees": 718 - 81, "given": 81, "erratum": 1, "consequence": 2}
+    assert statuses(records) == {"agrees": 721 - 81, "given": 81, "erratum": 1, "consequence": 2}
 
 
 def test_rows_of_published_balancing(examples):
@@ -444,6 +446,29 @@ def test_the_other_order_of_the_states_is_noticed(monkeypatch):
     simulation = rotorid.timedomain.integration.simulate
     monkeypatch.setitem(simulation.HEUN, "sequential-heun", lambda n: [[i] for i in reversed(range(n))])
     assert statuses(time_records.rows())["differs"] > 200
+
+
+def test_a_wrong_runge_kutta_is_noticed(monkeypatch):
+    """k4 at the middle of the step, too."""
+    find = rotorid.timedomain.integration.simulate.find
+
+    def wrong(system, now, then, z):
+        h, k1 = then - now, system(now, z)
+        k2 = system(now + h / 2, z + h / 2 * k1)
+        return z + h / 6 * (k1 + 4 * k2 + system(now + h / 2, z + h / 2 * k2))
+
+    def finding(methods, name, what):
+        found = find(methods, name, what)
+        if name != "rk4":
+            return found
+        return dataclasses.replace(
+            found, function=rotorid.timedomain.integration.simulate._stepwise(name, wrong)
+        )
+
+    monkeypatch.setattr(rotorid.timedomain.integration.simulate, "find", finding)
+    found = [r for r in time_records.rows() if r.status == "differs"]
+    assert {r.source for r in found} == {"[F] the same, steps 1 to 5"}
+    assert len(found) >= 2
 
 
 def test_a_wrong_solution_in_time_is_noticed(monkeypatch):

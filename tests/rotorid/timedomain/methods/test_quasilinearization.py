@@ -99,3 +99,14 @@ def test_what_it_does_not_know():
         fit(book_model(), book_record(), method="quasilinearization", trajectory={"x1": 1.0})
     with pytest.raises(ValueError, match="heun"):
         fit(decay(), decay_record(), method="quasilinearization", integrator="rk4")
+
+
+def test_a_tolerance_ends_it():
+    """The step that [Q] prints in table 2.3, against the one that is asked for."""
+    every = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST)
+    found = fit(book_model(), book_record(), method="quasilinearization", trajectory=FIRST, tolerance=0.01)
+    steps = np.abs(np.diff(every.history, axis=0) / every.history[1:]).max(axis=1)
+    first = int(np.flatnonzero(steps < 0.01)[0]) + 1
+    assert (found.iterations, found.stopped_by, every.stopped_by) == (first, "step", "step")
+    assert found.iterations < every.iterations
+    assert found.values == pytest.approx([1.0, -1.0, -1.0], abs=1e-4)
