@@ -97,7 +97,8 @@ def output_error(
     experiments
         Harmonic tests, with the inputs known; free vibrations (the predicted mode most like the measured
         shape is compared: its frequency, and its amplitudes relative to the first measured one, taken as
-        exact; the frequency counts with the relative error of an amplitude). Some amplitudes may be missing.
+        exact; the frequency counts with its error, or else with the relative one of an amplitude). Some
+        amplitudes may be missing.
     start
         First guess of each parameter, by name or in the model's order; NaN where there is none.
     bounds, loss

@@ -73,6 +73,7 @@ GIVEN = (
     "reduce --compliance sample_data/book_task_9/compliance.csv --measured sample_data/book_task_9/modes.csv"
 )
 IDENTIFY, FIT = "sample_data/identify", "sample_data/fit"
+SHAKEN = "modes sample_data/modes/amplitudes.csv --excitation force"
 PROBES = '--sensors "probe DE:45,probe NDE:45"'
 
 ROTOR_COMMANDS = f"""
@@ -240,6 +241,11 @@ simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.1
 simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
 simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
 simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
+identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
+modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
+modes-band                  {SHAKEN} --bands 24:28
+modes-one-side              {SHAKEN} --bands 25:26.2
+modes-no-reading            {SHAKEN} --bands 100:120Hz
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
@@ -312,7 +318,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "simulate", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "schema", "validate"),
 )
 
 MODELLED = {
