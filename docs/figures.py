@@ -245,8 +245,8 @@ GALLERY = (
         "circles",
         "identification",
         "modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2 --phase-error 1",
-        "All three resonances are read on both sides, and the readings lie on the circles and peaks of one fit; "
-        "at the third one X3 hardly moves.",
+        "All three resonances are read on both sides, and the readings lie on the circles and peaks of "
+        "one fit; in the third mode the circle of X3 is small.",
     ),
     Picture(
         "shapes",

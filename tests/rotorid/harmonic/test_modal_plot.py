@@ -50,7 +50,7 @@ def points(ax):
 
 
 def curves(ax):
-    return [line.get_xydata() for line in ax.lines if line.get_linewidth() > 1 and len(line.get_xydata()) > 500]
+    return [line.get_xydata() for line in ax.lines if len(line.get_xydata()) > 500]
 
 
 def words(figure):
