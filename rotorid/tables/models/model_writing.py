@@ -24,10 +24,9 @@ def ode_model_bytes(
 ) -> bytes:
     """A model file of M y'' + C y' + K y = f whose dampers to the ground are to be estimated.
 
-    It is read by `read_ode_model` (time records), by `read_harmonic_model` (amplitudes) and, in its matrix
-    form, by `read_motion`. Where a coordinate has no mass, the matrices cannot be integrated: the file holds
-    the states of `fem.state_space` instead, in which damped massless coordinates are of first order and
-    undamped ones are eliminated.
+    It is read by `read_ode_model` (time records) and by `read_harmonic_model` (amplitudes). Where a
+    coordinate has no mass, the matrices cannot be integrated: the file holds the states of `fem.state_space`
+    instead, in which damped massless coordinates are of first order and undamped ones are eliminated.
 
     Parameters
     ----------

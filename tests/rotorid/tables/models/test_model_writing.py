@@ -11,6 +11,7 @@ import pytest
 from cases import each_of
 from hypothesis import given
 from hypothesis import strategies as st
+from timedomain_cases import motion_in
 
 import fem
 from rotorid.harmonic import identify
@@ -20,7 +21,6 @@ from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import InputError, TableWarning, read_harmonic_model, read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
-from rotorid.tables.models.motion_file import read_motion
 from rotorid.timedomain import Record, simulate
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.models.linear_system import state_space
@@ -118,29 +118,13 @@ def test_matrices_keep_all_digits_in_both_planes(tmp_path):
     M, C, K = (rng.standard_normal((4, 4)) * 10.0 ** rng.integers(-9, 9, (4, 4)) for _ in range(3))
     motion = fem.Motion(M + 1e9 * np.eye(4), C, K, ("x7", "x12", "y7", "y12"), 314.1)
     path = saved(tmp_path, "m.toml", ode_model_bytes(motion, {"x7": 3.0, "y12": 4.0}, {}))
-    back = read_motion(path, {"d_x7": 0.0, "d_y12": 0.0})
+    back = motion_in(path, {"d_x7": 0.0, "d_y12": 0.0})
     for key in "MCK":
         np.testing.assert_array_equal(getattr(back, key), getattr(motion, key))
     assert back.coordinates == motion.coordinates
     assert back.speed == 314.1
-    damped = read_motion(path, {"d_x7": 100.0}).C - motion.C
+    damped = motion_in(path, {"d_x7": 100.0}).C - motion.C
     np.testing.assert_allclose(np.diag(damped), [100.0, 0, 0, 4.0], rtol=1e-12, atol=1e-12 * abs(C).max())
-
-
-def test_values_that_a_motion_does_not_take(tmp_path, three):
-    path = saved(tmp_path, "m.toml", ode_model_bytes(three, BEGIN, {}))
-    with pytest.raises(ValueError, match="d_x8 is no parameter of the model"):
-        read_motion(path, {"d_x8": 1.0})
-    with pytest.raises(ValueError, match=r"they are: d_x7, d_x12, d_x18$"):
-        read_motion(path, {"damping": 1.0})
-    with pytest.raises(ValueError, match="d_x7 must be a finite number"):
-        read_motion(path, {"d_x7": np.nan})
-    states = saved(tmp_path, "s.toml", '[states]\nx = "-a*x"\n[initial]\nx = 1\n[estimate]\na = 1\n')
-    with pytest.raises(InputError, match="key M: expected M, C and K: states have no mass matrix"):
-        read_motion(states)
-    text = path.read_text().replace("[estimate]", '[force]\nx7 = "-3*x12"\n[estimate]')
-    with pytest.raises(InputError, match=r"force.x7: expected no x12 in it"):
-        read_motion(saved(tmp_path, "f.toml", text))
 
 
 def test_nothing_to_estimate(tmp_path, three):
@@ -157,7 +141,7 @@ def test_nothing_to_estimate(tmp_path, three):
     exact = (V / scale[:, None]) @ (q[:, None] * np.cos(np.sqrt(squares)[:, None] * t))
     np.testing.assert_allclose(y[:, 0], exact[0], rtol=1e-8, atol=1e-12)
     assert model.outputs == ("x7", "v_x18")
-    np.testing.assert_array_equal(read_motion(path).K, K)
+    np.testing.assert_array_equal(motion_in(path).K, K)
     with pytest.raises(ValueError):
         fit(model, Record(t, {"x7": y[:, 0], "v_x18": y[:, 1]}))
     with pytest.raises(InputError, match="no parameter is to be estimated"):

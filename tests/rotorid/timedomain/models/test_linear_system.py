@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
+from timedomain_cases import motion_in
 
 import fem
 from fem.state_space import state_space as of_motion
@@ -13,7 +14,6 @@ from rotorid.reduction.dynamics.small_rotor import small_rotor
 from rotorid.samples import sample_data
 from rotorid.tables import read_ode_model, read_rotor
 from rotorid.tables.models.model_writing import ode_model_bytes
-from rotorid.tables.models.motion_file import read_motion
 from rotorid.timedomain import ode_model, second_order
 from rotorid.timedomain.models.linear_system import state_space
 
@@ -64,7 +64,7 @@ def test_plane_of_a_reduced_rotor_through_a_file(tmp_path):
     expected = of_motion(damped)
     found = state_space(read_ode_model(path))
     assert farthest(found.eigenvalues, expected.eigenvalues) < 1e-10
-    again = of_motion(read_motion(path), inputs=["f_x7", "f_x18"])
+    again = of_motion(motion_in(path), inputs=["f_x7", "f_x18"])
     assert farthest(again.eigenvalues, expected.eigenvalues) < 1e-10
     assert (found.inputs, found.outputs) == (again.inputs, again.outputs)
     w = [50.0, 135.0, 700.0]
@@ -100,7 +100,7 @@ def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping,
 def test_both_planes_through_matrices_and_back(tmp_path):
     small = small_rotor(turning(0.0), (3, 5, 6), [40.0, 25.0, 10.0])
     motion = small.motion(SPEED, supports="condensed")
-    back = read_motion(written(tmp_path, motion))
+    back = motion_in(written(tmp_path, motion))
     for key in "MCK":
         np.testing.assert_array_equal(getattr(back, key), getattr(motion, key))
     assert (back.coordinates, back.speed) == (motion.coordinates, SPEED)
