@@ -14,7 +14,11 @@ from rotorid.samples import sample_data
 DOCS = sample_data().parent / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
-PAGES = [*STARTS, *QUESTIONS, DOCS / "rk4.md", DOCS / "validation.md", *sorted((DOCS / "api").glob("*.md"))]
+BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
+SINGLE = [DOCS / "rk4.md", DOCS / "validation.md"]
+AWAITED = {"quasilinearization"}
+"""Pages of the books with commands that are built at this moment."""
+PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 
 @pytest.fixture
@@ -31,7 +35,17 @@ def test_there_is_a_page_for_each_of_the_three_users():
     assert {page.stem for page in STARTS} == {*USERS, "installation"}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            page,
+            id=f"{page.parent.name}/{page.stem}",
+            marks=pytest.mark.xfail(page in BOOK and page.stem in AWAITED, strict=True, reason="to come"),
+        )
+        for page in PAGES
+    ],
+)
 def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplace, cli, capsys):
     renewals = {} if os.environ.get("ROTORID_RENEW_PAGES") else None
     ran = run_page(page, workplace, cli, capsys, renewals)
@@ -43,6 +57,8 @@ def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplac
     assert ran == sum(
         len(commands(block)) if block.kind == "console" else block.kind == "python" for block in blocks(page)
     )
+    if page in BOOK:
+        assert ran >= 1
     if page in STARTS or page in QUESTIONS:
         assert ran >= (5 if page.stem in USERS else 2)
         for block in blocks(page):
