@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.rpm import RPM
-from rotorid.base.text import counted
+from rotorid.base.text import counted, listing
 from rotorid.report.comparisons import (
     methods_part,
     placement_part,
@@ -15,7 +15,7 @@ from rotorid.report.comparisons import (
     trade_off_part,
 )
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.number_tables import Grid, Part, below, every_warning, few, numbered, words
+from rotorid.report.number_tables import Grid, Part, below, every_warning, numbered, words
 from rotorid.report.page import render_report
 from rotorid.report.rotor_description import rotor_sheet
 from rotorid.report.rotor_figures import reduction_picture
@@ -95,7 +95,7 @@ def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[t
     how += ", rows of each mode relative to its 1/ω²" if document["rows"] == "relative" else ""
     return [
         ("Files", files),
-        ("Masses at", f"nodes {few(document['nodes'])}"),
+        ("Masses at", f"nodes {listing(map(str, document['nodes']), 'and')}"),
         ("Method", how),
         ("Modes from", {"rotor": "the rotor model", "measured": "measurement"}[document["source"]]),
         ("Shapes scaled", f"to {SCALES[document['normalise']]}"),
@@ -205,9 +205,11 @@ def _small(document: Document) -> Part:
         "Both planes: masses on a massless shaft, with the rotor's bearings, seals and gyroscopic effect."
     ]
     if small["support_nodes"]:
-        said.append(f"Places without mass that carry supports: nodes {few(small['support_nodes'])}.")
+        said.append(
+            f"Places without mass that carry supports: nodes {listing(map(str, small['support_nodes']), 'and')}."
+        )
     if small["modal_damping"]:
-        ratios = few([f"{100 * ratio:g} %" for ratio in small["modal_damping"]])
+        ratios = listing((f"{100 * ratio:g} %" for ratio in small["modal_damping"]), "and")
         said.append(f"Modal damping of the first modes: {ratios} of critical.")
     return Part("The small model to go on with", tuple(said))
 
