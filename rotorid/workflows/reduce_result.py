@@ -128,15 +128,7 @@ class ReducedRotor(Parts):
         """To print: one HTML file."""
         from rotorid.report.reduction import reduce_report
 
-        return reduce_report(
-            self.to_dict(),
-            self.result,
-            provenance=self.provenance,
-            placement=self.placement,
-            methods=self.methods,
-            response=self.response,
-            stability=self.stability,
-        )
+        return reduce_report(self.to_dict(), self.parts, self.provenance)
 
     def with_small(self) -> ReducedRotor:
         """The same with the small model, which needs a rotor."""
