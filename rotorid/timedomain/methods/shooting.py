@@ -25,7 +25,7 @@ SAMPLES = 6
 """Of a piece, at least, by default."""
 STRICTNESS = (1.0, 10.0, 100.0)
 """Weights of the joints relative to the data, one search after the other."""
-TOLERANCE = 1e-6
+TOLERANCE, EVALUATIONS = 1e-6, 100
 """Of each search."""
 RTOL = 1e-7
 """Of the integration: this is only the way to a starting point."""
@@ -51,7 +51,6 @@ def shoot(
     upper: FloatArray,
     *,
     pieces: int | None = None,
-    max_iterations: int = 100,
 ) -> FloatArray:
     """Parameters (n,) from pieces that join.
 
@@ -67,8 +66,6 @@ def shoot(
         Bounds of the parameters.
     pieces
         Of each record; default: at most 12, each of six samples or more.
-    max_iterations
-        Of each search.
 
     Raises
     ------
@@ -91,7 +88,7 @@ def shoot(
         search.weight = weight
         search.forget()
         way = Search(search.residual, search.jacobian, "linear", TOLERANCE)
-        z, _, _ = drive(way, z, low, high, None, "linear", stated=True, limit=max_iterations)
+        z, _, _ = drive(way, z, low, high, "linear", stated=True, limit=EVALUATIONS)
     return z[:n]
 
 
