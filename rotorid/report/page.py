@@ -56,19 +56,16 @@ def render_report(
         If the template names something that the context does not hold.
     """
     whole = Document({**document, "provenance": dict(provenance)})
-    text = (
-        _environment()
-        .get_template(template)
-        .render(
-            document=whole.data,
-            title=title,
-            warnings=list(warnings),
-            provenance=provenance,
-            json_text=json_inside(whole.data),
-            show=whole.show,
-            found=whole.found,
-            **context,
-        )
+    page = _environment().get_template(template)
+    text = page.render(
+        document=whole.data,
+        title=title,
+        warnings=list(warnings),
+        provenance=provenance,
+        json_text=json_inside(whole.data),
+        show=whole.show,
+        found=whole.found,
+        **context,
     )
     return text.encode("utf-8", "replace")  # names of files may be anything
 
