@@ -11,8 +11,6 @@ from golden.storing import read
 from rotorid.samples import sample_data
 
 PAGE = sample_data().parent / "docs" / "book" / "index.md"
-AWAITED = re.compile("--ridge|fit .*--design")
-"""Commands of the table that are built at this moment."""
 
 
 def _to(last, first=1, text="({})"):
@@ -107,13 +105,7 @@ def _once(text):
     return " ".join(text.split())
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        pytest.param(one, marks=pytest.mark.xfail(bool(AWAITED.search(one)), strict=True, reason="to come"))
-        for one in SAID
-    ],
-)
+@pytest.mark.parametrize("command", SAID)
 def test_every_command_answers_as_the_table_says(command, tmp_path, monkeypatch, cli):
     """What the net runs and compares is not run again."""
     words = shlex.split(command)[1:]

@@ -16,8 +16,6 @@ STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
 BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
 SINGLE = [DOCS / "rk4.md", DOCS / "validation.md"]
-AWAITED = {"quasilinearization"}
-"""Pages of the books with commands that are built at this moment."""
 PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 
@@ -35,17 +33,7 @@ def test_there_is_a_page_for_each_of_the_three_users():
     assert {page.stem for page in STARTS} == {*USERS, "installation"}
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(
-            page,
-            id=f"{page.parent.name}/{page.stem}",
-            marks=pytest.mark.xfail(page in BOOK and page.stem in AWAITED, strict=True, reason="to come"),
-        )
-        for page in PAGES
-    ],
-)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplace, cli, capsys):
     renewals = {} if os.environ.get("ROTORID_RENEW_PAGES") else None
     ran = run_page(page, workplace, cli, capsys, renewals)
