@@ -170,7 +170,6 @@ class ReducedRotor(Parts):
         return ode_model_bytes(
             motion,
             {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
-            {},
             comments=said,
             inputs=inputs,
             outputs=None if set(masses) == set(motion.coordinates) else masses,

@@ -41,7 +41,7 @@ def farthest(found, expected):
 
 def written(tmp_path, motion, **options):
     path = tmp_path / "model.toml"
-    path.write_bytes(ode_model_bytes(motion, options.pop("dampers", {}), {}, **options))
+    path.write_bytes(ode_model_bytes(motion, options.pop("dampers", {}), **options))
     return path
 
 
