@@ -86,7 +86,6 @@ def shoot(
     search.evaluate(z)
     for weight in STRICTNESS:
         search.weight = weight
-        search.forget()
         way = Search(search.residual, search.jacobian, "linear", TOLERANCE)
         z, _, _ = drive(way, z, low, high, "linear", stated=True, limit=EVALUATIONS)
     return z[:n]
@@ -103,10 +102,7 @@ class _Pieces:
         self.unit = (float(np.sqrt(np.mean(data**2))) or 1.0) * np.sqrt(len(data))
         size = np.abs(nodes).max(axis=0)
         self.scale = np.where(size > 0, size, 1.0)
-        self.forget()
-
-    def forget(self) -> None:
-        self.last: tuple[bytes, FloatArray, FloatArray] | None = None
+        self.last: tuple[tuple[bytes, float], FloatArray, FloatArray] | None = None
 
     def residual(self, z: FloatArray) -> FloatArray:
         try:
@@ -119,8 +115,9 @@ class _Pieces:
         return self.evaluate(z)[1]
 
     def evaluate(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if self.last is None or self.last[0] != z.tobytes():
-            self.last = (z.tobytes(), *self._rows(z))
+        key = z.tobytes(), self.weight
+        if self.last is None or self.last[0] != key:
+            self.last = (key, *self._rows(z))
         return self.last[1], self.last[2]
 
     def _rows(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
