@@ -85,11 +85,10 @@ def test_both_planes_with_gyroscopic_discs_and_cross_coupling(tmp_path, damping,
     forces = ["f_x3", "f_y6"]
     path = written(tmp_path, motion, inputs=forces, outputs=shown)
     assert ("[states]" in path.read_text()) == (supports == "kept")
-    found = state_space(read_ode_model(path), speed=SPEED)
+    found = state_space(read_ode_model(path))
     expected = of_motion(motion, inputs=forces, outputs=shown)
     assert farthest(found.eigenvalues, expected.eigenvalues) < 1e-10
     assert singular(motion, found.eigenvalues) < 1e-9
-    assert found.speed == SPEED
     assert (found.inputs, found.outputs) == (expected.inputs, expected.outputs)
     w = np.array([20.0, 77.0, 160.0, 400.0])
     np.testing.assert_allclose(
@@ -179,8 +178,6 @@ def test_numbers_that_are_none():
         state_space(model, [np.nan])
     with pytest.raises(ValueError, match="1 parameter values are needed"):
         state_space(model, [1.0, 2.0])
-    with pytest.raises(ValueError, match="finite number in rad/s"):
-        state_space(model, speed=np.inf)
     curve = ode_model({}, estimate={"a": 1.0}, outputs={"y": "a*t"})
     with pytest.raises(ValueError, match="without states"):
         state_space(curve)
