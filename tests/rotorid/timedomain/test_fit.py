@@ -99,8 +99,6 @@ def test_json_and_text():
     [
         ({"method": "newton"}, "method 'newton' is not known"),
         ({"start": {"z": 1.0}}, "z is no parameter"),
-        ({"bounds": {"z": (0.0, 1.0)}}, "z is no parameter"),
-        ({"bounds": {"a": (1.0, 0.0)}}, "below the upper"),
         ({"starts": 0}, "at least 1"),
         ({"loss": "square"}, "loss 'square' is not known"),
     ],
