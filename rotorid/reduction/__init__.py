@@ -16,7 +16,7 @@ from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
     separate,
     separated_compliance,
 )
-from rotorid.reduction.guyan_irs_serep import compare_methods, guyan, irs, serep
+from rotorid.reduction.guyan_irs_serep import compare_methods, reduce_by
 from rotorid.reduction.guyan_irs_serep_result import Method, Methods
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.reduction.placement_result import Placement
@@ -43,8 +43,6 @@ __all__ = [
     "compare_stability",
     "design",
     "equivalent_masses",
-    "guyan",
-    "irs",
     "mac",
     "mass_sensitivity",
     "mass_uncertainty",
@@ -52,10 +50,10 @@ __all__ = [
     "natural_frequencies",
     "rank_nodes",
     "reduce",
+    "reduce_by",
     "reduce_measured",
     "separate",
     "separated_compliance",
-    "serep",
     "small_rotor",
     "stability_threshold",
     "trade_off",
