@@ -200,7 +200,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         "1",
         speed,
         size(options.radius, "--radius", "200mm"),
-        bearing_load=load,
+        load,
         fraction=options.fraction / 100,
         limit=inf if most is None else mass(most, "--max-mass", "30g"),
         phase=None if phase is None else labels.leading(radians(degrees(phase, "--reading-phase"))),
