@@ -8,7 +8,7 @@ from rotorid.reduction.equivalent.changed_inputs import Shift
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design, equivalent_masses
 from rotorid.reduction.equivalent.frequency_matching import matching_masses
 from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff, trade_off
-from rotorid.reduction.equivalent.mass_sensitivity import InputErrors, mass_sensitivity
+from rotorid.reduction.equivalent.mass_sensitivity import InputErrors
 from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty, mass_uncertainty
 from rotorid.reduction.equivalent.small_model_modes import mac, natural_frequencies
 from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
@@ -44,7 +44,6 @@ __all__ = [
     "design",
     "equivalent_masses",
     "mac",
-    "mass_sensitivity",
     "mass_uncertainty",
     "matching_masses",
     "natural_frequencies",
