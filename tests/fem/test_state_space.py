@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
-from exact_solutions import whirl_exactly
+from exact_solutions import frequency_response, whirl_exactly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigvals
 from scipy.optimize import linear_sum_assignment
 from scipy.signal import StateSpace as ScipyStateSpace
 from scipy.signal import lsim
-from state_spaces import frequency_response
 
 import fem
 from fem.state_space import state_space

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import each_of
-from exact_solutions import exactly, whirl_exactly
+from exact_solutions import exactly, frequency_response, whirl_exactly
 from fem_rotors import rotor23
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from state_spaces import frequency_response
 
 import fem
 from fem.state_space import state_space

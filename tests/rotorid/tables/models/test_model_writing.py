@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cases import each_of
+from exact_solutions import frequency_response
 from hypothesis import given
 from hypothesis import strategies as st
-from state_spaces import frequency_response
 
 import fem
 from rotorid.harmonic import identify

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
-from state_spaces import frequency_response
+from exact_solutions import frequency_response
 
 import fem
 from fem.state_space import state_space as of_motion
