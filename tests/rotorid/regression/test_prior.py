@@ -331,9 +331,10 @@ def test_what_the_data_alone_determine_is_said_of_the_nonlinear_model():
 def test_a_bound_is_no_fault_of_the_prior_and_its_misfit_is_not_hidden():
     model = ode_model({"x": "-k*x"}, initial={"x": "x0"}, estimate={"k": 1.0, "x0": 1.0})
     x = 2 * np.exp(-0.7 * T) + 0.02 * np.random.default_rng(3).standard_normal(25)
-    data, bounds = Record(T, {"x": x}, sigma={"x": 0.02}), {"k": (0.5, 0.6)}
-    plain = fit(model, data, bounds=bounds)
-    found = fit(replace(model, prior={"k": (0.75, 0.02)}), data, bounds=bounds)  # as the data say: 0.7
+    data = Record(T, {"x": x}, sigma={"x": 0.02})
+    model = replace(model, bounds=np.array([[0.5, 0.6], [-np.inf, np.inf]]))
+    plain = fit(model, data)
+    found = fit(replace(model, prior={"k": (0.75, 0.02)}), data)  # as the data say: 0.7
     assert plain.estimate.chi_square > 3 * 24
     assert found.estimate.chi_square == pytest.approx(plain.estimate.chi_square, rel=1e-6)
     assert found.estimate.dof == plain.estimate.dof == 24
@@ -355,8 +356,8 @@ def test_a_prior_that_errors_are_estimated_with_chooses_among_all_minima():
     rng, chosen = np.random.default_rng(0), []
     for sign in (1, -1):  # the data prefer one of two minima by chance
         y = 4 + 0.1 * rng.standard_normal(25)
-        known = replace(model, prior={"a": (2.0 * sign, 0.1)})
-        found = fit(known, record(y, None), weigh=True, starts=9, bounds={"a": (-10.0, 10.0)})
+        known = replace(model, prior={"a": (2.0 * sign, 0.1)}, bounds=np.array([[-10.0, 10.0]]))
+        found = fit(known, record(y, None), weigh=True, starts=9)
         chosen.append(sign * found.values[0])
         assert found.minima[1].cost - found.minima[0].cost == pytest.approx(40**2 / 2, rel=0.1)
         assert sum(m.starts for m in found.minima) == 9
