@@ -151,7 +151,7 @@ def _words(expression: Expression) -> str:
     from sympy import sstr
 
     told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
-    told = re.sub(r"\*\*(\d+)", lambda found: found[1].translate(_RAISED), told)
+    told = re.sub(r"\*\*(\d+)(?![\w.])", lambda found: found[1].translate(_RAISED), told)
     return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
 
 

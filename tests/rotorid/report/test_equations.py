@@ -579,6 +579,12 @@ def test_a_sum_with_a_long_fraction_before_it_keeps_its_brackets():
     assert row.written(latex=True) == r"\left(2.8 x - 5.108 y^{2}\right) \cdot z = z"
 
 
+def test_only_whole_powers_are_raised():
+    x = sympy.Symbol("x")
+    row = Row("", [(x**12, 1)], [(x ** sympy.Rational(1333, 1000), 1), (x ** sympy.Float("12.5"), 1)])
+    assert row.written() == "x¹² = x**1.333 + x**12.5"
+
+
 @pytest.mark.parametrize("name", FOUND)
 def test_the_document_has_what_was_solved(name):
     shown = FOUND[name].equations
