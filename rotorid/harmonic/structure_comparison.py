@@ -162,12 +162,15 @@ def compare_structures(pair: Sequence[Structure]) -> StructureComparison:
         f"{one.name}: {words}" for one, fit in zip(pair, alone, strict=True) for words in fit.warnings
     ]
     left = left_over(pair[more].model, pair[more].data, _values(fits[more][0]))
-    few, test = dof[less] - dof[more], None
+    few, test, why = dof[less] - dof[more], None, ""
     if nested and few != fits[more][0].rank - fits[less][0].rank:
-        warnings.insert(0, "no F test: a parameter stands at its bound, where F does not hold")
+        why = "a parameter stands at its bound, where F does not hold"
+    elif nested and plans[more].warnings:  # the misfits are too small for their degrees of freedom
+        why = "an amplitude or a phase counts as exact: state both errors"
     elif not dof[more] or (left is not None and left < EXACT) or not all(fit.converged for fit, _ in fits):
-        words = "no F test: a fit leaves no degree of freedom or only rounding, or it did not converge"
-        warnings.insert(0, words)
+        why = "a fit leaves no degree of freedom or only rounding, or it did not converge"
+    if why:
+        warnings.insert(0, f"no F test: {why}")
     elif nested and few > 0:
         F = max(misfits[less] - misfits[more], 0.0) / few * dof[more] / misfits[more]
         test = F, float(fdtrc(few, dof[more], F))

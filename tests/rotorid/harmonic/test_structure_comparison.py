@@ -139,6 +139,14 @@ def test_bounds_of_both_around_the_estimate_change_nothing():
     assert compare_structures((small, large)).special == 0
 
 
+def test_a_phase_without_an_error_is_not_tested():
+    """It counts with a hundredth of the amplitude's error: 14 of 100 such F were above the level of 5 %."""
+    data = replace(readings(), errors=AmplitudeErrors(0.05))
+    found = compared(FIXED, MASS, data)
+    assert (found.special, found.f_test) == (0, None)
+    assert "no F test: an amplitude or a phase counts as exact" in found.summary()
+
+
 def test_equations_multiplied_by_anything_give_the_same():
     """Residuals of equations would not: these are a thousand times larger, and weighted by frequency."""
     factor = model("1000*p**2*(m*p**2 + b*p + c)*X = 1000*p**2*F", ["c", "b", "m"])
