@@ -21,6 +21,7 @@ from rotorid.cli.commands import (
     fit,
     identify,
     influence,
+    modes,
     reduce,
     response,
     schema,
@@ -61,6 +62,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "identify": identify.identify,
         "fit": fit.fit,
         "simulate": simulate.simulate,
+        "modes": modes.modes,
     },
     "Samples, and checks": {"demo": demo.demo, "schema": schema.schema, "validate": validate.validate},
 }
@@ -99,8 +101,7 @@ def _rotorid(
 def _overview() -> str:
     """The jobs, each with the first example of its first command, and their commands."""
     lines = [
-        "Four jobs, each with an example. More of a command: rotorid COMMAND --help",
-        "The files are those of a checkout; elsewhere, rotorid demo DIR writes some and uses them.",
+        "An example of each job, run in a checkout (else: rotorid demo DIR). More: rotorid COMMAND --help"
     ]
     for job, commands in _COMMANDS.items():
         told = {name: command.__doc__ or "" for name, command in commands.items()}

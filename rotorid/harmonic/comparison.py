@@ -79,7 +79,7 @@ class Comparison:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(predicted) / np.abs(self.measured)
         near = (ratio < TRUSTED) & (ratio > 1 / TRUSTED)
-        whiten, _ = _whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
+        whiten, _ = whitening(self.experiments, self.model.outputs, np.where(near, predicted, self.measured))
         return replace(self, whiten=whiten, _last={})
 
     def predict(self, theta: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -149,8 +149,10 @@ class Comparison:
             dz, dw = mode_slopes(A, dA, mode[0], w, reference)
             root = np.sqrt(mode[0])
             over = self.whiten[i, :, 0, 0]
-            # the frequency has the relative error of the reference amplitude
+            # without an error of its own the frequency has the relative one of the reference amplitude
             share = over[reference] * abs(shape[reference]) / omega
+            if self.experiments.frequency_std is not None:
+                share = 1 / self.experiments.frequency_std[i]
             r = np.concatenate(
                 ([(root - omega) * share], over[others] * (w * shape[reference] - shape)[others])
             )
@@ -179,7 +181,7 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     left_out = _left_out(experiments, model, given, np.asarray(known))
     if not len(forced) and not len(free):
         raise ValueError("no reading can be compared with a prediction: " + "; ".join(left_out))
-    whiten, warnings = _whitening(experiments, outputs, measured)
+    whiten, warnings = whitening(experiments, outputs, measured)
     rows = [
         (i, outputs[j], part)
         for i in forced
@@ -229,7 +231,7 @@ def reference_amplitude(shape: FloatArray) -> int:
     return int(np.flatnonzero(size >= 0.1 * size.max())[0])
 
 
-def _whitening(
+def whitening(
     experiments: Experiments, outputs: tuple[str, ...], amplitudes: ComplexArray
 ) -> tuple[FloatArray, tuple[str, ...]]:
     """Inverse root of the covariance of each reading, (n, e, 2, 2), rows along and across; and warnings."""

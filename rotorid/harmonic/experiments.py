@@ -89,6 +89,8 @@ class Experiments:
         From repeated readings: by signal (n, 2, 2), real and imaginary part; before `errors`.
     varying
         Known quantities (n,) that change from row to row, by name; NaN where unknown.
+    frequency_std
+        Standard deviations of the frequencies (n,), rad/s; None: exact.
     axis, units
         How people see frequencies, and the amplitudes of signals that are not in the unit of the model.
     """
@@ -100,6 +102,7 @@ class Experiments:
     errors: AmplitudeErrors | None = None
     covariances: Mapping[str, FloatArray] = field(default_factory=dict)
     varying: Mapping[str, FloatArray] = field(default_factory=dict)
+    frequency_std: FloatArray | None = None
     axis: Shown = RAD_PER_S
     units: Mapping[str, Shown] = field(default_factory=dict)
 
@@ -147,6 +150,7 @@ class Experiments:
             self,
             names=tuple(self.names[i] for i in chosen),
             frequencies=self.frequencies[chosen],
+            frequency_std=None if self.frequency_std is None else self.frequency_std[chosen],
             signals=signals,
             free=self.free[chosen],
             covariances=covariances,

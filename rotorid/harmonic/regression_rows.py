@@ -151,21 +151,30 @@ def ask_about_case(model: HarmonicModel, experiments: Experiments) -> None:
 def row_covariance(model: HarmonicModel, experiments: Experiments, rows: Rows, u: FloatArray) -> FloatArray:
     """Covariance of each experiment's real rows, (n, 2·equations, 2·equations).
 
-    A row's error is Σ A_s δZ_s with the coefficients A_s at u; inputs are exact.
+    A row's error is Σ A_s δZ_s + Σ Z_s δA_s with the coefficients A_s at u, which have that of the frequency;
+    inputs are exact.
     """
     n, equations = rows.Y.shape
     weights = rows.constants + rows.coefficients @ u
     total = np.zeros((n, 2 * equations, 2 * equations))
+    slope = np.zeros((n, equations), dtype=complex)
     for s, name in enumerate(model.outputs):
         covariance = experiments.covariance(name)
         own = model.column == s
         a = np.zeros((n, equations), dtype=complex)
-        np.add.at(a.T, model.equation[own], (rows.powers[:, own] * weights[own]).T)
+        terms = rows.powers[:, own] * weights[own]
+        np.add.at(a.T, model.equation[own], terms.T)
+        moved = model.power[own] * terms * np.nan_to_num(experiments.table([name]))  # by ω/dω
+        np.add.at(slope.T, model.equation[own], moved.T)
         block = np.empty((n, equations, 2, 2))
         block[..., 0, 0] = block[..., 1, 1] = a.real
         block[..., 0, 1], block[..., 1, 0] = -a.imag, a.imag
         tall = block.reshape(n, 2 * equations, 2)
         total += tall @ covariance @ np.swapaxes(tall, 1, 2)
+    if experiments.frequency_std is not None:
+        relative = experiments.frequency_std / experiments.frequencies
+        own = np.stack((slope.real, slope.imag), axis=2).reshape(n, -1) * relative[:, None]
+        total += own[:, :, None] * own[:, None, :]
     return total
 
 

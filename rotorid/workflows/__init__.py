@@ -10,6 +10,7 @@ from rotorid.workflows.demo import Demo, DemoOptions, demo
 from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
+from rotorid.workflows.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
@@ -33,6 +34,8 @@ __all__ = [
     "FitOptions",
     "IdentifyOptions",
     "InfluenceOptions",
+    "ModesOfReadings",
+    "ModesOptions",
     "Outcome",
     "PermissibleUnbalance",
     "RecordFit",
@@ -57,6 +60,7 @@ __all__ = [
     "fit",
     "identify",
     "influence",
+    "modes",
     "reduce",
     "response",
     "simulate",

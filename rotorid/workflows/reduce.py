@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import counted
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import (
@@ -16,6 +18,7 @@ from rotorid.workflows.option_values import (
     Speeds,
     band,
     nodes,
+    number,
     numbers,
     one_of,
     one_speed,
@@ -27,7 +30,7 @@ from rotorid.workflows.result_provenance import log, provenance, workflow
 if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.base.registry import Method
-    from rotorid.reduction import Placement, Reduction
+    from rotorid.reduction import InputErrors, Placement, Reduction
     from rotorid.tables.data.modes_table import MeasuredModes
     from rotorid.workflows.reduce_result import ReducedRotor
 
@@ -39,6 +42,7 @@ Rows = Literal["equal", "relative"]
 """How rows of the regression are weighted."""
 View = Literal["shapes", "methods", "trade-off", "placement", "response", "stability", "errors", "what-if"]
 """What a picture shows."""
+ERRORS = ("compliance", "frequencies", "shapes", "seal_stiffness")
 
 
 def choices() -> dict[str, Sequence[Method[Any]]]:
@@ -149,7 +153,6 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
     ValueError
         For a rotor or an option that cannot be, and for options that would have no effect.
     """
-    from rotorid.workflows.reduce_inputs import shares
     from rotorid.workflows.reduce_result import ReducedRotor
 
     options = options or ReduceOptions()
@@ -200,7 +203,6 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     from rotorid.reduction import rank_nodes
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
-    from rotorid.workflows import reduce_inputs as given
     from rotorid.workflows.reduce_result import ReducedRotor
 
     machine, files = rotor_source(rotor)
@@ -223,7 +225,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
         files = (*files, Path(options.measured))
-        data = given.at(data, machine, places, options.measured)
+        data = modes_at(data, machine, places, options.measured)
     result = reduce_rotor(
         machine,
         places,
@@ -231,14 +233,14 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         speed=at,
         supports_apart=options.supports_apart,
         measured=None if data is None else (data.frequencies, data.shapes),
-        errors=given.errors(options.errors, data, used, len(places)),
+        errors=input_errors(options.errors, data, used, len(places)),
         **how,
     )
     tables = [support.speeds[0] for support in machine.supports if support.speeds]
     found = ReducedRotor(
         result=result,
         placement=placement if options.rank else None,
-        damping=given.damping_ratios(options.damping),
+        damping=damping_ratios(options.damping),
         speed=max(tables, default=0.0) if at is None else at,
         both_planes=options.both_planes,
         forces=[machine.node(node) for node in _forces(options)],
@@ -287,7 +289,6 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
     """A reduction without a rotor: its compliance and its modes from tables."""
     from rotorid.reduction import reduce_measured
     from rotorid.tables.data.modes_table import read_compliance, read_modes
-    from rotorid.workflows import reduce_inputs as given
 
     if options.compliance is None or options.measured is None:
         raise ValueError("give a rotor, or --compliance and --measured, which take its place")
@@ -297,7 +298,7 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
         labels = [str(node) for node in nodes(options.nodes, "--nodes")]
         named = {str(node): node for node in data.nodes}
         wanted = [named.get(label, label) for label in labels]
-    data = given.at(data, None, wanted, options.measured)
+    data = modes_at(data, None, wanted, options.measured)
     known, alpha = read_compliance(options.compliance, wanted)
     order = [known.index(node) for node in wanted]
     used = min(2, len(data.frequencies), len(wanted)) if options.modes is None else options.modes
@@ -314,7 +315,7 @@ def _of_tables(options: ReduceOptions, how: Mapping[str, Any]) -> tuple[Reductio
         used,
         nodes=wanted,
         seal_stiffness=[springs.get(str(node), 0.0) for node in wanted],
-        errors=given.errors(options.errors, data, used, len(wanted)),
+        errors=input_errors(options.errors, data, used, len(wanted)),
         **how,
     )
     return result, (Path(options.compliance), Path(options.measured))
@@ -341,3 +342,85 @@ def _beside(found: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float
         if stable is not None:
             beside["stability"] = compare_stability(small, stable[1], lowest=stable[0])
     return dataclasses.replace(found, **beside)
+
+
+def modes_at(data: MeasuredModes, rotor: Rotor | None, wanted: list[Any], path: Path | str) -> MeasuredModes:
+    """The measured modes at these places only, in their order."""
+    known = [rotor.node(node) for node in data.nodes] if rotor is not None else list(data.nodes)
+    lost = [str(node) for node in wanted if node not in known]
+    if lost:
+        raise ValueError(
+            f"{path}: no shape was measured at {', '.join(lost)}; there are {', '.join(map(str, known))}"
+        )
+    rows = [known.index(node) for node in wanted]
+    return dataclasses.replace(
+        data,
+        nodes=tuple(wanted),
+        shapes=data.shapes[rows],
+        shape_std=None if data.shape_std is None else data.shape_std[rows],
+    )
+
+
+def input_errors(
+    given: str | Mapping[str, float] | None, data: MeasuredModes | None, modes: int, n: int
+) -> InputErrors | None:
+    """Read "compliance=1.3,shapes=1" or "alpha12=1.3" in percent for n masses.
+
+    What the table of modes states counts where nothing else is given.
+    """
+    from rotorid.reduction import InputErrors
+
+    stated: dict[str, Any] = {}
+    if data is not None and data.frequency_std is not None:
+        stated["frequencies"] = data.frequency_std[:modes]
+    if data is not None and data.shape_std is not None:
+        stated["shapes"] = data.shape_std[:, :modes]
+    for name, value in shares({} if given is None else given, "--errors", "compliance=1.3,shapes=1").items():
+        if not 0 <= value < 1:
+            raise ValueError(
+                f"--errors: {name}={100 * value:g} is no standard deviation from 0 to 100 percent"
+            )
+        _state(stated, name, value, n, modes)
+    return InputErrors(**stated) if stated else None
+
+
+def _state(stated: dict[str, Any], name: str, value: float, n: int, modes: int) -> None:
+    """Note the error of a kind of input, or of one: alpha12, U31, omega1, c2."""
+    import numpy as np
+
+    if name in ERRORS:
+        stated[name] = value
+        return
+    shapes = {"alpha": (n, n), "U": (n, modes), "omega": (modes,), "c": (n,)}
+    kinds = dict(zip(shapes, ("compliance", "shapes", "frequencies", "seal_stiffness"), strict=True))
+    found = re.fullmatch(r"(alpha|U)(\d)(\d)|(omega|c)(\d)", name)
+    stem = (found.group(1) or found.group(4)) if found else ""
+    at = tuple(int(d) - 1 for d in found.group(2, 3, 5) if d) if found else ()
+    if not found or any(not 0 <= i < size for i, size in zip(at, shapes[stem], strict=True)):
+        raise ValueError(
+            f"--errors: {name!r} is not known{did_you_mean(name, ERRORS)}; known are {', '.join(ERRORS)}, or "
+            f"one input of {counted(n, 'mass', 'masses')} and {counted(modes, 'mode')}: "
+            f"alpha11 to alpha{n}{n}, U11 to U{n}{modes}, omega1 to omega{modes}, c1 to c{n}"
+        )
+    table = np.array(np.broadcast_to(stated.get(kinds[stem], 0.0), shapes[stem]))
+    table[at] = value
+    if stem == "alpha":
+        table[at[::-1]] = value
+    stated[kinds[stem]] = table
+
+
+def shares(given: str | Mapping[str, float], what: str, example: str) -> dict[str, float]:
+    """Read "alpha12=1.3,U31=-0.3", in percent, as shares; numbers in a mapping are shares."""
+    return numbers(given, what, example, 100.0)
+
+
+def damping_ratios(given: str | Sequence[float] | None) -> Sequence[float]:
+    """Read "1,0.5", in percent, as damping ratios."""
+    if not isinstance(given, str):
+        return given or ()
+    values = [number(part) for part in given.split(",")]
+    if not all(0 <= value < 100 for value in values):
+        raise ValueError(
+            f"--damping {given!r}: percent of critical damping of the first modes, from 0 to below 100, 1,0.5"
+        )
+    return [value / 100 for value in values]

@@ -73,6 +73,7 @@ GIVEN = (
     "reduce --compliance sample_data/book_task_9/compliance.csv --measured sample_data/book_task_9/modes.csv"
 )
 IDENTIFY, FIT = "sample_data/identify", "sample_data/fit"
+SHAKEN = "modes sample_data/modes/amplitudes.csv --excitation force"
 PROBES = '--sensors "probe DE:45,probe NDE:45"'
 
 ROTOR_COMMANDS = f"""
@@ -227,6 +228,7 @@ identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/t
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
+identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
@@ -239,6 +241,11 @@ simulate-record             simulate {FIT}/three_masses/model.toml --with c1=0.1
 simulate-record-errors      simulate {FIT}/quasilinearization/model.toml --with theta1=1,theta2=-1,theta3=-1 --times 0,1,2,3 --sigma y1=0.01,y2=0.02
 simulate-resonance          simulate undamped.toml --with c=1000 --frequencies 5:15:5 --inputs F=1
 simulate-missing            simulate {IDENTIFY}/task_5_1/model.toml --with c=1000 --frequencies 10 --inputs F=10
+identify-modes              identify {IDENTIFY}/task_7_1/model.toml sample_data/modes/modes.csv
+modes-chain                 {SHAKEN} --amplitude-error 2 --phase-error 1 --output modes.csv
+modes-band                  {SHAKEN} --bands 24:28
+modes-one-side              {SHAKEN} --bands 25:26.2
+modes-no-reading            {SHAKEN} --bands 100:120Hz
 fit-run-down-plot           fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv --plot run_down.png
 fit-quasi-method            fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --verbose
 fit-quasi-sequential        fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record.csv --method quasilinearization --integrator sequential-heun --table
@@ -257,6 +264,11 @@ fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02
+fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma auto
+fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
+fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
+fit-design                  fit {FIT}/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1 --sigma 0.02 --design 0:10:0.5 --choose 4
 identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
 identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
 identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
@@ -306,7 +318,7 @@ COMMANDS = (
         "split",
         "tolerance",
     ),
-    *("unbalance", "reduce", "identify", "fit", "simulate", "schema", "validate"),
+    *("unbalance", "reduce", "identify", "fit", "simulate", "modes", "schema", "validate"),
 )
 
 MODELLED = {
@@ -323,6 +335,13 @@ ALIKE = {
         "trial 1,middle,800,0\ntrial 2,left,400,90\ntrial 2,middle,400,90\n",
     )
 }
+PRIOR = {
+    "prior.toml": (
+        f"{FIT}/quasilinearization/model.toml",
+        "[estimate]",
+        "[prior]\ntheta1 = [1.0, 0.004]\ntheta2 = [-0.9, 0.02]\n\n[estimate]",
+    )
+}
 MASS = {
     "mass.toml": (
         f"{IDENTIFY}/task_5_1/model.toml",
@@ -331,6 +350,16 @@ MASS = {
     )
 }
 EDITS = {
+    "fit-prior": PRIOR,
+    "fit-prior-auto": PRIOR,
+    "fit-prior-unweighed": PRIOR,
+    "identify-prior": {
+        "prior.toml": (
+            f"{IDENTIFY}/task_4_1/model.toml",
+            '"delta"]',
+            '"delta"]\n\n[prior]\ndelta = [0.1, 0.02]',
+        )
+    },
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {

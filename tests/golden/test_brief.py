@@ -15,10 +15,11 @@ NO_ANSWER = ("schema", "--version")
 JUDGEMENTS = {
     "balance": r"(Mount|Remove) (these|this|nothing)|Do not mount|Measure again|"
     r"(Pass|Fail|Not decidable) \(|As predicted: |Not as predicted: |Not judged: |written: ",
+    "modes": r"\d+ modes?: |Not every mode is determined: ",
     "split": r"Mount |Instead of adding .*(take away opposite:|grind off )|.* from two weights:$",
     "trial-weight": r"Trial weight in plane ",
     "tolerance": r"G[\d.]+ for .*: permissible residual unbalance [\d.]+ g·mm",
-    "simulate": r"(Amplitudes|Natural modes|Record) ",
+    "simulate": r"(Amplitudes|Natural modes|Record)\b",
     "unbalance": r"The readings determine ",
 }
 """How the first line begins."""

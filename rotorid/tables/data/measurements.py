@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -15,21 +16,23 @@ from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
 from rotorid.base.suggestions import did_you_mean
 from rotorid.base.text import listing
 from rotorid.base.unit_words import Shown, speed_axis, vibration_unit_words
+from rotorid.tables.data.modes_table import read_modes
 from rotorid.tables.data.repeated_readings import FREQUENCIES, merge_repeats
 from rotorid.tables.models.harmonic_file import HarmonicFile
 from rotorid.tables.reader import units
-from rotorid.tables.reader.columns import Column, Table, read_table
+from rotorid.tables.reader.columns import Column, Table, make_table, read_grid
 from rotorid.tables.reader.problems import Problems, TableWarning
 from rotorid.tables.reader.units import Unit, UnitError, UnitReader, one_of
 from rotorid.tables.runs.stated_conventions import FULL_TURN
 
 if TYPE_CHECKING:
-    from rotorid.harmonic.experiments import Experiments
+    from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
     from rotorid.harmonic.operator_model import HarmonicModel
 
 
 _SPEED = one_of(units.SPEED)
 _FREE = "a free vibration has real amplitudes"
+_AMPLITUDE = re.compile(r"(.+)_(?:amplitude|phase|re|im)(?:_.*)?")
 
 
 def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> Experiments:
@@ -44,6 +47,9 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     With a column `repeat`, rows of one experiment (or, without names, of one frequency and excitation) are
     readings of the same: their mean counts, and their scatter, pooled over the table, says how large the
     errors are unless the model file states them.
+
+    A table of modes (`mode`, `node`, `shape`, as `read_modes` reads it), whose nodes are amplitudes of the
+    model, holds free vibrations with their errors.
 
     Parameters
     ----------
@@ -72,8 +78,11 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     file = model if isinstance(model, HarmonicFile) else None
     equations = model.model if isinstance(model, HarmonicFile) else model
     problems = Problems()
+    grid = problems.need(read_grid(path, "measurements", problems, first=True))
+    if {"mode", "node", "shape"} <= set(grid.header):
+        return _free_vibrations(path, equations, file)
     columns = _columns(equations.signals, equations.varying)
-    table = problems.need(read_table(path, "measurements", columns, problems, first=True))
+    table = problems.need(make_table(grid, columns, problems))
     unclear = len(problems) > 0
     frequency = _frequency(table)
     read = {name: _amplitude(table, name, unclear=unclear) for name in equations.signals}
@@ -100,6 +109,67 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
     if "repeat" in table:
         rows = merge_repeats(table, rows, equations)
     return rows
+
+
+def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experiments:
+    """Read displacements at any points: as `read_measurements`, with any names and without a model.
+
+    Velocities and accelerations, known by their units, become displacements. Repeated readings stay apart.
+    """
+    from rotorid.harmonic.experiments import Experiments
+
+    problems = Problems()
+    grid = problems.need(read_grid(path, "measurements", problems, first=True))
+    names = tuple(dict.fromkeys(found[1] for name in grid.header if (found := _AMPLITUDE.fullmatch(name))))
+    table = problems.need(make_table(grid, _columns(names, ()), problems))
+    omega, unclear = _frequency(table), len(problems) > 0
+    signals = {name: z for name in names if (z := _amplitude(table, name, unclear=unclear)) is not None}
+    if not set(names) - {"F"}:
+        table.in_header(None, "amplitudes of points: columns X_amplitude and X_phase_deg, or X_re and X_im")
+    labels = _experiments(table)
+    problems.stop()
+    for name, values in signals.items():
+        part = next(f"{name}_{part}" for part in ("amplitude", "re") if f"{name}_{part}" in table)
+        bad = (omega == 0) | ((name == "F") & (np.isnan(values) | (values == 0)))
+        table.complain_where(bad, part, "a frequency above 0, and a force F that is not 0")
+        if not np.nan_to_num(values).any():
+            table.as_whole(table.fields[part].name, "a number that is not 0 in at least one row")
+        order = {"velocity": 1, "acceleration": 2}.get(table.unit(part).kind, 0)
+        signals[name] = values / (1j * np.where(bad, 1.0, omega)) ** order
+    problems.stop()
+    axis, units = _shown(table, signals)
+    return Experiments(labels, omega, signals, np.zeros(len(table), bool), errors, axis=axis, units=units)
+
+
+def _free_vibrations(path: str | Path, model: HarmonicModel, file: HarmonicFile | None) -> Experiments:
+    """A table of modes, whose nodes are amplitudes of the model."""
+    from rotorid.harmonic.experiments import Experiments
+
+    modes, problems = read_modes(path), Problems()
+    nodes, k = [str(node) for node in modes.nodes], len(modes.frequencies)
+    for node in set(nodes) - set(model.outputs):
+        expected = f"an amplitude of the model: {listing(model.outputs)}{did_you_mean(node, model.outputs)}"
+        problems.add(str(path), None, "node", node, expected)
+    if model.varying or model.has_constant_terms:
+        problems.add(str(path), None, None, None, f"a model of amplitudes and parameters only, for {_FREE}")
+    problems.stop()
+    signals = {
+        name: np.full(k, 0 if name in model.inputs else np.nan, dtype=complex) for name in model.signals
+    }
+    signals |= dict(zip(nodes, modes.shapes.astype(complex), strict=True))
+    errors, covariances, own = None if file is None else file.errors, {}, modes.frequency_std
+    if errors is None and modes.shape_std is not None:
+        variances = (modes.shape_std * modes.shapes)[..., None, None] ** 2 * np.diag([1.0, 0.0])
+        covariances = dict(zip(nodes, variances, strict=True))
+    return Experiments(
+        tuple(f"mode {mode}" for mode in range(1, k + 1)),
+        modes.frequencies,
+        signals,
+        np.ones(k, dtype=bool),
+        errors,
+        covariances,
+        frequency_std=own * modes.frequencies if own is not None and own.all() else None,
+    )
 
 
 def measurement_columns(data: Experiments, signals: Sequence[str]) -> tuple[result.Column, ...]:

@@ -43,6 +43,8 @@ MODE_COLUMNS = (
     Column("shape", ratio),
     Column("frequency_std", _PERCENT, ("frequency_std_percent",), required=False, blank=True),
     Column("shape_std", _PERCENT, ("shape_std_percent",), required=False),
+    Column("damping", _PERCENT, ("damping_percent",), required=False, blank=True),
+    Column("damping_std", _PERCENT, ("damping_std_percent",), required=False, blank=True),
 )
 COMPLIANCE_COLUMNS = (
     Column("node"),
@@ -83,7 +85,8 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     Its columns are `mode` (1, 2, … from the lowest frequency, without a gap), `frequency_rad_s` (or `_Hz`,
     `_rpm`, or `speed_rpm`; it may be blank after the first row of a mode), `node`, `shape` (relative
     amplitude with its sign) and, optionally, `frequency_std_percent` and `shape_std_percent`, one standard
-    deviation. Every mode has the same nodes, each once.
+    deviation; `damping_percent` and `damping_std_percent` may stand beside them and are not used. Every mode
+    has the same nodes, each once.
 
     Parameters
     ----------

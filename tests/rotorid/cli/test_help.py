@@ -102,7 +102,7 @@ def test_rotorid_alone_shows_four_jobs_with_examples_that_run(cli, checkout):
     assert [line.split()[0] for line in lines if line.startswith("  ") and "rotorid " not in line] == list(
         COMMANDS
     )
-    examples = [line[line.index("rotorid ") :] for line in lines[2:] if "rotorid " in line]
+    examples = [line[line.index("rotorid ") :] for line in lines[1:] if "rotorid " in line]
     assert [example.split()[1] for example in examples] == [
         "balance",
         "critical",

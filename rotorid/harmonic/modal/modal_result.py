@@ -1,0 +1,176 @@
+"""Modes fitted to amplitudes: frequencies, damping and shapes with errors, and what speaks against them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotorid.base.answer import COLUMNS, Answer, Answered
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, rows, text
+from rotorid.base.text import counted, error_figures, listing
+from rotorid.base.unit_words import Shown
+from rotorid.harmonic.comparison import reference_amplitude
+from rotorid.harmonic.plausibility import misfit
+from rotorid.regression.nonlinear import NonlinearEstimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LARGEST = 10.0
+"""No relative error of a shape is larger: amplitudes that are 0 within it are told as that share of it."""
+RARE, EXACT = 1e-3, 1e-3
+"""Probability below which chance explains nothing; a share of a shape that nobody minds."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModes(Answered):
+    """Modes from amplitudes.
+
+    Attributes
+    ----------
+    points
+        Where amplitudes were read, length P.
+    fit
+        ω_r in rad/s, then ζ_r.
+    residues, spread
+        R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for the variance
+        of the residuals where no errors are stated.
+    ends
+        First and last frequency around each resonance, rad/s.
+    trend
+        Correlation of neighbouring residuals, in its standard deviations.
+    same
+        What errors that are not stated were taken to be the same in.
+    axis
+        How people see frequencies.
+    """
+
+    points: tuple[str, ...]
+    fit: NonlinearEstimate
+    residues: ComplexArray
+    spread: FloatArray
+    ends: tuple[tuple[float, float], ...]
+    trend: float
+    same: str
+    axis: Shown
+
+    @cached_property
+    def undetermined(self) -> tuple[str, ...]:
+        """Why there are no modes to go on with, in words."""
+        found = [] if self.fit.converged else [self.fit.message]
+        std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
+        told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
+        for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
+            zip(told, self.ends, strict=True), 1
+        ):
+            if not 2 * error < high - low:
+                found.append(f"these readings do not tell frequency and damping of mode {mode}")
+            elif not low < omega < high:
+                found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
+            elif zeta + 2 * other < 0:
+                found.append(f"the damping of mode {mode} is negative ({zeta:.2g}): phases must be leads")
+        return tuple(found)
+
+    @cached_property
+    def parts(self) -> tuple[FloatArray, FloatArray]:
+        """Residues along and across the common phase of their mode, and their variances, (2, k, P) each."""
+        phase = np.angle((self.residues**2 / np.trace(self.spread, axis1=2, axis2=3)).sum(axis=1)) / 2
+        turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
+        turned = self.residues * np.exp(-1j * phase[:, None])
+        estimate = self.fit.estimate
+        unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
+        variances = np.einsum("aik,kpij,ajk->akp", turn, self.spread, turn)
+        variances *= 1.0 if estimate.errors_stated else unit
+        least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
+        return np.stack((np.copysign(least, turned.real), turned.imag)), variances
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Real shapes (k, P); the first point that is no node of a mode has 1."""
+        return np.array([s / s[reference_amplitude(s)] for s in self.parts[0][0]])
+
+    @property
+    def shape_std(self) -> FloatArray:
+        """Relative standard deviations (k, P), independent from point to point; NaN where unknown."""
+        return np.asarray(np.sqrt(self.parts[1][0]) / np.abs(self.parts[0][0]))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What must be known before the numbers are used."""
+        from scipy.special import chdtrc, ndtr
+
+        (along, across), (_, variances) = self.parts
+        lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
+        chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
+        minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
+        misfits = [*misfit(self.fit.estimate)]
+        if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
+            misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
+        return (
+            *self.undetermined,
+            *(f"{why}; or another mode is in the range (--bands)" for why in misfits),
+            *(
+                f"mode {mode + 1} is complex: phases scatter by {np.degrees(lost[mode] ** 0.5):.2g}°, more "
+                "than errors explain; its real shape is not exact (heavy damping, or another mode beside it)"
+                for mode in np.flatnonzero((chance < RARE) & (lost > minded))
+            ),
+        )
+
+    def columns(self) -> tuple[Column, ...]:
+        """The table of modes that `reduce` and `identify` read, a row per mode and point."""
+        P, k = len(self.points), len(self.ends)
+        omega, zeta = np.repeat(self.fit.estimate.solution, P).reshape(2, -1)
+        told = [
+            Column("mode", np.repeat(np.arange(1, k + 1), P)),
+            Column("frequency_rad_s", omega),
+            Column("node", self.points * k),
+            Column("shape", self.shapes.ravel()),
+            Column("damping_percent", 100 * zeta),
+        ]
+        if self.fit.std is not None and not np.isnan(self.shape_std).any():
+            errors = np.repeat(self.fit.std, P).reshape(2, -1)
+            told.append(Column("frequency_std_percent", 100 * errors[0] / omega))
+            told.append(Column("shape_std_percent", 100 * self.shape_std.ravel()))
+            told.append(Column("damping_std_percent", 100 * errors[1] / np.abs(zeta)))
+        return tuple(told)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types; what is unknown is None."""
+        estimate, modes = self.fit.estimate, [] if self.undetermined else rows(self.columns())
+        if self.undetermined:
+            estimate = replace(estimate, values=estimate.values * np.nan, covariance=None)
+        return plain({**estimate.to_dict(), "modes": modes, "warnings": self.warnings})
+
+    def to_frame(self) -> pd.DataFrame:
+        """The table of modes; ValueError where one is not determined, for a part would look like all."""
+        if self.undetermined:
+            raise ValueError(f"there is no table of modes: {self.undetermined[0]}")
+        return frame(self.columns())
+
+    @property
+    def answer(self) -> Answer:
+        """Frequencies and damping with their errors, shapes, and what speaks against them."""
+        estimate = self.fit.estimate
+        if self.undetermined:
+            return Answer("Not every mode is determined: no table of modes.", "", self.warnings)
+        told = [f"{self.axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
+        shapes = [Column("point", self.points, str)]
+        for mode, (shape, std) in enumerate(zip(self.shapes, self.shape_std, strict=True), 1):
+            shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
+            shapes.append(Column("±", np.abs(shape) * std, error_figures))
+        notes = ["ω in rad/s, ζ of critical damping", *estimate.told().notes]
+        if self.same:
+            notes.append(
+                f"errors are not stated: the same {self.same}, as what is left of the amplitudes shows"
+            )
+        return Answer(
+            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {self.axis.word.rpartition(', ')[2]}.",
+            f"{estimate.told().found}\n\n{text(shapes, width=COLUMNS)}",
+            self.warnings,
+            tuple(notes),
+        )

@@ -1,0 +1,337 @@
+"""Modes from amplitudes: against closed forms and drawn readings, and what is said where they do not tell."""
+
+import csv
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import fem
+from rotorid.harmonic.experiments import AmplitudeErrors, Experiments
+from rotorid.harmonic.modal.modal_fit import fit_modes
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+from rotorid.tables.data.modes_table import read_modes
+from rotorid.workflows.modes import ModesOptions, modes
+
+M = np.diag([20.0, 20.0, 10.0])
+K = np.array([[3e4, -2e4, 0.0], [-2e4, 2.5e4, -5e3], [0.0, -5e3, 5e3]])
+TASK_7_1 = sample_data() / "identify" / "task_7_1" / "model.toml"
+TRUTH = {"c1": 1e4, "c2": 2e4, "c3": 5e3}
+
+
+def undamped(M, K):
+    """Natural frequencies, and shapes with 1 at the first mass."""
+    squares, shapes = eigh(K, M)
+    return np.sqrt(squares), shapes / shapes[0]
+
+
+def around(centres, damping, readings=9, widths=3.0):
+    """Frequencies around resonances, so many half-power widths to each side."""
+    steps = np.linspace(-widths, widths, readings)
+    return np.concatenate([w * (1 + z * steps) for w, z in zip(centres, damping, strict=True)])
+
+
+def amplitudes(omega, M, C, K, force):
+    """By the dynamic stiffness, frequency by frequency."""
+    return np.array([np.linalg.solve(K - w**2 * M + 1j * w * C, force) for w in omega])
+
+
+def measured(omega, Z, errors=None, drawn=None):
+    """Experiments, with errors drawn along and across each amplitude."""
+    if drawn is not None:
+        rng, share = drawn
+        Z = Z * (1 + share * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
+    names = tuple(str(i) for i in range(len(omega)))
+    signals = {f"X{i}": z for i, z in enumerate(Z.T, start=1)}
+    return Experiments(names, omega, signals, np.zeros(len(omega), dtype=bool), errors)
+
+
+def fitted(omega, experiments, bands=None):
+    return fit_modes(experiments, tuple(experiments.signals), np.ones(len(omega), dtype=complex), bands)
+
+
+def found(result):
+    """Frequencies and damping, standard deviations and 95 % intervals, each (2, k)."""
+    low, high = result.fit.ci95.T.reshape(2, 2, -1)
+    return result.fit.estimate.solution.reshape(2, -1), result.fit.std.reshape(2, -1), low, high
+
+
+def chain(masses, springs):
+    return np.diag(masses), np.diag(springs + np.append(springs[1:], 0.0)) - sum(
+        np.diag(springs[1:], side) for side in (1, -1)
+    )
+
+
+def test_exact_amplitudes_give_the_exact_modes():
+    omega0, shapes = undamped(M, K)
+    damping = 2e-4 * omega0  # C = 4e-4 K
+    omega = around(omega0, damping)
+    result = fitted(omega, measured(omega, amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])))
+    frequency, zeta = result.fit.estimate.solution.reshape(2, -1)
+    np.testing.assert_allclose(frequency, omega0, rtol=1e-9)
+    np.testing.assert_allclose(zeta, damping, rtol=1e-7)
+    np.testing.assert_allclose(result.shapes, shapes.T, rtol=1e-7)
+    assert result.warnings == ()
+
+
+def test_modes_beyond_the_range_hardly_bias_those_in_it():
+    M5, K5 = chain(np.array([10.0, 15.0, 8.0, 12.0, 20.0]), np.array([2e4, 1.5e4, 1e4, 2e4, 1.2e4]))
+    omega0, shapes = undamped(M5, K5)
+    damping = 1e-4 * omega0
+    omega = around(omega0[1:2], damping[1:2], 15)
+    result = fitted(omega, measured(omega, amplitudes(omega, M5, 2e-4 * K5, K5, np.eye(5)[0])))
+    frequency, zeta = result.fit.estimate.solution
+    assert frequency == pytest.approx(omega0[1], rel=1e-7)
+    assert zeta == pytest.approx(damping[1], rel=1e-3)
+    np.testing.assert_allclose(result.shapes[0], shapes[:, 1], rtol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("errors", "masses", "read", "draws"),
+    [("stated", 3, 3, 60), ("share of", 3, 3, 60), ("stated", 4, 2, 60), ("size everywhere", 4, 1, 200)],
+)
+def test_intervals_of_drawn_readings_hold_the_truth(errors, masses, read, draws):
+    """Random chains: 95 % of the intervals, within four standard deviations of such a count."""
+    rng, held, count = np.random.default_rng(7), np.zeros(3), 0
+    chosen = 0
+    for _ in range(draws):
+        M0, K0 = chain(rng.uniform(5, 20, masses), rng.uniform(5e3, 2e4, masses))
+        omega0, shapes = undamped(M0, K0)
+        damping = 10 ** rng.uniform(-3, -2) * omega0 / omega0[-1]
+        C = 2 * damping[0] / omega0[0] * K0
+        omega = around(omega0[:read], damping[:read])
+        exact = amplitudes(omega, M0, C, K0, np.eye(masses)[-1])
+        share = 0.01 * np.abs(exact).max() / np.abs(exact) if "size" in errors else 0.02
+        stated = AmplitudeErrors(0.02, 0.02) if errors == "stated" else None
+        result = fitted(omega, measured(omega, exact, stated, (rng, share)))
+        chosen += stated is not None or result.same.startswith(errors)
+        assert len(result.ends) == read
+        _, _, low, high = found(result)
+        truth = np.array([omega0[:read], damping[:read]])
+        held[:2] += ((low <= truth) & (truth <= high)).sum(axis=1)
+        factor = (high - low)[0, 0] / 2 / result.fit.std[0]
+        ratio = result.shapes[:, -1] / result.shapes[:, 0]
+        error = np.abs(ratio) * np.hypot(result.shape_std[:, -1], result.shape_std[:, 0])
+        held[2] += (np.abs(ratio - (shapes[-1] / shapes[0])[:read]) <= factor * error).sum()
+        count += read
+    assert chosen > 0.9 * draws
+    assert np.abs(held / count - 0.95).max() < 4 * np.sqrt(0.95 * 0.05 / count)
+
+
+def test_a_chain_is_identified_from_its_modes_within_the_intervals(tmp_path, cli):
+    """Lesson 7 whole: amplitudes around resonances, modes, stiffnesses; 40 drawn tests."""
+    from rotorid.tables import read_harmonic_model, read_measurements
+    from rotorid.workflows.identify import identify
+
+    omega0, _ = undamped(M, K)
+    omega = around(omega0, 2e-4 * omega0)
+    exact = amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])
+    rng, held, file = np.random.default_rng(5), 0, read_harmonic_model(TASK_7_1)
+    for _ in range(40):
+        experiments = measured(omega, exact, AmplitudeErrors(0.02, 0.02), (rng, 0.02))
+        path = tmp_path / "modes.csv"
+        fitted(omega, experiments).to_frame().to_csv(path, index=False)
+        result = identify(file, read_measurements(path, file)).identification
+        held += sum(
+            low <= TRUTH[n] <= high for n, (low, high) in zip(result.parameters, result.ci95, strict=True)
+        )
+    assert abs(held / 120 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 120)
+    output = cli("identify", TASK_7_1, path, "--method", "output-error", "--json").json["parameters"]
+    for name, value in zip(result.parameters, result.values, strict=True):
+        assert output[name]["value"] == pytest.approx(value, abs=0.2 * output[name]["std"])
+
+
+def test_the_modes_of_a_rotor_reduce_it(tmp_path, cli):
+    """Run-up under unbalance of the 23-element rotor with dampers, read at three nodes: the same masses."""
+    rows = list(csv.reader((sample_data() / "rotor23.csv").read_text().splitlines()))
+    damped = tmp_path / "rotor.csv"
+    damped.write_text(
+        ",".join([*rows[0], "support_damping_N_s_per_m"])
+        + "\n"
+        + "\n".join(",".join([*row, "400" if float(row[3]) else "0"]) for row in rows[1:])
+    )
+    rotor, nodes = read_rotor(damped), [7, 12, 18]
+    exact = fem.critical_speeds(rotor, 3)
+    omega = around(exact.frequencies, [1.2e-5, 1.5e-4, 4e-4], 11)
+    unbalance = {6: 1e-3, 15: 0.5e-3j, 19: 3e-4}
+    Z = fem.unbalance_response(rotor, unbalance, omega, nodes=nodes).amplitudes
+    Z = 1e6 * Z.reshape(len(omega), 3)
+    rng = np.random.default_rng(2)
+    Z = Z * (1 + 0.01 * (rng.standard_normal(Z.shape) + 1j * rng.standard_normal(Z.shape)))
+    head = "speed_rpm," + ",".join(f"{n}_amplitude_um,{n}_phase_deg" for n in nodes)
+    cells = [
+        [w * 30 / np.pi, *np.stack((np.abs(z), np.degrees(np.angle(z))), 1).ravel()]
+        for w, z in zip(omega, Z, strict=True)
+    ]
+    table, output = tmp_path / "runup.csv", tmp_path / "modes.csv"
+    table.write_text("\n".join([head, *(",".join(map(str, row)) for row in cells)]))
+    words = ("--amplitude-error", "1", "--phase-error", "0.573")
+    document = cli("modes", table, "--excitation", "unbalance", *words, "--output", output, "--json").json
+    assert document["warnings"] == []
+    read = read_modes(output, rotor)
+    assert np.all(np.abs(read.frequencies - exact.frequencies) < 4 * read.frequency_std * read.frequencies)
+    reduced = cli(
+        "reduce", sample_data() / "rotor23.csv", "--measured", output, "--modes", "2", "--json"
+    ).json
+    computed = cli(
+        "reduce", sample_data() / "rotor23.csv", "--nodes", "7,12,18", "--modes", "2", "--json"
+    ).json
+    np.testing.assert_allclose(reduced["masses_kg"], computed["masses_kg"], rtol=0.05)
+
+
+def test_a_velocity_under_a_given_force_is_the_same_mode(tmp_path):
+    omega0, shapes = undamped(M, K)
+    omega = around(omega0, 2e-4 * omega0)
+    force = np.linspace(5, 20, len(omega)) * np.exp(0.7j)
+    Z = amplitudes(omega, M, 4e-4 * K, K, [1.0, 0.0, 0.0]) * force[:, None]
+    rows = ["frequency_Hz,F_re,F_im,X1_re,X1_im,X2_re_mm_s,X2_im_mm_s,X3_re_um_pp,X3_im_um_pp"]
+    for w, f, (x1, x2, x3) in zip(omega, force, Z, strict=True):
+        z = (w / 2 / np.pi, f.real, f.imag, x1, 1e3j * w * x2, 2e6 * x3)
+        rows.append(
+            ",".join(str(part) for x in z[:3] for part in [x])
+            + ","
+            + ",".join(f"{x.real},{x.imag}" for x in z[3:])
+        )
+    path = tmp_path / "data.csv"
+    path.write_text("\n".join(rows))
+    result = modes(path, ModesOptions(excitation="force")).found
+    np.testing.assert_allclose(result.shapes, shapes.T, rtol=1e-6)
+    np.testing.assert_allclose(result.fit.estimate.solution[:3], omega0, rtol=1e-8)
+    assert result.answer.judgement.endswith("Hz.")
+
+
+def near_one(omega=None, C=4e-4 * K, share=0.0, seed=3, bands=None, conjugate=False):
+    """The first resonance of the chain."""
+    omega0, _ = undamped(M, K)
+    omega = around(omega0[:1], 2e-4 * omega0[:1]) if omega is None else omega
+    Z = amplitudes(omega, M, C, K, [0.0, 0.0, 1.0])
+    drawn = (np.random.default_rng(seed), share) if share else None
+    errors = AmplitudeErrors(share, share) if share else None
+    return fitted(omega, measured(omega, Z.conj() if conjugate else Z, errors, drawn), bands)
+
+
+def test_a_resonance_read_on_one_side_is_not_told():
+    omega0 = undamped(M, K)[0][0]
+    with pytest.raises(ValueError, match="both sides"):
+        near_one(np.linspace(0.9, 0.999, 12) * omega0)
+    result = near_one(np.linspace(0.9, 0.99, 12) * omega0, share=0.02, bands=[(0.8 * omega0, 1.2 * omega0)])
+    assert result.undetermined
+    assert result.answer.judgement.startswith("Not every mode is determined")
+    assert result.to_dict()["modes"] == []
+    assert result.to_dict()["parameters"]["ω1"]["value"] is None
+    with pytest.raises(ValueError, match="no table of modes"):
+        result.to_frame()
+
+
+def test_too_few_readings_are_refused():
+    omega0, _ = undamped(M, K)
+    with pytest.raises(ValueError, match="too few readings"):
+        near_one(omega0[0] * (1 + 2e-3 * np.array([-1, 0, 1])), bands=[(0.0, 20.0)])
+    band = [(0.9 * omega0[0], 1.1 * omega0[0])]
+    with pytest.raises(ValueError, match="3 frequencies"):
+        near_one(np.repeat(omega0[0] * np.array([0.999, 1.001]), 6), share=0.01, bands=band)
+    thrice = near_one(np.repeat(omega0[0] * np.array([0.998, 1.0, 1.002]), 4), share=0.01, bands=band)
+    assert "do not tell" in thrice.undetermined[0]
+    with pytest.raises(ValueError, match="no readings in --bands"):
+        near_one(bands=[(1.0, 2.0)])
+
+
+def test_readings_that_lack_are_left_out():
+    """Rows in any order, one of them blank, one blank at one point: the exact modes all the same."""
+    omega0, shapes = undamped(M, K)
+    omega = np.random.default_rng(6).permutation(around(omega0, 2e-4 * omega0))
+    Z = amplitudes(omega, M, 4e-4 * K, K, [0.0, 0.0, 1.0])
+    Z[3], Z[5, 1] = np.nan, np.nan
+    result = fitted(omega, measured(omega, Z))
+    np.testing.assert_allclose(result.fit.values[:3], omega0, rtol=1e-9)
+    np.testing.assert_allclose(result.shapes, shapes.T, rtol=1e-7)
+
+
+def test_phases_that_lag_are_found_out():
+    result = near_one(share=0.01, conjugate=True)
+    assert "phases must be leads" in result.undetermined[0]
+
+
+def test_complex_modes_are_told_as_such():
+    """Two near modes, a damper at one mass: eigenvalues of the first-order form, and phases far from 0."""
+    K2, C2 = np.array([[1e4, -200.0], [-200.0, 1.026e4]]), np.diag([2.0, 0.1])
+    omega = np.linspace(97, 103, 81)
+    Z = amplitudes(omega, np.eye(2), C2, K2, [1.0, 0.3])
+    result = fitted(
+        omega, measured(omega, Z, AmplitudeErrors(0.005, 0.005), (np.random.default_rng(1), 0.005))
+    )
+    values = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-K2, -C2]]))
+    values = values[values.imag > 0][np.argsort(np.abs(values[values.imag > 0]))]
+    _, _, low, high = found(result)
+    truth = np.array([np.abs(values), -values.real / np.abs(values)])
+    assert ((2 * low - high < truth) & (truth < 2 * high - low)).all()
+    assert [words[:17] for words in result.warnings] == ["mode 1 is complex", "mode 2 is complex"]
+
+
+@pytest.mark.parametrize("gap", [1.001, 1.002, 1.004, 1.01])
+@pytest.mark.parametrize("errors", [AmplitudeErrors(0.01, 0.01), None])
+def test_two_modes_in_one_peak_are_not_taken_for_one(gap, errors):
+    omega = np.linspace(98, 102, 81)
+    Z = amplitudes(omega, np.eye(2), 0.4 * np.eye(2), np.diag([1e4, 1e4 * gap]), [1.0, 1.0])
+    result = fitted(omega, measured(omega, Z, errors, (np.random.default_rng(1), 0.01)))
+    assert len(result.ends) == 1
+    assert any("another mode is in the range" in words for words in result.warnings)
+
+
+def test_a_node_of_a_mode_stays_readable(tmp_path):
+    """A shape that is 0 within its error is written with the largest error that the table can hold."""
+    M3, K3 = np.eye(3), np.array([[2e4, -1e4, 0], [-1e4, 2e4, -1e4], [0, -1e4, 2e4]])
+    omega0 = undamped(M3, K3)[0]
+    omega = around(omega0[:2], 2e-4 * omega0[:2])
+    Z = amplitudes(omega, M3, 4e-4 * K3, K3, [1.0, 0.2, 0.0])
+    result = fitted(omega, measured(omega, Z, AmplitudeErrors(0.02, 0.02), (np.random.default_rng(4), 0.02)))
+    path = tmp_path / "modes.csv"
+    result.to_frame().to_csv(path, index=False)
+    read = read_modes(path)
+    assert 0.3 < read.shape_std[1, 1] <= 10
+    assert abs(read.shapes[1, 1]) < 4 * read.shape_std[1, 1] * abs(read.shapes[1, 1])
+    assert read.shape_std[1, 1] * abs(read.shapes[1, 1]) > 1e-3  # of 2 % of noise
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("frequency_Hz,X_amplitude\n1,2\n", "a column X_phase_deg"),
+        ("frequency_Hz,F_re\n1,2\n", "amplitudes of points"),
+        ("frequency_Hz,F_re,X_re\n1,0,1\n", "a force F that is not 0"),
+        ("frequency_Hz,X_re\n0,1\n", "a frequency above 0"),
+        ("frequency_Hz,X_re,Y_re\n1,1,\n2,1,\n", "a number that is not 0 in at least one row"),
+    ],
+)
+def test_tables_that_cannot_be_are_refused(tmp_path, cli, text, words):
+    path = tmp_path / "data.csv"
+    path.write_text(text)
+    outcome = cli("modes", path, "--excitation", "force")
+    assert outcome.code == 2
+    assert words in " ".join(outcome.err.split())
+
+
+def test_a_table_of_modes_needs_the_names_of_the_model(tmp_path, cli):
+    path = tmp_path / "modes.csv"
+    path.write_text("mode,frequency_rad_s,node,shape\n1,12,X1,1\n1,12,Y2,1\n")
+    outcome = cli("identify", TASK_7_1, path)
+    assert outcome.code == 2
+    assert "an amplitude of the model: X1, X2 or X3" in outcome.err
+
+
+def test_one_stated_error_needs_the_other(cli):
+    outcome = cli(
+        "modes", sample_data() / "modes" / "amplitudes.csv", "--excitation", "force", "--phase-error", "1"
+    )
+    assert outcome.code == 2
+    assert "belong together" in outcome.err
+
+
+def test_the_sample_holds_what_the_command_writes(tmp_path, cli):
+    folder, output = sample_data() / "modes", tmp_path / "modes.csv"
+    words = ("--excitation", "force", "--amplitude-error", "2", "--phase-error", "1")
+    cli("modes", folder / "amplitudes.csv", *words, "--output", output)
+    new, stored = read_modes(output), read_modes(folder / "modes.csv")
+    np.testing.assert_allclose(new.frequencies, stored.frequencies, rtol=1e-9)
+    np.testing.assert_allclose(new.shapes, stored.shapes, rtol=1e-7)
