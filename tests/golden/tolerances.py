@@ -41,7 +41,9 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance("identify-task_8_2", "residual*", "as many equations as unknowns: " + _EXACT, absolute=1e-12),
     Tolerance("fit-quasi*", "parameters.*.std", _EXACT, absolute=1e-13),
     Tolerance("fit-quasi*", "*residual_rms", _EXACT, absolute=1e-12),
-    Tolerance("identify-prior", "*.delta*", "only the prior knows it: what readings tell is 0", absolute=1e-12),
+    Tolerance(
+        "identify-prior", "*.delta*", "only the prior knows it: what readings tell is 0", absolute=1e-12
+    ),
     Tolerance("identify-modes", "influence.*", "an iteration anew without each mode", relative=1e-7),
     Tolerance("fit-quasi*", "residual rms *", _EXACT, absolute=1e-12),
     Tolerance("fit-quasi-method", "rotorid: *", _EXACT, absolute=1e-12),

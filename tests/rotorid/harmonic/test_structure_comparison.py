@@ -135,7 +135,9 @@ def test_the_same_model_within_bounds_is_the_special_case():
 def test_bounds_of_both_around_the_estimate_change_nothing():
     data = readings()
     near = {"b": (0.0, 1.01 * identify_outputs(FIXED, data).value("b"))}
-    small, large = (Structure(one, one_model, data, near, {}) for one, one_model in (("s", FIXED), ("l", MASS)))
+    small, large = (
+        Structure(one, one_model, data, near, {}) for one, one_model in (("s", FIXED), ("l", MASS))
+    )
     assert compare_structures((small, large)).special == 0
 
 

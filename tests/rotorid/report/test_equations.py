@@ -570,6 +570,7 @@ def test_terms_keep_their_signs_and_brackets():
     long = sympy.Rational(12345678, 10**7)
     assert Row("", [(long * a, x)], [(sympy.Rational(3, 10), x)]).written() == "1.23457·a·x = 3/10·x"
 
+
 def test_a_sum_with_a_long_fraction_before_it_keeps_its_brackets():
     x, y, z = sympy.symbols("x y z")
     sum_of_two = sympy.factor_terms(sympy.Rational(14, 5) * x - sympy.Rational(1277, 250) * y**2)
