@@ -17,11 +17,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from balancing.tolerance_allocation import bearing_limits, safe_pair, transfer
 from rotorid.base.answer import Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.rpm import rpm, rpm_text
 from rotorid.base.text import figures
@@ -92,26 +91,6 @@ class Tolerance(Answered):
         if self.bearings is None or self.positions is None:
             return None
         return transfer(self.positions, self.bearings)
-
-    def at_bearings(self, residual: ArrayLike) -> ComplexArray:
-        """Unbalance at the two bearings, kg·m, equivalent to residuals (P,), kg·m, in the planes.
-
-        Raises
-        ------
-        ValueError
-            Where the distances are not known, or for another number of residuals than planes.
-        """
-        T = self.transfer
-        u = np.asarray(residual, dtype=complex)
-        if T is None:
-            raise ValueError(
-                "the positions of planes and bearings are not known: give them with the tolerance"
-            )
-        if u.shape != (len(self.planes),):
-            raise ValueError(
-                f"there must be one residual for each of {len(self.planes)} planes; got {u.shape}"
-            )
-        return np.asarray(T @ u)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types: kg·m, m, rad/s, and g·mm, µm where people read these."""

@@ -23,7 +23,7 @@ known beforehand, so amounts are safe if they keep the tolerances even in the wo
 The standard leaves open which of these pairs to take. Here it is the one with the largest product u_1 u_2:
 it uses both tolerances fully where that leaves something for both planes, gives U_A and U_B to planes at the
 bearings, and gives neither plane nothing. Residuals that exceed it may still be good: what counts is what
-they are together at the bearings (`Tolerance.at_bearings`).
+they are together at the bearings (`Tolerance.transfer`).
 """
 
 from __future__ import annotations

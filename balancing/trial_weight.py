@@ -67,62 +67,13 @@ def plane_load(rotor_mass: float | None, bearing_load: float | None, planes: int
     return bearing_load
 
 
-def force_amount(
-    speed: float,
-    radius: float,
-    *,
-    rotor_mass: float | None = None,
-    bearing_load: float | None = None,
-    fraction: float = FRACTION,
-    planes: int = 1,
-) -> tuple[float, float]:
-    """Trial mass whose force is a fraction of the load: m r ω² = f · load.
-
-    Parameters
-    ----------
-    speed
-        rad/s.
-    radius
-        m.
-    rotor_mass, bearing_load
-        kg, shared equally by the planes; or N, carried at this plane. One of them.
-    fraction
-        f.
-    planes
-        How many planes carry the rotor.
-
-    Returns
-    -------
-    Mass (kg) and load of the plane (N).
-
-    Raises
-    ------
-    ValueError
-        For a number that is not positive, and for both loads or none.
-
-    Examples
-    --------
-    >>> mass, load = force_amount(314.159265, 0.2, rotor_mass=500)
-    >>> f"{1e3 * mass:.2f} g"
-    '24.84 g'
-    """
-    load = plane_load(rotor_mass, bearing_load, planes)
-    if load is None:
-        raise ValueError("give the mass of the rotor or the load of the bearing, one of them")
-    for what, value in {"speed": speed, "radius": radius, "fraction of the load": fraction}.items():
-        positive(what, value)
-    return fraction * load / (radius * speed**2), load
-
-
 def trial_from_force(  # noqa: PLR0913
     plane: str,
     speed: float,
     radius: float,
+    load: float,
     *,
-    rotor_mass: float | None = None,
-    bearing_load: float | None = None,
     fraction: float = FRACTION,
-    planes: int = 1,
     limit: float = math.inf,
     phase: float | None = None,
     lag: Lag | None = None,
@@ -131,14 +82,16 @@ def trial_from_force(  # noqa: PLR0913
     quantity: Quantity = "displacement",
     labels: Labels | None = None,
 ) -> TrialWeight:
-    """First trial weight without any coefficients.
+    """First trial weight without any coefficients: its force is a fraction of the load, m r ω² = f · load.
 
     Parameters
     ----------
     plane
         Name.
-    speed, radius, rotor_mass, bearing_load, fraction, planes
-        As of `force_amount`.
+    speed, radius, load
+        rad/s, m, and N, that the plane carries: its share of the rotor's weight, or that of its bearing.
+    fraction
+        f.
     limit
         Largest weight of the plane, kg.
     phase, lag
@@ -152,10 +105,17 @@ def trial_from_force(  # noqa: PLR0913
     ------
     ValueError
         For impossible numbers, and a weight larger than the plane's limit.
+
+    Examples
+    --------
+    >>> trial = trial_from_force("left", 314.159265, 0.2, 500 * GRAVITY)
+    >>> f"{1e3 * trial.amount:.2f} g"
+    '24.84 g'
     """
-    amount, load = force_amount(
-        speed, radius, rotor_mass=rotor_mass, bearing_load=bearing_load, fraction=fraction, planes=planes
-    )
+    given = {"speed": speed, "radius": radius, "load of the plane": load, "fraction of the load": fraction}
+    for what, value in given.items():
+        positive(what, value)
+    amount = fraction * load / (radius * speed**2)
     made = labels or Labels()
     _check_limit(
         plane, amount, limit, made, f"take at most {100 * fraction * limit / amount:.3g} % of the load"

@@ -127,7 +127,7 @@ def records() -> dict[str, float]:
         (
             "quasilinearization",
             "quasilinearization",
-            "[Q]: the truth is (1, -1, -1), its signs lost in the print",
+            "[Q]: the truth is (1, -1, -1), its signs lost in the scan",
         ),
         (
             "three_masses",

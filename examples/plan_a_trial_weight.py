@@ -16,14 +16,14 @@ from rotorid import read_job
 
 JOB = Path(__file__).parents[1] / "sample_data" / "model_job" / "job.toml"
 SPEED = 3000 * 2 * pi / 60  # rad/s
-RADIUS, ROTOR_MASS = 0.2, 500.0  # m, kg
+RADIUS, LOAD = 0.2, 500.0 * 9.80665  # m, and N of a rotor of 500 kg
 IN_GRAMS = balancing.Labels(weight_unit="g", weight_scale=1e3)
 
 
 def main() -> dict[str, float]:
     """Print three plans; return their amounts and angles."""
     # Nothing is known but the machine: the centrifugal force is 10 % of the load on the bearings.
-    plain = balancing.trial_from_force("left", SPEED, RADIUS, rotor_mass=ROTOR_MASS, labels=IN_GRAMS)
+    plain = balancing.trial_from_force("left", SPEED, RADIUS, LOAD, labels=IN_GRAMS)
     print(plain.summary(), end="\n\n")
 
     # A phase is read, 120° lead, and the rotor runs below its critical speed: opposite the heavy spot.
@@ -31,7 +31,7 @@ def main() -> dict[str, float]:
         "left",
         SPEED,
         RADIUS,
-        rotor_mass=ROTOR_MASS,
+        LOAD,
         phase=radians(120),
         lag=expected_lag("below"),
         labels=IN_GRAMS,

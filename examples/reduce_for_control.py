@@ -47,7 +47,7 @@ def main(model: str | None = None) -> dict[str, float]:
     if model is not None:
         motion = small.equations_of_motion
         dampers = dict.fromkeys(motion.coordinates, 1000.0)
-        Path(model).write_bytes(ode_model_bytes(motion, dampers, {}))
+        Path(model).write_bytes(ode_model_bytes(motion, dampers))
     return {
         "m7_kg": float(small.masses.solution[0]),
         "m12_kg": float(small.masses.solution[1]),

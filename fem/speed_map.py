@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -126,13 +126,7 @@ class SpeedMap(Answered):
         )
 
 
-def speed_map(
-    rotor: Rotor,
-    stiffness: ArrayLike | None = None,
-    n: int = 4,
-    *,
-    supports: Sequence[str | int] | None = None,
-) -> SpeedMap:
+def speed_map(rotor: Rotor, stiffness: ArrayLike | None = None, n: int = 4) -> SpeedMap:
     """Compute the undamped critical speeds for supports of equal stiffness.
 
     Forward synchronous whirl with gyroscopic effect, as `critical_speeds`. Damping and cross-coupling play no
@@ -146,16 +140,14 @@ def speed_map(
         N/m, ascending; by default eight decades around the shaft's own stiffness 48 E I / L³.
     n
         How many critical speeds.
-    supports
-        Names or numbers (from 1, in the rotor's order) of the supports whose stiffness varies; the others
-        stay as they are. All by default.
 
     Raises
     ------
     ValueError
-        For impossible stiffness, an unknown support, or more critical speeds than the model has.
+        For impossible stiffness, a rotor without supports, or more critical speeds than the model has.
     """
-    chosen = _chosen(rotor, supports)
+    if not rotor.supports:
+        raise ValueError("the rotor has no support whose stiffness could vary: add supports")
     n = whole(n, "the number of critical speeds")
     flexural = (
         48 * float(rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
@@ -165,16 +157,15 @@ def speed_map(
     k = _checked(stiffness)
 
     def at(value: float) -> FloatArray:
-        return _criticals(_with_stiffness(rotor, chosen, value), n)
+        return _criticals(_with_stiffness(rotor, value), n)
 
     speeds = np.array([at(float(value)) for value in k])
     # ω∞ (1 − c/k) for stiff supports: two of them tell the limit.
     stiff = max(1e5 * flexural, 10 * float(k[-1]))
     pinned = 2 * at(2 * stiff) - at(stiff)
     own, meetings = [], []
-    for i in chosen:
-        support = rotor.supports[i]
-        name = support.name or f"support {i + 1}"
+    for number, support in enumerate(rotor.supports, start=1):
+        name = support.name or f"support {number}"
         for direction, curve, where in _own_curves(support):
             label = name if direction == "x and y" else f"{name}, {direction}"
             own.append((label, curve, where))
@@ -185,31 +176,6 @@ def speed_map(
     for array in (speeds, pinned):
         array.flags.writeable = False
     return SpeedMap(k, speeds, _free(at, float(k[0])), pinned, tuple(own), tuple(meetings), rotor)
-
-
-def _chosen(rotor: Rotor, supports: Sequence[str | int] | None) -> list[int]:
-    if not rotor.supports:
-        raise ValueError("the rotor has no support whose stiffness could vary: add supports")
-    if supports is None:
-        return list(range(len(rotor.supports)))
-    names = [support.name for support in rotor.supports]
-    chosen = []
-    for item in supports:
-        if isinstance(item, str):
-            if item not in names or not item:
-                known = ", ".join(name for name in names if name) or "none has a name"
-                raise ValueError(
-                    f"no support is called {item!r} (supports: {known}); give a name or a number"
-                )
-            chosen.append(names.index(item))
-            continue
-        number = whole(item, "a support")
-        if not 1 <= number <= len(names):
-            raise ValueError(f"support {number} does not exist: the rotor has supports 1 to {len(names)}")
-        chosen.append(number - 1)
-    if not chosen:
-        raise ValueError("choose one support at least whose stiffness varies")
-    return chosen
 
 
 def _checked(stiffness: ArrayLike) -> FloatArray:
@@ -223,12 +189,10 @@ def _checked(stiffness: ArrayLike) -> FloatArray:
     return k
 
 
-def _with_stiffness(rotor: Rotor, chosen: list[int], value: float) -> Rotor:
+def _with_stiffness(rotor: Rotor, value: float) -> Rotor:
     supports = [
         Support(s.node, value, name=s.name, kind=s.kind, tilting_stiffness=s.tilting_stiffness)
-        if i in chosen
-        else s
-        for i, s in enumerate(rotor.supports)
+        for s in rotor.supports
     ]
     changed: Rotor = replace(rotor, supports=supports)
     return changed

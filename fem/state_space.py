@@ -28,13 +28,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from fem.matrices.equations_of_motion import Motion
 from fem.matrices.massless import ZERO, eigenvalues, massive_first, scales, solved, split_by_damping
 from rotorid.base.arrays import ComplexArray, FloatArray
-
-_CHUNK = 2_000_000  # complex numbers at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,32 +73,6 @@ class StateSpace:
         """Of A, 1/s, by rising frequency |Im|, then real part, shape (n,)."""
         values = eigenvalues(self.A)
         return values[np.lexsort((values.imag, values.real, np.abs(values.imag)))]
-
-    def frequency_response(self, omega: ArrayLike) -> ComplexArray:
-        """C (iω − A)⁻¹ B + D at frequencies in rad/s, shape (S, outputs, inputs).
-
-        Raises
-        ------
-        ValueError
-            For frequencies that are not finite, or an undamped natural frequency itself.
-        """
-        w = np.atleast_1d(np.asarray(omega, dtype=float))
-        if w.ndim != 1 or not np.isfinite(w).all():
-            raise ValueError("frequencies must be finite numbers in rad/s, one or a list")
-        n = len(self.A)
-        out = np.empty((w.size, len(self.outputs), len(self.inputs)), dtype=complex)
-        step = max(1, _CHUNK // max(n * n, 1))
-        for first in range(0, w.size, step):
-            part = slice(first, first + step)
-            matrix = 1j * w[part, None, None] * np.eye(n) - self.A
-            try:
-                X = np.linalg.solve(matrix, np.broadcast_to(self.B, (len(matrix), *self.B.shape)))
-            except np.linalg.LinAlgError:
-                raise ValueError(
-                    "a frequency is exactly an undamped natural frequency: the response there is infinite"
-                ) from None
-            out[part] = self.C @ X + self.D
-        return out
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from rotorid.tables import read_job as read_job
     from rotorid.tables import read_measurements as read_measurements
     from rotorid.tables import read_modes as read_modes
-    from rotorid.tables import read_motion as read_motion
     from rotorid.tables import read_ode_model as read_ode_model
     from rotorid.tables import read_record as read_record
     from rotorid.tables import read_rotor as read_rotor
@@ -101,7 +100,6 @@ _HOME = {
     "read_measurements": "tables",
     "read_modes": "tables",
     "read_compliance": "tables",
-    "read_motion": "tables",
     "read_ode_model": "tables",
     "read_record": "tables",
     "Job": "tables",

@@ -234,26 +234,6 @@ class Labels:
         """Angles with the rotation as angles on the paper, both in rad, there counter-clockwise."""
         return np.asarray(self.drawn_sign * np.asarray(angle, dtype=float))
 
-    def seen_from(self, view: View) -> Labels:
-        """The same conventions seen from an end.
-
-        From the other end the rotation, and with it the words clockwise and counter-clockwise, are turned
-        round; numbers stay what they are.
-
-        Raises
-        ------
-        ValueError
-            If the labels do not say from which end the rotation is seen.
-        """
-        if self.rotation is None or self.view is None:
-            raise ValueError(
-                "the direction of rotation and the end from which it is seen are not stated: "
-                'give both, rotation = "clockwise" and view = "drive end"'
-            )
-        if view == self.view:
-            return self
-        return replace(self, view=view, rotation=opposite(self.rotation))
-
     def otherwise(self, names: Collection[str]) -> Labels:
         """The labels with "phase", "angles" or both turned round."""
         phase: Phase = "lag" if self.phase == "lead" else "lead"

@@ -35,6 +35,7 @@ ANSWERS = (
         "identify-two-models",
         "fit-run_down",
         "simulate-lesson-5",
+        "modes-chain",
         "validate",
         "demo-main",
     ),

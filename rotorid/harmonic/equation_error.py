@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -29,11 +29,9 @@ from rotorid.harmonic.regression_rows import Rows, build_rows, row_covariance, w
 from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.nonlinear import NonlinearEstimate
+from rotorid.regression.nonlinear import Bounds, NonlinearEstimate
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.undetermined_combinations import FoundCombination, echelon
-
-Bounds = Mapping[str, tuple[float | None, float | None]]
 
 REWEIGHTINGS = 60
 SETTLED = 0.01

@@ -9,13 +9,14 @@ import numpy as np
 
 from rotorid.base.registry import Method, find
 from rotorid.base.text import listing
-from rotorid.harmonic.equation_error import Bounds, equation_error, limits
+from rotorid.harmonic.equation_error import equation_error, limits
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_identification import identify_outputs
 from rotorid.harmonic.regression_rows import ask_about_case
 from rotorid.harmonic.result import Identification
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
+from rotorid.regression.nonlinear import Bounds
 from rotorid.regression.prior import Known
 
 Identify = Callable[

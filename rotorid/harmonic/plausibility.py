@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from rotorid.harmonic.parameter_combinations import multipliers
 from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.nonlinear import NonlinearEstimate
+from rotorid.regression.nonlinear import Bounds, NonlinearEstimate
 
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
@@ -24,7 +24,6 @@ EXPLAINS = 0.2
 EXACT = 1e-6
 """Share of the readings below which there is no noise."""
 KINDS = ("spring", "damper", "mass")
-Bounds = Mapping[str, tuple[float | None, float | None]]
 Refit = Callable[[Experiments], Sequence[FloatArray]]
 Refine = Callable[[FloatArray], tuple[NonlinearEstimate, FloatArray]]
 UNITS = {"Hz": 2 * np.pi, "rpm": np.pi / 30}

@@ -8,7 +8,7 @@ from rotorid.reduction.equivalent.changed_inputs import Shift
 from rotorid.reduction.equivalent.equivalent_masses_formula_50 import design, equivalent_masses
 from rotorid.reduction.equivalent.frequency_matching import matching_masses
 from rotorid.reduction.equivalent.frequency_shape_trade_off import TradeOff, trade_off
-from rotorid.reduction.equivalent.mass_sensitivity import InputErrors, mass_sensitivity
+from rotorid.reduction.equivalent.mass_sensitivity import InputErrors
 from rotorid.reduction.equivalent.mass_uncertainty import MassUncertainty, mass_uncertainty
 from rotorid.reduction.equivalent.small_model_modes import mac, natural_frequencies
 from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
@@ -16,7 +16,7 @@ from rotorid.reduction.equivalent.support_flexibility_formula_47 import (
     separate,
     separated_compliance,
 )
-from rotorid.reduction.guyan_irs_serep import compare_methods, guyan, irs, serep
+from rotorid.reduction.guyan_irs_serep import compare_methods, reduce_by
 from rotorid.reduction.guyan_irs_serep_result import Method, Methods
 from rotorid.reduction.placement import book_nodes, rank_nodes
 from rotorid.reduction.placement_result import Placement
@@ -43,19 +43,16 @@ __all__ = [
     "compare_stability",
     "design",
     "equivalent_masses",
-    "guyan",
-    "irs",
     "mac",
-    "mass_sensitivity",
     "mass_uncertainty",
     "matching_masses",
     "natural_frequencies",
     "rank_nodes",
     "reduce",
+    "reduce_by",
     "reduce_measured",
     "separate",
     "separated_compliance",
-    "serep",
     "small_rotor",
     "stability_threshold",
     "trade_off",

@@ -83,8 +83,10 @@ class _Condensed:
     regression: _Regression = _Regression()
 
 
-def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
-    """Reduce a rotor to the deflections of some nodes by static condensation (Guyan).
+def reduce_by(
+    rotor: fem.Rotor, nodes: Sequence[str | int], method: str = "guyan", *, speed: float | None = None
+) -> Method:
+    """Reduce a rotor to the deflections of some nodes by one of `METHODS`.
 
     Parameters
     ----------
@@ -92,6 +94,8 @@ def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None =
         On supports; its plane x at rest is reduced.
     nodes
         Masters: different nodes, as numbers from 1 or names of stations.
+    method
+        "guyan", "irs", "serep", or "regression" over one mode.
     speed
         Where tables of supports are read, rad/s; by default their lowest common speed.
 
@@ -99,55 +103,19 @@ def guyan(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None =
     ------
     ValueError
         For nodes that do not exist or repeat, more masters than the rotor has modes, a rotor that is free
-        to move, a speed outside a table.
+        to move, a speed outside a table, an unknown method; for "irs" where Guyan's mass matrix is singular;
+        for "serep" where the modes' shapes at the masters depend on one another.
 
     Examples
     --------
     >>> supports = [fem.Support(1, 1e8), fem.Support(5, 1e8)]
     >>> shaft = fem.Rotor(length=[0.25] * 4, outer_diameter=0.05, supports=supports)
-    >>> model = guyan(shaft, [3])
+    >>> model = reduce_by(shaft, [3])
     >>> model.M.round(2), model.relative_error.round(4)
     (array([[7.5]]), array([0.0075]))
     """
-    return _reduced("guyan", rotor, nodes, speed)
-
-
-def irs(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
-    """Reduce a rotor by the improved reduced system: Guyan's shapes corrected by their inertia forces.
-
-    Parameters
-    ----------
-    rotor, nodes, speed
-        As for `guyan`.
-
-    Raises
-    ------
-    ValueError
-        As `guyan`; and where Guyan's mass matrix is singular.
-    """
-    return _reduced("irs", rotor, nodes, speed)
-
-
-def serep(rotor: fem.Rotor, nodes: Sequence[str | int], *, speed: float | None = None) -> Method:
-    """Reduce a rotor to as many of its modes as there are masters (SEREP): exact for these.
-
-    Parameters
-    ----------
-    rotor, nodes, speed
-        As for `guyan`.
-
-    Raises
-    ------
-    ValueError
-        As `guyan`; and where the modes' shapes at the masters depend on one another, as at a node of all of
-        them.
-    """
-    return _reduced("serep", rotor, nodes, speed)
-
-
-def _reduced(name: str, rotor: fem.Rotor, nodes: Sequence[str | int], speed: float | None) -> Method:
-    method = registry.find(METHODS, name, "method")
-    return method.function(method.title, _condense(rotor, nodes, speed))
+    chosen = registry.find(METHODS, method, "method")
+    return chosen.function(chosen.title, _condense(rotor, nodes, speed))
 
 
 def compare_methods(
@@ -164,7 +132,7 @@ def compare_methods(
     Parameters
     ----------
     rotor, nodes, speed
-        As in `guyan`.
+        As in `reduce_by`.
     modes
         How many modes the regression uses, 1 … n.
     normalise, rows
@@ -178,7 +146,7 @@ def compare_methods(
     Raises
     ------
     ValueError
-        As for `guyan`, or for a number of modes out of range.
+        As for `reduce_by`, or for a number of modes out of range.
     """
     C = _condense(rotor, nodes, speed)
     n = len(C.nodes)

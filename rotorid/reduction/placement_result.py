@@ -146,25 +146,6 @@ class Placement(Answered):
         loss = np.maximum(1.0 - self.mac[front], SMALL_LOSS)
         return int(front[np.argmin(np.maximum(error / error.min(), loss / loss.min()))])
 
-    def index(self, nodes: tuple[int, ...]) -> int:
-        """Row of a choice of nodes, in any order.
-
-        Raises
-        ------
-        ValueError
-            If it is not among the choices.
-        """
-        wanted = sorted(int(n) for n in nodes)
-        found = []
-        if len(wanted) == self.nodes.shape[1]:
-            found = np.flatnonzero((self.nodes == wanted).all(axis=1)).tolist()
-        if not found:
-            raise ValueError(
-                f"nodes {wanted} are not among the choices of {self.nodes.shape[1]} of "
-                f"{len(self.candidates)} candidates; give different nodes among the candidates"
-            )
-        return int(found[0])
-
     def traps(self) -> IndexArray:
         """Rows with all checked frequencies within 2 % but a shape unlike the rotor's (MAC below 0.9)."""
         r = self.ranked

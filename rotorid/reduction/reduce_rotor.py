@@ -18,8 +18,7 @@ from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
     RowWeights,
     equivalent_masses,
 )
-from rotorid.reduction.equivalent.mass_sensitivity import mass_sensitivity
-from rotorid.reduction.equivalent.mass_uncertainty import InputErrors, MassUncertainty, mass_uncertainty
+from rotorid.reduction.equivalent.mass_uncertainty import InputErrors, mass_uncertainty
 from rotorid.reduction.equivalent.plane_at_rest import mass_nodes, plane_at_rest
 from rotorid.reduction.equivalent.small_model_modes import like, mac, natural_frequencies
 from rotorid.reduction.equivalent.support_flexibility_formula_47 import separate
@@ -201,13 +200,11 @@ def _reduced(
             f"the first {counted(modes, 'mode')} cannot determine the masses at nodes {list(places)}: "
             f"{estimate.describe_rank()}; use more modes or other nodes"
         )
-    sensitivity = mass_sensitivity(alpha, *used, **how)
-    uncertainty: MassUncertainty | None = None
     bound = estimate.warnings if isinstance(estimate, BoundedEstimate) else ()
     if errors is not None and bound:
         bound += ("what the stated errors do was not computed: masses at a bound do not follow them",)
-    elif errors is not None:
-        uncertainty = mass_uncertainty(alpha, *used, errors, **how)
+        errors = None
+    known = mass_uncertainty(alpha, *used, errors or InputErrors(), **how)
     frequencies, own = natural_frequencies(alpha, estimate.solution, seal_stiffness=seals)
     compared = shapes[:, :n]
     own[:, : compared.shape[1]] = like(own[:, : compared.shape[1]], compared)
@@ -218,7 +215,7 @@ def _reduced(
         nodes=places,
         modes=modes,
         masses=estimate,
-        sensitivity=sensitivity,
+        sensitivity=known.sensitivity,
         compliance=alpha,
         seal_stiffness=seals,
         frequencies=frequencies,
@@ -227,11 +224,11 @@ def _reduced(
         rotor_shapes=compared,
         rotor_modes=None,
         choices=choices,
-        uncertainty=uncertainty,
+        uncertainty=None if errors is None else known,
         separated=None,
         warnings=(
             *bound,
-            *of_regression(estimate, sensitivity, frequencies, places, agreement[:modes]),
+            *of_regression(estimate, known.sensitivity, frequencies, places, agreement[:modes]),
             *far_off(errors_of_frequency),
         ),
     )

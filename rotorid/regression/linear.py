@@ -20,21 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.regression.estimate import Estimate, coverage_factor
-from rotorid.regression.undetermined_combinations import WORD_TOLERANCE, Combination
-
-__all__ = [
-    "Combination",
-    "Estimate",
-    "coverage_factor",
-    "gain",
-    "least_squares",
-    "solution",
-    "solution_and_rank",
-    "stack",
-    "stretch",
-    "unstretch",
-]
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.undetermined_combinations import WORD_TOLERANCE
 
 RCOND = 1e-12
 """Singular values below RCOND times the largest count as zero (after column scaling)."""

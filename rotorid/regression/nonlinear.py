@@ -106,7 +106,6 @@ def nonlinear_least_squares(  # noqa: PLR0913
     names: Sequence[str],
     sigma_stated: bool,
     bounds: Bounds | None = None,
-    scale: ArrayLike | None = None,
     loss: str = "linear",
     max_iterations: int = 200,
     near: bool = False,
@@ -129,8 +128,6 @@ def nonlinear_least_squares(  # noqa: PLR0913
         Whether a residual of 1 means one stated standard deviation (normal intervals, not rescaled).
     bounds
         {name: (lower, upper)}, None for no bound.
-    scale
-        Typical size of a change of each parameter (n,); default: from the columns of the Jacobian.
     loss
         One of `LOSSES`; with a robust one the spread is taken from the residuals and intervals are Student's.
     max_iterations
@@ -184,7 +181,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     if not left:
         search.path.clear()
         search.costs.clear()
-        x, ok, why = drive(search, first, lower, upper, scale, loss, sigma_stated, max_iterations)
+        x, ok, why = drive(search, first, lower, upper, loss, sigma_stated, max_iterations)
         x, judged, left = polish(search, x, lower, upper, labels, sigma_stated)
     converged = ok and left
     if ok and not left:

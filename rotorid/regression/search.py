@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rotorid.base.arrays import BoolArray, FloatArray
 from rotorid.base.text import counted
@@ -60,7 +59,6 @@ def drive(
     x: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
-    scale: ArrayLike | None,
     loss: str,
     stated: bool,
     limit: int,
@@ -68,7 +66,6 @@ def drive(
     """Scipy's trust-region search; a robust loss without stated errors finds its own scale first."""
     from scipy.optimize import least_squares as driver
 
-    x_scale = "jac" if scale is None else np.asarray(scale, dtype=np.float64)
     ok, why = False, ""
     rounds = ["linear"] if loss == "linear" else [loss] if stated else ["linear", loss, loss]
     for step, name in enumerate(rounds):
@@ -85,7 +82,7 @@ def drive(
                 jac=search.jacobian,
                 bounds=(lower, upper),
                 method="trf",
-                x_scale=x_scale,
+                x_scale="jac",
                 loss=name,
                 f_scale=search.f_scale,
                 ftol=search.tolerance,

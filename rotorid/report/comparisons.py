@@ -50,7 +50,7 @@ def trade_off_part(document: Document) -> Part:
     return Part("Other masses at these nodes", tables=(Grid("", columns, note),))
 
 
-def methods_part(document: Document, methods: Methods | None) -> Part:
+def methods_part(document: Document, methods: Methods) -> Part:
     """All methods of reduction at the same nodes."""
     found = document["methods"]["methods"]
     said = [f"{each['method']}: {each['reason']}" for each in found if each["reason"]]
@@ -61,7 +61,7 @@ def methods_part(document: Document, methods: Methods | None) -> Part:
         "Other methods at these nodes",
         tuple(said),
         (Grid("Frequencies and shapes by method", columns),),
-        () if methods is None else (methods_picture(methods),),
+        (methods_picture(methods),),
     )
 
 
@@ -81,7 +81,7 @@ def _by_mode(document: Document, key: str, head: str, names: Sequence[str]) -> t
     return below(*columns)
 
 
-def placement_part(document: Document, placement: Placement | None) -> Part:
+def placement_part(document: Document, placement: Placement) -> Part:
     """The ranking of places, and the choices with a name."""
     from markupsafe import Markup
 
@@ -111,7 +111,7 @@ def placement_part(document: Document, placement: Placement | None) -> Part:
         )
         if choices
     ]
-    drawings = () if placement is None or not placement.ranked else (placement_picture(placement),)
+    drawings = (placement_picture(placement),) if placement.ranked else ()
     return Part("Other places of the masses", (said, trap), tuple(tables), drawings)
 
 
@@ -134,7 +134,7 @@ def _choices(document: Document, head: str, choices: Mapping[str, object]) -> tu
     )
 
 
-def response_part(document: Document, response: ResponseCost | None) -> Part:
+def response_part(document: Document, response: ResponseCost) -> Part:
     """Unbalance response of both models."""
     from markupsafe import Markup
 
@@ -164,11 +164,11 @@ def response_part(document: Document, response: ResponseCost | None) -> Part:
     left = sum(map(bool, found["excluded"]))
     if left:
         said.append(Markup("{} speeds near critical speeds are left out of these numbers.").format(left))
-    drawings = () if response is None else (running_picture(response),)
-    return Part("Unbalance response beside the full rotor's", tuple(said), drawings=drawings)
+    drawn = running_picture(response)
+    return Part("Unbalance response beside the full rotor's", tuple(said), drawings=(drawn,))
 
 
-def stability_part(document: Document, stability: StabilityCost | None) -> Part:
+def stability_part(document: Document, stability: StabilityCost) -> Part:
     """Stability of both models over speed; where nothing damps, there is nothing to draw."""
     from markupsafe import Markup
 
@@ -193,8 +193,7 @@ def stability_part(document: Document, stability: StabilityCost | None) -> Part:
                 document.show("stability.relative_difference_of_threshold", 3, scale=100.0, sign=True)
             )
         )
-    drawings = () if stability is None else (stability_picture(stability),)
-    return Part(heading, tuple(said), (Grid(span, columns),), drawings)
+    return Part(heading, tuple(said), (Grid(span, columns),), (stability_picture(stability),))
 
 
 def _one_model(document: Document, head: str, which: str) -> Cells:

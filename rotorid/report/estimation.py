@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import Answer
 from rotorid.base.arrays import FloatArray
-from rotorid.base.text import counted, sentence
+from rotorid.base.text import counted, listing, sentence
 from rotorid.base.unit_words import Shown
 from rotorid.regression.estimate import value_digits
 from rotorid.regression.undetermined_combinations import FoundCombination
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.number_tables import Grid, Part, evenly, every_warning, few, shown, words
+from rotorid.report.number_tables import Grid, Part, evenly, every_warning, shown, words
 from rotorid.report.page import inline_svg, render_report
 from rotorid.report.rotor_figures import Drawing
 
@@ -127,11 +127,11 @@ def _experiments(result: Identification) -> Facts:
     data, e = result.experiments, result.experiments.errors
     errors = NOT_STATED
     if data.covariances:
-        errors = f"from repeated readings of {few(list(data.covariances))}"
+        errors = f"from repeated readings of {listing(data.covariances, 'and')}"
     elif e is not None:
         errors = f"{100 * e.relative:g} % of an amplitude, {math.degrees(e.phase):g}° of a phase"
         errors += f", {e.floor:g} at amplitude 0" if e.floor else ""
-    what = f"{len(data)}, {_span(data.axis, data.frequencies)}; amplitudes of {few(list(data.signals))}"
+    what = f"{len(data)}, {_span(data.axis, data.frequencies)}; amplitudes of {listing(data.signals, 'and')}"
     return [("Experiments", what), ("Errors", errors)]
 
 

@@ -148,9 +148,3 @@ def evenly(n: int, most: int) -> list[int]:
     if n <= most:
         return list(range(n))
     return [round(i * (n - 1) / (most - 1)) for i in range(most)]
-
-
-def few(names: Sequence[object]) -> str:
-    """Print a list in words: "7, 12 and 18"."""
-    words = [str(name) for name in names]
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else "none"

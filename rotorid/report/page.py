@@ -17,24 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def render(template: str, **context: object) -> str:
-    """Fill a template of `rotorid/report/templates`.
-
-    Parameters
-    ----------
-    template
-        Its file name, such as "balance.html".
-    context
-        What the template names; a name that is missing is an error, never a blank.
-
-    Raises
-    ------
-    jinja2.UndefinedError
-        If the template names something that the context does not hold.
-    """
-    return _environment().get_template(template).render(**context)
-
-
 def render_report(
     template: str,
     document: Mapping[str, Any],
@@ -54,7 +36,7 @@ def render_report(
     Parameters
     ----------
     template
-        File name of the template.
+        File name in `rotorid/report/templates`, such as "balance.html".
     document
         What `--json` prints, without the provenance.
     title
@@ -70,10 +52,12 @@ def render_report(
     ------
     ValueError
         If the document holds a number that is not finite.
+    jinja2.UndefinedError
+        If the template names something that the context does not hold.
     """
     whole = Document({**document, "provenance": dict(provenance)})
-    text = render(
-        template,
+    page = _environment().get_template(template)
+    text = page.render(
         document=whole.data,
         title=title,
         warnings=list(warnings),

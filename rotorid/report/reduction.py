@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.rpm import RPM
-from rotorid.base.text import counted
+from rotorid.base.text import counted, listing
 from rotorid.report.comparisons import (
     methods_part,
     placement_part,
@@ -15,56 +15,43 @@ from rotorid.report.comparisons import (
     trade_off_part,
 )
 from rotorid.report.document import NOTHING, Cells, Document
-from rotorid.report.number_tables import Grid, Part, below, every_warning, few, numbered, words
+from rotorid.report.number_tables import Grid, Part, below, every_warning, numbered, words
 from rotorid.report.page import render_report
 from rotorid.report.rotor_description import rotor_sheet
 from rotorid.report.rotor_figures import reduction_picture
 
 if TYPE_CHECKING:
-    from rotorid.reduction import Methods, Placement, Reduction, ResponseCost, StabilityCost
+    from rotorid.reduction import Reduction
 
 SCALES = {"first": "1 at the first mass", "largest": "1 at their largest", "length": "the length 1"}
 
 
 def reduce_report(
-    document: Mapping[str, Any],
-    result: Reduction,
-    *,
-    provenance: Mapping[str, Any],
-    placement: Placement | None = None,
-    methods: Methods | None = None,
-    response: ResponseCost | None = None,
-    stability: StabilityCost | None = None,
+    document: Mapping[str, Any], results: Mapping[str, Any], provenance: Mapping[str, Any]
 ) -> bytes:
-    """Make the sheet of a reduction.
+    """Make the sheet of a reduction, HTML in UTF-8.
 
     Parameters
     ----------
     document
         What `rotorid reduce --json` prints, without the provenance.
-    result
-        The reduction it is from.
+    results
+        The results that it is from, by their keys in it; the reduction is that of "".
     provenance
         Program version, input files, date and options.
-    placement, methods, response, stability
-        What the document holds besides, for the pictures.
-
-    Returns
-    -------
-    bytes
-        HTML, UTF-8.
     """
     document = Document(document)
+    result: Reduction = results[""]
     parts = [
         _masses(document, result),
         *_uncertain(document),
         *_what_if(document),
         *_if("trade_off", document, trade_off_part),
-        *_if("methods", document, methods_part, methods),
-        *_if("response", document, response_part, response),
-        *_if("stability", document, stability_part, stability),
+        *_if("methods", document, methods_part, results["methods"]),
+        *_if("response", document, response_part, results["response"]),
+        *_if("stability", document, stability_part, results["stability"]),
         *_if("small_model", document, _small),
-        *_if("placement", document, placement_part, placement),
+        *_if("placement", document, placement_part, results["placement"]),
         _compliance(document),
     ]
     return render_report(
@@ -95,7 +82,7 @@ def _about(document: Mapping[str, Any], provenance: Mapping[str, Any]) -> list[t
     how += ", rows of each mode relative to its 1/ω²" if document["rows"] == "relative" else ""
     return [
         ("Files", files),
-        ("Masses at", f"nodes {few(document['nodes'])}"),
+        ("Masses at", f"nodes {listing(map(str, document['nodes']), 'and')}"),
         ("Method", how),
         ("Modes from", {"rotor": "the rotor model", "measured": "measurement"}[document["source"]]),
         ("Shapes scaled", f"to {SCALES[document['normalise']]}"),
@@ -205,9 +192,10 @@ def _small(document: Document) -> Part:
         "Both planes: masses on a massless shaft, with the rotor's bearings, seals and gyroscopic effect."
     ]
     if small["support_nodes"]:
-        said.append(f"Places without mass that carry supports: nodes {few(small['support_nodes'])}.")
+        nodes = listing(map(str, small["support_nodes"]), "and")
+        said.append(f"Places without mass that carry supports: nodes {nodes}.")
     if small["modal_damping"]:
-        ratios = few([f"{100 * ratio:g} %" for ratio in small["modal_damping"]])
+        ratios = listing((f"{100 * ratio:g} %" for ratio in small["modal_damping"]), "and")
         said.append(f"Modal damping of the first modes: {ratios} of critical.")
     return Part("The small model to go on with", tuple(said))
 

@@ -38,7 +38,7 @@ def critical_report(
     chart: SpeedMap | None = None,
     operating: Band = None,
 ) -> bytes:
-    """Make the sheet of critical speeds.
+    """Make the sheet of critical speeds, HTML in UTF-8.
 
     Parameters
     ----------
@@ -52,11 +52,6 @@ def critical_report(
         The critical speed map, if the document has one.
     operating
         Range of operating speeds, rad/s.
-
-    Returns
-    -------
-    bytes
-        HTML, UTF-8.
     """
     document = Document(document)
     parts = [
@@ -89,7 +84,7 @@ def response_report(
     provenance: Mapping[str, Any],
     operating: Band = None,
 ) -> bytes:
-    """Make the sheet of an unbalance response.
+    """Make the sheet of an unbalance response, HTML in UTF-8.
 
     Parameters
     ----------
@@ -105,11 +100,6 @@ def response_report(
         Program version, input files, date and options.
     operating
         Range of operating speeds, rad/s.
-
-    Returns
-    -------
-    bytes
-        HTML, UTF-8.
     """
     document = Document(document)
     rotor = response.rotor

@@ -9,7 +9,6 @@ from rotorid.tables.data.modes_table import MeasuredModes, read_compliance, read
 from rotorid.tables.data.records import read_record
 from rotorid.tables.job.job_file import Job, job_from_files, read_job
 from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_model
-from rotorid.tables.models.motion_file import read_motion
 from rotorid.tables.models.ode_file import read_ode_model
 from rotorid.tables.reader.problems import InputError, Problem, TableWarning
 from rotorid.tables.reader.table_writing import write_table
@@ -37,7 +36,6 @@ __all__ = [
     "read_job",
     "read_measurements",
     "read_modes",
-    "read_motion",
     "read_ode_model",
     "read_record",
     "read_rotor",

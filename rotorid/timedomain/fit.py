@@ -37,7 +37,6 @@ def fit(  # noqa: PLR0913
     method: str = "levenberg-marquardt",
     integrator: str = "auto",
     start: Mapping[str, float] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
     loss: str = "linear",
     starts: int = 1,
     trajectory: Trajectories | None = None,
@@ -64,8 +63,6 @@ def fit(  # noqa: PLR0913
         Of `INTEGRATORS`. Quasilinearization takes one of `HEUN`, or integrates with error control.
     start
         Starting values by name, instead of the model's.
-    bounds
-        {name: (lower, upper)}, instead of the model's; not for Gauss–Newton and quasilinearization.
     loss
         One of `LOSSES` in `rotorid.regression.robust`.
     starts
@@ -117,8 +114,6 @@ def fit(  # noqa: PLR0913
     plain = method in ("gauss-newton", "quasilinearization")
     if plain and loss != "linear":
         raise ValueError(f"{method} knows no robust loss; use levenberg-marquardt")
-    if plain and bounds:
-        raise ValueError(f"{method} knows no bounds; use levenberg-marquardt")
     if method == "quasilinearization" and integrator == "rk4":
         raise ValueError("quasilinearization integrates with heun, sequential-heun, or error control (auto)")
     if starts < 1 or max_iterations < 1 or not max_seconds > 0:
@@ -134,7 +129,7 @@ def fit(  # noqa: PLR0913
         )
     problem = Problem(model, several, integrator, rtol, seconds=max_seconds)
     names = problem.model.parameters
-    limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
+    limits = problem.model.bounds
     recorded = recorded_starts(model, problem.records)
     begin = _start(problem.model, recorded | for_copies(model, len(several), start or {}))
     begin = inside(begin, limits[:, 0], limits[:, 1])
@@ -228,17 +223,6 @@ def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:
     if not np.isfinite(found).all():
         raise ValueError("starting values must be finite numbers")
     return found
-
-
-def _bounds(model: OdeModel, bounds: Mapping[str, tuple[float, float]] | None) -> FloatArray:
-    table = model.bounds.copy()
-    for name, (low, high) in (bounds or {}).items():
-        if name not in model.parameters:
-            raise ValueError(f"bounds: {name} is no parameter; parameters are {', '.join(model.parameters)}")
-        if not low < high:
-            raise ValueError(f"the lower bound of {name} must be below the upper one; got {low}, {high}")
-        table[model.parameters.index(name)] = low, high
-    return table
 
 
 def _outside(theta: FloatArray, limits: FloatArray) -> bool:

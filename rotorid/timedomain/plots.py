@@ -65,10 +65,9 @@ def fine_curves(result: Fit) -> tuple[Trajectory, ...]:
     return tuple(_fine(result, k) for k in range(len(result.simulations)))
 
 
-def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory] | None = None) -> None:
+def draw_signal(result: Fit, name: str, axes: Axes, curves: Sequence[Trajectory]) -> None:
     """Measured samples (points) of an output and the fitted model (lines) over time."""
     j = result.model.outputs.index(name)
-    curves = fine_curves(result) if curves is None else curves
     for k, record in enumerate(result.records):
         if name in record.outputs:
             axes.plot(_times(record, record.t), record.outputs[name], **_mark(result, k))

@@ -142,28 +142,12 @@ def row(
     erratum: str = "",
     corrected: str | None = None,
 ) -> Row:
-    """Make a row; the tolerance is half a unit of the last printed digit, unless a reason is given.
-
-    Parameters
-    ----------
-    source, quantity
-        Where the number is printed, and what it is, with its unit.
-    printed
-        The number as printed, as text, such as ``"1.003e4"``.
-    computed
-        The number as computed now.
-    tolerance
-        Another largest difference, in the unit of the number; then `reason` says why.
-    erratum
-        Why the printed number is wrong. The computed one must then differ from it.
-    corrected
-        The right number as text, where it is known; only with `erratum`.
+    """Make a row of the fields of `Row`; without a `tolerance` it is half a unit of the last printed digit.
 
     Raises
     ------
     ValueError
-        For a text that is no number, a tolerance without reason, a reason without tolerance, a corrected
-        number without erratum.
+        For a printed text that is no number.
 
     Examples
     --------
@@ -172,25 +156,7 @@ def row(
     >>> row("[S] task 7.2", "c1, N/m", "1.003e4", 10036.0).status
     'differs'
     """
-    usual = half_unit(printed)
-    if not source.strip() or not quantity.strip():
-        raise ValueError("a row needs its source and its quantity")
-    if tolerance is None and reason:
-        raise ValueError(f"{source}, {quantity}: a reason belongs to a stated tolerance")
-    if tolerance is not None:
-        if not reason.strip():
-            raise ValueError(
-                f"{source}, {quantity}: a tolerance of {tolerance:g} instead of {usual:g} needs a reason"
-            )
-        if not 0 < tolerance < math.inf:
-            raise ValueError(f"{source}, {quantity}: a tolerance must be positive and finite")
-    if corrected is not None:
-        number(corrected)
-        if not erratum:
-            raise ValueError(f"{source}, {quantity}: a corrected number needs the reason of its erratum")
-    if erratum and not erratum.strip():
-        raise ValueError(f"{source}, {quantity}: an erratum needs its reason")
-    chosen = usual if tolerance is None else float(tolerance)
+    chosen = half_unit(printed) if tolerance is None else float(tolerance)
     return Row(source, quantity, printed, float(computed), chosen, reason, erratum, corrected)
 
 

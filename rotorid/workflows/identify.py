@@ -259,7 +259,9 @@ def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, 
         )
     usual = min(max(2, len(file.model.parameters)), len(frequencies))
     number = usual if choose is None else choose
-    return design(file.model, guess, frequencies, number, errors=file.errors, inputs=_inputs(file, found))
+    read = [name for name in file.model.outputs if name not in file.unmeasured]
+    inputs = _inputs(file, found)
+    return design(file.model, guess, frequencies, number, errors=file.errors, inputs=inputs, measured=read)
 
 
 def _inputs(file: HarmonicFile, found: Identification | None) -> dict[str, complex]:

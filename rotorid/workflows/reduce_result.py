@@ -128,15 +128,7 @@ class ReducedRotor(Parts):
         """To print: one HTML file."""
         from rotorid.report.reduction import reduce_report
 
-        return reduce_report(
-            self.to_dict(),
-            self.result,
-            provenance=self.provenance,
-            placement=self.placement,
-            methods=self.methods,
-            response=self.response,
-            stability=self.stability,
-        )
+        return reduce_report(self.to_dict(), self.parts, self.provenance)
 
     def with_small(self) -> ReducedRotor:
         """The same with the small model, which needs a rotor."""
@@ -178,7 +170,6 @@ class ReducedRotor(Parts):
         return ode_model_bytes(
             motion,
             {x: float(f"{0.02 * c:.3g}") for x, c in critical.items()},
-            {},
             comments=said,
             inputs=inputs,
             outputs=None if set(masses) == set(motion.coordinates) else masses,

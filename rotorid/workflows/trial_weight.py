@@ -186,7 +186,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
     missing = [name for name in ("speed", "radius") if getattr(options, name) is None]
     if load is None:
         missing.insert(0, "rotor-mass (or --bearing-load)")
-    if options.speed is None or options.radius is None or missing:
+    if options.speed is None or options.radius is None or load is None:
         raise ValueError(f"without a job, give --{' and --'.join(missing)}")
     shown = units.one_of(units.MASS)(options.unit)
     labels = Labels(
@@ -200,7 +200,7 @@ def _from_force(options: TrialWeightOptions, load: float | None) -> TrialWeight:
         "1",
         speed,
         size(options.radius, "--radius", "200mm"),
-        bearing_load=load,
+        load,
         fraction=options.fraction / 100,
         limit=inf if most is None else mass(most, "--max-mass", "30g"),
         phase=None if phase is None else labels.leading(radians(degrees(phase, "--reading-phase"))),

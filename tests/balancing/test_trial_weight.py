@@ -8,7 +8,7 @@ import pytest
 from balancing import Influence, Labels, ReadingErrors
 from balancing.coefficients.coefficients_from_model import model_influence
 from balancing.trial_angle import expected_lag, opposing_angle
-from balancing.trial_weight import force_amount, trial_from_coefficients, trial_from_force
+from balancing.trial_weight import GRAVITY, plane_load, trial_from_coefficients, trial_from_force
 from rotorid.plots import plot
 from rotorid.samples import sample_data
 from rotorid.tables import read_rotor
@@ -18,30 +18,45 @@ GRAMS = Labels(weight_unit="g", weight_scale=1e3)
 
 
 def test_amount_makes_a_tenth_of_the_load():
-    mass, load = force_amount(RPM3000, 0.2, rotor_mass=500)
+    load = plane_load(500, None)
     assert load == pytest.approx(500 * 9.80665)
+    found = trial_from_force("A", RPM3000, 0.2, load)
+    assert found.load == load
     # 490.3325 N / (0.2 m · 98696.04 s⁻²)
-    assert mass == pytest.approx(0.02484054, rel=1e-6)
-    assert mass * 0.2 * RPM3000**2 == pytest.approx(0.1 * load)
-    assert force_amount(RPM3000, 0.2, rotor_mass=500, planes=2)[0] == pytest.approx(mass / 2)
-    assert force_amount(RPM3000, 0.2, bearing_load=2500, fraction=0.05)[0] == pytest.approx(125 / 19739.2088)
+    assert found.amount == pytest.approx(0.02484054, rel=1e-6)
+    assert found.amount * 0.2 * RPM3000**2 == pytest.approx(0.1 * load)
+    assert plane_load(500, None, 2) == pytest.approx(load / 2)
+    assert plane_load(None, 2500) == 2500
+    assert plane_load(None, None) is None
+    assert trial_from_force("A", RPM3000, 0.2, 2500, fraction=0.05).amount == pytest.approx(125 / 19739.2088)
 
 
 @pytest.mark.parametrize(
-    ("speed", "radius", "options", "words"),
+    ("speed", "radius", "load", "fraction", "words"),
     [
-        (RPM3000, 0.0, {"rotor_mass": 500}, "radius must be a finite number above 0, not 0"),
-        (0.0, 0.2, {"rotor_mass": 500}, "speed must be"),
-        (RPM3000, 0.2, {"rotor_mass": -1}, "mass of the rotor must be"),
-        (RPM3000, 0.2, {"bearing_load": inf}, "load of the bearing must be"),
-        (RPM3000, 0.2, {"rotor_mass": 1, "fraction": 0}, "fraction of the load must be"),
-        (RPM3000, 0.2, {}, "one of them"),
-        (RPM3000, 0.2, {"rotor_mass": 1, "bearing_load": 1}, "one of them"),
+        (RPM3000, 0.0, 5e3, 0.1, "radius must be a finite number above 0, not 0"),
+        (0.0, 0.2, 5e3, 0.1, "speed must be"),
+        (RPM3000, 0.2, inf, 0.1, "load of the plane must be"),
+        (RPM3000, 0.2, 10.0, 0, "fraction of the load must be"),
     ],
 )
-def test_impossible_loads(speed, radius, options, words):
+def test_impossible_forces(speed, radius, load, fraction, words):
     with pytest.raises(ValueError, match=words):
-        force_amount(speed, radius, **options)
+        trial_from_force("A", speed, radius, load, fraction=fraction)
+
+
+@pytest.mark.parametrize(
+    ("loads", "words"),
+    [
+        ((-1, None), "mass of the rotor must be"),
+        ((None, inf), "load of the bearing must be"),
+        ((1, 1), "one of them"),
+        ((1, None, 0), "number of planes must be"),
+    ],
+)
+def test_impossible_loads(loads, words):
+    with pytest.raises(ValueError, match=words):
+        plane_load(*loads)
 
 
 def simulated_phase(heavy, eta, zeta, sensor, key, quantity):
@@ -140,7 +155,7 @@ def test_limit_cuts_what_follows_from_the_share_and_refuses_what_is_stated():
         trial_from_coefficients(W, READINGS, "left", amount=0.007, limit=0.006)
     assert trial_from_coefficients(W, READINGS, "left", amount=0.006, limit=0.006).amount == 0.006
     with pytest.raises(ValueError, match=r"24.84 g is larger .* 20 g: take at most 8.05 % of the load"):
-        trial_from_force("A", RPM3000, 0.2, rotor_mass=500, limit=0.02, labels=GRAMS)
+        trial_from_force("A", RPM3000, 0.2, 500 * GRAVITY, limit=0.02, labels=GRAMS)
 
 
 def test_weights_too_small_or_too_large_are_named():
@@ -155,8 +170,8 @@ def test_weights_too_small_or_too_large_are_named():
     heavy = trial_from_coefficients(W, READINGS, "left", radius=0.2, load=100.0)
     assert heavy.force == pytest.approx(heavy.amount * 0.2 * RPM3000**2)
     assert "% of the load, more than 25 %" in heavy.warnings[0]
-    assert trial_from_force("A", RPM3000, 0.2, rotor_mass=5, fraction=0.25).warnings == ()
-    assert "26 % of the load" in trial_from_force("A", RPM3000, 0.2, rotor_mass=5, fraction=0.26).warnings[0]
+    assert trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, fraction=0.25).warnings == ()
+    assert "26 % of the load" in trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, fraction=0.26).warnings[0]
 
 
 def test_trial_radius_different_from_that_of_the_coefficients():
@@ -193,7 +208,7 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match="plane 'left' acts on no reading"):
         trial_from_coefficients(influence([[[0.0, 1.0], [0.0, 1.0]]]), READINGS, "left")
     with pytest.raises(ValueError, match="needs both the phase"):
-        trial_from_force("A", RPM3000, 0.2, rotor_mass=5, phase=1.0)
+        trial_from_force("A", RPM3000, 0.2, 5 * GRAVITY, phase=1.0)
     with pytest.raises(ValueError, match="quantity must be one of"):
         opposing_angle(0.0, 0.0, quantity="speed")
 
@@ -204,7 +219,7 @@ def test_force_with_an_angle_in_the_conventions_of_the_job():
         "A",
         RPM3000,
         0.2,
-        rotor_mass=500,
+        500 * GRAVITY,
         phase=radians(30),
         lag=expected_lag("below"),
         labels=labels,
@@ -222,7 +237,7 @@ def test_force_with_an_angle_in_the_conventions_of_the_job():
     arrow = plot(found).lines[0]
     assert arrow.get_xdata()[1] == pytest.approx(radians(105))
     assert arrow.get_ydata()[1] == pytest.approx(24.84, abs=0.005)
-    without = trial_from_force("A", RPM3000, 0.2, rotor_mass=500, labels=labels)
+    without = trial_from_force("A", RPM3000, 0.2, 500 * GRAVITY, labels=labels)
     assert without.to_dict()["angle_deg"] is None
     assert "any angle" in without.summary()
     with pytest.raises(ValueError, match="has no angle to draw"):

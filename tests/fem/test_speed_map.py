@@ -81,16 +81,6 @@ def test_intersections_with_constant_and_tabulated_supports():
     assert [label for label, _, _ in found.own] == ["front", "rear, x", "rear, y"]
 
 
-def test_a_subset_of_supports():
-    rotor = uniform(
-        10, supports=[fem.Support(1, 1e8, name="left"), fem.Support(11, 1e8), fem.Support(6, 1e7, name="mid")]
-    )
-    found = fem.speed_map(rotor, [1e7], n=2, supports=["mid"])
-    np.testing.assert_allclose(found.speeds[0], fem.critical_speeds(rotor, 2).frequencies)
-    again = fem.speed_map(rotor, [1e7], n=2, supports=[3])
-    np.testing.assert_allclose(again.speeds, found.speeds)
-
-
 def test_pedestals_in_series():
     soft = fem.Support(1, 1e8, pedestal=fem.Pedestal(10.0, 1e8))
     rotor = uniform(10, supports=[soft, fem.Support(11, 5e7)])
@@ -114,9 +104,6 @@ def test_results_speak():
         ([-1.0, 1e7], {}, "above 0"),
         ([math.inf], {}, "finite"),
         (["stiff"], {}, "numbers"),
-        ([1e8], {"supports": ["nobody"]}, "no support is called"),
-        ([1e8], {"supports": [3]}, "supports 1 to 2"),
-        ([1e8], {"supports": []}, "choose one support"),
         ([1e8], {"n": 0}, "cannot be found"),
     ],
 )

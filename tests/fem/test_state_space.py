@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from cases import each_of
-from exact_solutions import whirl_exactly
+from exact_solutions import frequency_response, whirl_exactly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigvals
@@ -89,7 +89,7 @@ def test_random_systems_keep_eigenvalues_and_receptance(drawn):
     omega = np.array([0.0, 0.7, 3.1, 40.0])
     w = omega[:, None, None]
     dynamic = motion.K + 1j * w * motion.C - w * w * motion.M
-    H = model.frequency_response(omega)
+    H = frequency_response(model, omega)
     unit = np.abs(H @ dynamic - np.eye(len(motion.M)))
     assert (
         unit.max(axis=(1, 2)) < 1e-10 * np.abs(H).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
@@ -138,7 +138,7 @@ def test_scipy_takes_it_and_answers_alike():
     omega = np.array([0.4, 2.0])
     dynamic = motion.K + 1j * omega[:, None, None] * motion.C - omega[:, None, None] ** 2 * motion.M
     expected = np.linalg.inv(dynamic)[:, [2, 0]][:, :, [1, 0]]
-    np.testing.assert_allclose(model.frequency_response(omega), expected, rtol=1e-10)
+    np.testing.assert_allclose(frequency_response(model, omega), expected, rtol=1e-10)
     system = ScipyStateSpace(*model)
     for k, w in enumerate(omega):
         theirs = system.C @ np.linalg.solve(1j * w * np.eye(len(A)) - system.A, system.B) + system.D
@@ -151,7 +151,7 @@ def test_velocities():
     undamped = next(i for i in massless if not motion.C[i].any())
     others = [name for i, name in enumerate(motion.coordinates) if i != undamped]
     model = state_space(motion, outputs=[*others, *(f"v_{name}" for name in others)])
-    H = model.frequency_response([0.9, 2.5])
+    H = frequency_response(model, [0.9, 2.5])
     iw = 1j * np.array([0.9, 2.5])[:, None, None]
     np.testing.assert_allclose(H[:, 4:], iw * H[:, :4], rtol=1e-9, atol=1e-12)
     name = motion.coordinates[undamped]
@@ -159,7 +159,7 @@ def test_velocities():
         state_space(motion, outputs=[f"v_{name}"])
     # its velocity exists where no force acts on it at once
     force = next(f"f_{motion.coordinates[i]}" for i in range(5) if motion.M[i].any())
-    both = state_space(motion, inputs=[force], outputs=[name, f"v_{name}"]).frequency_response(0.9)[0]
+    both = frequency_response(state_space(motion, inputs=[force], outputs=[name, f"v_{name}"]), 0.9)[0]
     assert both[1, 0] == pytest.approx(0.9j * both[0, 0], rel=1e-10)
 
 
@@ -262,13 +262,9 @@ def test_names_are_checked():
         state_space(motion_of(np.eye(2), np.eye(2), np.eye(2), ("x1", "x1")))
 
 
-def test_frequencies_of_an_undamped_system():
+def test_an_undamped_system():
     model = state_space(motion_of(1.0, 0.0, 4.0))
-    with pytest.raises(ValueError, match="exactly an undamped natural frequency"):
-        model.frequency_response([1.0, 2.0])
-    with pytest.raises(ValueError, match="finite numbers"):
-        model.frequency_response([np.nan])
-    assert model.frequency_response(1.0)[0, 0, 0] == pytest.approx(1 / 3)
+    assert frequency_response(model, 1.0)[0, 0, 0] == pytest.approx(1 / 3)
     document = model.to_dict()
     assert document["A"] == [[0.0, 1.0], [-4.0, 0.0]]
     assert document["states"] == ["x1", "v_x1"]

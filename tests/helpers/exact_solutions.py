@@ -35,3 +35,10 @@ def whirl_exactly(rotor, speed, n=6):
     size = np.sqrt((np.abs(x) ** 2 + np.abs(y) ** 2).max(axis=1))
     said = missing_modes(P.planes, real, still, lam.size, n)
     return WhirlModes(float(speed), lam, x.T / size, y.T / size, real, 0.0, rotor, said)
+
+
+def frequency_response(model, omega):
+    """C (iω − A)⁻¹ B + D at frequencies in rad/s, shape (S, outputs, inputs)."""
+    A, B, C, D = model
+    iw = 1j * np.atleast_1d(omega)[:, None, None] * np.eye(len(A))
+    return C @ np.linalg.solve(iw - A, np.broadcast_to(B, (len(iw), *B.shape))) + D

@@ -5,7 +5,6 @@ import re
 from rotorid.samples import sample_data
 from rotorid.tables.job import job_keys
 from rotorid.tables.models import harmonic_file, matrix_form, ode_file, shared_keys
-from rotorid.tables.reader.settings_keys import key_lines
 from rotorid.tables.rotor import bearing, rotor_file
 
 PAGE = sample_data().parent / "docs" / "files.md"
@@ -28,6 +27,16 @@ TABLES = {
     "key of [[disc]]": rotor_file.DISC,
     "key of [[bearing]]": bearing.KEYS_OF["bearing"],
 }
+
+
+def key_lines(keys, what="key"):
+    """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
+    lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
+    for key in keys:
+        names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
+        words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
+        lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
+    return lines
 
 
 def with_tables(text):

@@ -1,7 +1,10 @@
 """Models and records of [Q] and [F], and oscillators, for tests of fits."""
 
+import tomllib
+
 import numpy as np
 
+import fem
 from rotorid.timedomain.integration.simulate import simulate
 from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
@@ -94,3 +97,16 @@ def van_der_pol_record(**options):
     t, rng = np.linspace(0.0, 25.0, 126), np.random.default_rng(1)
     x = simulate(van_der_pol(), [10.0], t, sensitivities=False).y[:, 0]
     return Record(t, {"x": x + 0.05 * rng.standard_normal(len(t))}, **options)
+
+
+def motion_in(path, values=()):
+    """M, C and K of a model file, its parameters at their starting values or at these."""
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    put = said["estimate"] | dict(values)
+
+    def entry(cell):
+        parts = cell.split(" + ") if isinstance(cell, str) else [cell]
+        return sum(float(put.get(part, part)) for part in parts)
+
+    M, C, K = (np.array([[entry(cell) for cell in row] for row in said[key]]) for key in "MCK")
+    return fem.Motion(M, C, K, tuple(said["coordinates"]), said.get("speed_rad_s", 0.0))

@@ -82,12 +82,9 @@ def fit_modes(
     ]
     best = max(found, key=lambda one: one[0])
     _, fit, readings, left = best
-    q = fit.estimate.solution
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    residues = np.transpose(readings.each(2, q))[: len(rows)]
-    spread = np.swapaxes(readings.each(3, q), 0, 1)[: len(rows)]
     same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
-    return FittedModes(tuple(points), fit, residues, spread, ends, float(trend), same, experiments.axis)
+    return FittedModes(tuple(points), fit, ends, float(trend), same, experiments, readings)
 
 
 def _search(

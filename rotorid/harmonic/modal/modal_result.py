@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, error_figures, listing
-from rotorid.base.unit_words import Shown
 from rotorid.harmonic.comparison import reference_amplitude
+from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.modal.modal_readings import Readings
 from rotorid.harmonic.plausibility import misfit
 from rotorid.regression.nonlinear import NonlinearEstimate
 
@@ -37,27 +38,23 @@ class FittedModes(Answered):
         Where amplitudes were read, length P.
     fit
         ω_r in rad/s, then ζ_r.
-    residues, spread
-        R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for the variance
-        of the residuals where no errors are stated.
     ends
         First and last frequency around each resonance, rad/s.
     trend
         Correlation of neighbouring residuals, in its standard deviations.
     same
         What errors that are not stated were taken to be the same in.
-    axis
-        How people see frequencies.
+    experiments, readings
+        What was fitted, by rising frequency, and the same under its excitation, whitened.
     """
 
     points: tuple[str, ...]
     fit: NonlinearEstimate
-    residues: ComplexArray
-    spread: FloatArray
     ends: tuple[tuple[float, float], ...]
     trend: float
     same: str
-    axis: Shown
+    experiments: Experiments
+    readings: Readings
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
@@ -79,12 +76,15 @@ class FittedModes(Answered):
     @cached_property
     def parts(self) -> tuple[FloatArray, FloatArray]:
         """Residues along and across the common phase of their mode, and their variances, (2, k, P) each."""
-        phase = np.angle((self.residues**2 / np.trace(self.spread, axis1=2, axis2=3)).sum(axis=1)) / 2
+        k, q = len(self.ends), self.fit.estimate.solution
+        residues = np.transpose(self.readings.each(2, q))[:k]
+        spread = np.swapaxes(self.readings.each(3, q), 0, 1)[:k]  # at this q, of whitened readings
+        phase = np.angle((residues**2 / np.trace(spread, axis1=2, axis2=3)).sum(axis=1)) / 2
         turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
-        turned = self.residues * np.exp(-1j * phase[:, None])
+        turned = residues * np.exp(-1j * phase[:, None])
         estimate = self.fit.estimate
         unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
-        variances = np.einsum("aik,kpij,ajk->akp", turn, self.spread, turn)
+        variances = np.einsum("aik,kpij,ajk->akp", turn, spread, turn)
         variances *= 1.0 if estimate.errors_stated else unit
         least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
         return np.stack((np.copysign(least, turned.real), turned.imag)), variances
@@ -158,7 +158,8 @@ class FittedModes(Answered):
         estimate = self.fit.estimate
         if self.undetermined:
             return Answer("Not every mode is determined: no table of modes.", "", self.warnings)
-        told = [f"{self.axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
+        axis = self.experiments.axis
+        told = [f"{axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
         shapes = [Column("point", self.points, str)]
         for mode, (shape, std) in enumerate(zip(self.shapes, self.shape_std, strict=True), 1):
             shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
@@ -169,7 +170,7 @@ class FittedModes(Answered):
                 f"errors are not stated: the same {self.same}, as what is left of the amplitudes shows"
             )
         return Answer(
-            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {self.axis.word.rpartition(', ')[2]}.",
+            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {axis.word.rpartition(', ')[2]}.",
             f"{estimate.told().found}\n\n{text(shapes, width=COLUMNS)}",
             self.warnings,
             tuple(notes),

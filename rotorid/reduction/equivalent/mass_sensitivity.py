@@ -25,12 +25,11 @@ from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
     Normalisation,
     RowWeights,
     design,
-    equivalent_masses,
     normalised,
     row_factors,
 )
 from rotorid.reduction.equivalent.small_model_modes import natural_frequencies
-from rotorid.regression import Estimate, gain
+from rotorid.regression import gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,13 +150,6 @@ class Inputs:
         domega = -0.5 * omega * dlam / (lam * (masses @ x**2))
         return np.stack((dm, domega), axis=1)
 
-    def estimate(self) -> Estimate:
-        """The masses of (50)."""
-        return equivalent_masses(
-            self.alpha, self.omega, self.U,
-            seal_stiffness=self.springs, normalise=self.normalise, rows=self.rows,
-        )  # fmt: skip
-
 
 def inputs(
     compliance: ArrayLike,
@@ -184,46 +176,6 @@ def inputs(
         *(f"c{i + 1}" for i in range(n)),
     )
     return Inputs(alpha, omega, U, springs, normalise, rows, names)
-
-
-def mass_sensitivity(
-    compliance: ArrayLike,
-    frequencies: ArrayLike,
-    shapes: ArrayLike,
-    *,
-    seal_stiffness: ArrayLike = 0.0,
-    normalise: Normalisation = "first",
-    rows: RowWeights = "equal",
-) -> FloatArray:
-    """Say how much errors of the inputs move the masses of (50).
-
-    Parameters
-    ----------
-    compliance, frequencies, shapes, seal_stiffness, normalise, rows
-        As in `equivalent_masses`.
-
-    Returns
-    -------
-    Standard deviation of each mass over its value, per unit relative standard deviation of every compliance
-    (symmetric) and every shape ordinate except the first, all independent; shape (n,). First order. Errors
-    of your own, and what they do to frequencies: `mass_uncertainty`.
-
-    Raises
-    ------
-    ValueError
-        As in `equivalent_masses`, and for masses that the modes do not determine.
-    """
-    p = inputs(compliance, frequencies, shapes, seal_stiffness=seal_stiffness, normalise=normalise, rows=rows)
-    estimate = p.estimate()
-    if not estimate.full_rank:
-        raise ValueError(f"masses that are not determined have no sensitivity: {estimate.describe_rank()}")
-    n, k = p.U.shape
-    model, x = natural_frequencies(p.alpha, estimate.values, seal_stiffness=p.springs)
-    change = p.gradients(estimate.values, model, x)[:, 0]
-    compliances, ordinates = n * (n + 1) // 2, n * (n + 1) // 2 + k
-    used = np.r_[0:compliances, ordinates + k : ordinates + n * k]  # without the first mass's ordinates
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.linalg.norm(change[used], axis=0) / np.abs(estimate.values))
 
 
 def standard_deviations(errors: InputErrors, p: Inputs) -> FloatArray:

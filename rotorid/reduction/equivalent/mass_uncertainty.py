@@ -20,7 +20,11 @@ from rotorid.base.result import Column, frame, text
 from rotorid.base.rpm import RPM
 from rotorid.base.text import error_figures
 from rotorid.reduction.equivalent.changed_inputs import Shift, labels, units
-from rotorid.reduction.equivalent.equivalent_masses_formula_50 import Normalisation, RowWeights
+from rotorid.reduction.equivalent.equivalent_masses_formula_50 import (
+    Normalisation,
+    RowWeights,
+    equivalent_masses,
+)
 from rotorid.reduction.equivalent.mass_sensitivity import (
     InputErrors,
     Inputs,
@@ -91,6 +95,20 @@ class MassUncertainty(Answered):
         """Standard deviations of the model's frequencies, rad/s, shape (n,)."""
         return np.asarray(np.sqrt(np.diag(self.frequencies_covariance)))
 
+    @property
+    def sensitivity(self) -> FloatArray:
+        """Standard deviation of each mass over its value, shape (n,), first order; not by the stated errors.
+
+        Per unit relative standard deviation of every compliance (symmetric) and every shape ordinate except
+        those at the first mass, all independent.
+        """
+        n, k = self._problem.U.shape
+        compliances, ordinates = n * (n + 1) // 2, n * (n + 1) // 2 + k
+        used = np.r_[0:compliances, ordinates + k : ordinates + n * k]
+        change = np.array([self.gradients[name][0] for name in self._problem.names])
+        with np.errstate(divide="ignore"):
+            return np.asarray(np.linalg.norm(change[used], axis=0) / np.abs(self.masses))
+
     def shift(self, changes: Mapping[str, float]) -> Shift:
         """Predict what given relative changes of inputs do, such as {"alpha12": 0.013}.
 
@@ -120,19 +138,6 @@ class MassUncertainty(Answered):
         text = f"first order is poor for changes of this size: {', '.join(which)}; use the exact values"
         said = (text,) if which else ()
         return Shift(first[0], first[1], exact[0], exact[1], said)
-
-    def draw(self, errors: InputErrors, count: int = 1000, seed: int = 0) -> FloatArray:
-        """Exact masses and frequencies, (count, 2, n), for inputs drawn from normal errors.
-
-        A frequency is NaN where the drawn inputs give a model in which that mode does not vibrate.
-
-        Raises
-        ------
-        ValueError
-            For errors whose shape does not fit, or so large that a frequency is drawn below zero.
-        """
-        sigma = standard_deviations(errors, self._problem)
-        return self._problem.exact(np.random.default_rng(seed).normal(size=(count, len(sigma))) * sigma)
 
     def to_frame(self) -> pd.DataFrame:
         """A row per mass and per frequency: value, std, nonlinearity, and the share of each input."""
@@ -240,7 +245,7 @@ def mass_uncertainty(
     First order, by analytic derivatives; checked by exact recomputation at plus and minus one standard
     deviation of each input alone, and of all inputs together in the direction that moves each mass and each
     frequency most. The larger difference is `nonlinearity`; above 10 % `warnings` say so, and the standard
-    deviations give no more than the order of magnitude: draw inputs instead (`draw`).
+    deviations give no more than the order of magnitude: take `drawn` instead.
 
     Examples
     --------
@@ -248,10 +253,9 @@ def mass_uncertainty(
     >>> print(found.masses_std.round(3))
     [0.509 0.509]
     """
-    problem = inputs(
-        compliance, frequencies, shapes, seal_stiffness=seal_stiffness, normalise=normalise, rows=rows
-    )
-    estimate = problem.estimate()
+    how: dict[str, Any] = {"seal_stiffness": seal_stiffness, "normalise": normalise, "rows": rows}
+    problem = inputs(compliance, frequencies, shapes, **how)
+    estimate = equivalent_masses(compliance, frequencies, shapes, **how)
     if not estimate.full_rank:
         raise ValueError(
             f"there is no uncertainty of masses that are not determined: {estimate.describe_rank()}; use "

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 def ode_model_bytes(
     motion: Motion,
     dampers: Mapping[str, float],
-    initial: Mapping[str, float],
     *,
     comments: Sequence[str] = (),
     inputs: Sequence[str] = (),
@@ -24,10 +23,9 @@ def ode_model_bytes(
 ) -> bytes:
     """A model file of M y'' + C y' + K y = f whose dampers to the ground are to be estimated.
 
-    It is read by `read_ode_model` (time records), by `read_harmonic_model` (amplitudes) and, in its matrix
-    form, by `read_motion`. Where a coordinate has no mass, the matrices cannot be integrated: the file holds
-    the states of `fem.state_space` instead, in which damped massless coordinates are of first order and
-    undamped ones are eliminated.
+    It is read by `read_ode_model` (time records) and by `read_harmonic_model` (amplitudes). Where a
+    coordinate has no mass, the matrices cannot be integrated: the file holds the states of `fem.state_space`
+    instead, in which damped massless coordinates are of first order and undamped ones are eliminated.
 
     Parameters
     ----------
@@ -36,8 +34,6 @@ def ode_model_bytes(
     dampers
         {displacement: starting value of its damper, N·s/m}; the parameter of `x7` is called `d_x7`. Empty:
         nothing is estimated. In the form of states each needs a displacement with mass.
-    initial
-        Initial values {displacement or velocity: value} that are not 0; in the form of states, of states.
     comments
         Lines at the top.
     inputs
@@ -56,10 +52,10 @@ def ode_model_bytes(
     Raises
     ------
     ValueError
-        Numbers that are not finite, names that do not exist, a damper at a massless displacement, and what
-        `fem.state_space` refuses.
+        Matrices that are not finite, names that do not exist or stand twice, a damper at a massless
+        displacement, and what `fem.state_space` refuses.
     """
-    _check(motion, dampers, initial, inputs, outputs)
+    _check(motion, inputs, outputs)
     massless = np.asarray(~(motion.M.any(axis=0) | motion.M.any(axis=1)), dtype=bool)
     lines = [f"# {part}" for line in comments for part in line.splitlines() or [""]]
     if motion.speed:
@@ -67,9 +63,9 @@ def ode_model_bytes(
     if inputs:
         lines.append(f"inputs = {_names(inputs)}")
     if massless.any():
-        lines += _states(motion, massless, dampers, initial, inputs, outputs)
+        lines += _states(motion, massless, dampers, inputs, outputs)
     else:
-        lines += _matrices(motion, dampers, initial, inputs, outputs)
+        lines += _matrices(motion, dampers, inputs, outputs)
     lines += ["", "[estimate]", *(f"d_{name} = {float(value)!r}" for name, value in dampers.items())]
     if dampers:
         lines += ["", "[bounds]", *(f"d_{name} = [0, inf]" for name in dampers)]
@@ -79,7 +75,6 @@ def ode_model_bytes(
 def _matrices(
     motion: Motion,
     dampers: Mapping[str, float],
-    initial: Mapping[str, float],
     inputs: Sequence[str],
     outputs: Sequence[str] | None,
 ) -> list[str]:
@@ -97,8 +92,6 @@ def _matrices(
         lines += [f"{key} = [", *(f"  [{', '.join(row)}]," for row in rows), "]"]
     if inputs:
         lines += ["", "[force]", *(f'{name.removeprefix("f_")} = "{name}"' for name in inputs)]
-    if initial:
-        lines += ["", "[initial]", *(f"{name} = {_number(value)}" for name, value in initial.items())]
     if outputs is not None:
         lines += ["", "[outputs]", *(f'{name} = "{name}"' for name in outputs)]
     return lines
@@ -108,7 +101,6 @@ def _states(
     motion: Motion,
     massless: BoolArray,
     dampers: Mapping[str, float],
-    initial: Mapping[str, float],
     inputs: Sequence[str],
     outputs: Sequence[str] | None,
 ) -> list[str]:
@@ -142,10 +134,7 @@ def _states(
             if share:
                 text += f" - ({_number(share)})*d_{name}*({velocity[f'v_{name}']})"
         lines.append(f'{state} = "{text}"')
-    if lost := [name for name in initial if name not in model.states]:
-        raise ValueError(f"initial: {lost[0]} is no state; they are {', '.join(model.states)}")
-    lines += ["", "[initial]", *(f"{name} = {_number(initial.get(name, 0.0))}" for name in model.states)]
-    lines += ["", "[outputs]"]
+    lines += ["", "[initial]", *(f"{name} = 0" for name in model.states), "", "[outputs]"]
     for i, name in enumerate(shown):
         lines.append(f'{name} = "{_sum([*C[i], *D[i, u]], [*model.states, *inputs])}"')
     return lines
@@ -161,34 +150,16 @@ def _sum(values: Sequence[float], names: Sequence[str]) -> str:
     return " + ".join(terms) or "0"
 
 
-def _check(
-    motion: Motion,
-    dampers: Mapping[str, float],
-    initial: Mapping[str, float],
-    inputs: Sequence[str],
-    outputs: Sequence[str] | None,
-) -> None:
+def _check(motion: Motion, inputs: Sequence[str], outputs: Sequence[str] | None) -> None:
     for key in "MCK":
         if not np.isfinite(getattr(motion, key)).all():
             raise ValueError(f"{key} holds numbers that are not finite: such a model cannot be written")
-    for what, values in (("dampers", dampers), ("initial", initial)):
-        for name, value in values.items():
-            if not np.isfinite(value):
-                raise ValueError(f"{what}: the value of {name} must be a finite number, not {value!r}")
-    for name in dampers:
-        motion.index(name)
-        if dampers[name] < 0:
-            raise ValueError(
-                f"dampers: the starting value of {name} must be 0 or more, not {dampers[name]:g}"
-            )
     forces, rates = ([f"{kind}_{name}" for name in motion.coordinates] for kind in "fv")
     _check_names("input", inputs, forces)
     _check_names("output", outputs or (), [*motion.coordinates, *rates])
 
 
 def _check_names(kind: str, chosen: Sequence[str], allowed: Sequence[str]) -> None:
-    if isinstance(chosen, str):
-        raise ValueError(f"{kind}s must be a list of names, not the one name {chosen!r}")
     for i, name in enumerate(chosen):
         if name not in allowed:
             raise ValueError(f"no {kind} {name!r} in this model: they are named like {allowed[0]}")

@@ -50,8 +50,6 @@ class Column:
         Whether the table is unusable without it.
     blank
         Whether a cell may be empty: NaN or `""` then, and the reader of the table decides.
-    no_unit
-        Whether the unit may be left out.
     """
 
     stem: str
@@ -59,7 +57,6 @@ class Column:
     examples: tuple[str, ...] = ()
     required: bool = True
     blank: bool = False
-    no_unit: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:

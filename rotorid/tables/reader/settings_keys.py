@@ -184,13 +184,3 @@ def object_schema(keys: Sequence[Key]) -> dict[str, Any]:
 def file_schema(keys: Sequence[Key], title: str) -> dict[str, Any]:
     """Keys of a whole file as a JSON schema (draft 2020-12), for editors."""
     return {"$schema": DRAFT, "title": title, **object_schema(keys)}
-
-
-def key_lines(keys: Sequence[Key], what: str = "key") -> list[str]:
-    """Keys as a table in Markdown: names, what is said about them, and how their values are written."""
-    lines = [f"| {what} | meaning | such as |", "|---|---|---|"]
-    for key in keys:
-        names = ", ".join(f"`{key.kind.header.format(name)}`" for name in key.names)
-        words = [f'"{word}"' for word in key.kind.schema.get("enum", ())] or [key.kind.example]
-        lines.append(f"| {names} | {key.about} | {', '.join(f'`{word}`' for word in words if word)} |")
-    return lines

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 Value = str | int | float | bool | None
 
 
-def write_table(
-    path: str | Path, frame: pd.DataFrame, *, comments: Sequence[str] = (), sheet: str = "table"
-) -> None:
+def write_table(path: str | Path, frame: pd.DataFrame) -> None:
     """Write a table to `.csv` or `.xlsx`, whole or not at all.
 
     Numbers keep all their digits; NaN and None become blanks. Text that a spreadsheet could take for a
@@ -34,23 +32,19 @@ def write_table(
         Ends in `.csv` or `.xlsx`; an existing file is replaced.
     frame
         The table; its index is not written.
-    comments
-        Lines above the header.
-    sheet
-        Name of the sheet in a workbook.
 
     Raises
     ------
     InputError
         If the file cannot be written.
     """
-    write_bytes(Path(path), table_bytes(path, frame, comments=comments, sheet=sheet))
+    write_bytes(Path(path), table_bytes(path, frame))
 
 
 def table_bytes(
     path: str | Path, frame: pd.DataFrame, *, comments: Sequence[str] = (), sheet: str = "table"
 ) -> bytes:
-    """What `write_table` writes to a file of this name."""
+    """What `write_table` writes to a file of this name, with comment lines above the header."""
     path = Path(path)
     kind = path.suffix.lower()
     names = [str(name) for name in frame.columns]

@@ -149,22 +149,6 @@ class Section:
             self.complain(key, "a text in quotes")
         return value if isinstance(value, str) else ""
 
-    def choice(self, key: str, allowed: tuple[str, ...], default: str) -> str:
-        """One of several texts."""
-        value = self.take(key)
-        if value is None or value in allowed:
-            return default if value is None else str(value)
-        hint = did_you_mean(value, allowed) if isinstance(value, str) else ""
-        self.complain(key, listing(repr(option) for option in allowed) + hint)
-        return default
-
-    def flag(self, key: str) -> bool:
-        """True or false; false if not there."""
-        value = self.take(key)
-        if value is not None and not isinstance(value, bool):
-            self.complain(key, "true or false, without quotes (in a sheet: yes or no)")
-        return value is True
-
     def section(self, key: str) -> Section | None:
         """A table of settings, None if there is none."""
         value = self.take(key)

@@ -62,7 +62,6 @@ def simulate(
     method: str = "auto",
     rtol: float = 1e-10,
     sensitivities: bool = True,
-    x0: ArrayLike | None = None,
 ) -> Trajectory:
     """Solve a model over the times of a record.
 
@@ -81,8 +80,6 @@ def simulate(
         Relative tolerance of "dop853" and "lsoda"; the absolute one follows the size of each state.
     sensitivities
         Whether to solve for the derivatives too.
-    x0
-        Initial states (n_x,) instead of the model's own (then independent of the parameters).
 
     Raises
     ------
@@ -99,7 +96,7 @@ def simulate(
         raise ValueError(
             f"theta must be {len(model.parameters)} finite numbers ({', '.join(model.parameters)})"
         )
-    longer = record if x0 is not None else from_t0(model, record)
+    longer = from_t0(model, record)
     if longer is not record:
         run = simulate(model, values, longer, method=method, rtol=rtol, sensitivities=sensitivities)
         return Trajectory(run.t[1:], run.x[1:], run.S[1:], run.y[1:], run.y_theta[1:], run.method)
@@ -109,9 +106,10 @@ def simulate(
         x, s, used = np.zeros((len(t), 0)), np.zeros((len(t), 0, len(values))), "none"
     else:
         system = Augmented(model, values, t, u, sensitivities)
-        x_0, s_0 = _start(model, values, x0, sensitivities)
-        check_finite(model, t[:1], x_0[None], s_0[None])
-        x, s, used = integrate(system, x_0, s_0, rtol)
+        x0 = model.x0(values)
+        s0 = model.x0_theta(values) if sensitivities else np.zeros((len(x0), 0))
+        check_finite(model, t[:1], x0[None], s0[None])
+        x, s, used = integrate(system, x0, s0, rtol)
         check_finite(model, t, x, s)
     y = model.h(t, x, values, u)
     y_theta = np.zeros((*y.shape, len(values)))
@@ -158,18 +156,6 @@ def simulated_record(
         y = y + drawn * [sigma[name] for name in model.outputs]
     columns = y.T if digits is None else [significant(column, digits) for column in y.T]
     return replace(plan, outputs=dict(zip(model.outputs, columns, strict=True)), sigma=sigma)
-
-
-def _start(
-    model: OdeModel, theta: FloatArray, x0: ArrayLike | None, sensitivities: bool
-) -> tuple[FloatArray, FloatArray]:
-    empty = np.zeros((len(model.states), len(theta) if sensitivities else 0))
-    if x0 is None:
-        return model.x0(theta), model.x0_theta(theta) if sensitivities else empty
-    start = np.array(x0, dtype=float)
-    if start.shape != (len(model.states),):
-        raise ValueError(f"x0 must be {len(model.states)} numbers ({', '.join(model.states)})")
-    return start, empty
 
 
 def _auto(

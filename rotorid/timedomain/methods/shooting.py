@@ -25,7 +25,7 @@ SAMPLES = 6
 """Of a piece, at least, by default."""
 STRICTNESS = (1.0, 10.0, 100.0)
 """Weights of the joints relative to the data, one search after the other."""
-TOLERANCE = 1e-6
+TOLERANCE, EVALUATIONS = 1e-6, 100
 """Of each search."""
 RTOL = 1e-7
 """Of the integration: this is only the way to a starting point."""
@@ -51,7 +51,6 @@ def shoot(
     upper: FloatArray,
     *,
     pieces: int | None = None,
-    max_iterations: int = 100,
 ) -> FloatArray:
     """Parameters (n,) from pieces that join.
 
@@ -67,8 +66,6 @@ def shoot(
         Bounds of the parameters.
     pieces
         Of each record; default: at most 12, each of six samples or more.
-    max_iterations
-        Of each search.
 
     Raises
     ------
@@ -89,9 +86,8 @@ def shoot(
     search.evaluate(z)
     for weight in STRICTNESS:
         search.weight = weight
-        search.forget()
         way = Search(search.residual, search.jacobian, "linear", TOLERANCE)
-        z, _, _ = drive(way, z, low, high, None, "linear", stated=True, limit=max_iterations)
+        z, _, _ = drive(way, z, low, high, "linear", stated=True, limit=EVALUATIONS)
     return z[:n]
 
 
@@ -106,10 +102,7 @@ class _Pieces:
         self.unit = (float(np.sqrt(np.mean(data**2))) or 1.0) * np.sqrt(len(data))
         size = np.abs(nodes).max(axis=0)
         self.scale = np.where(size > 0, size, 1.0)
-        self.forget()
-
-    def forget(self) -> None:
-        self.last: tuple[bytes, FloatArray, FloatArray] | None = None
+        self.last: tuple[tuple[bytes, float], FloatArray, FloatArray] | None = None
 
     def residual(self, z: FloatArray) -> FloatArray:
         try:
@@ -122,8 +115,9 @@ class _Pieces:
         return self.evaluate(z)[1]
 
     def evaluate(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        if self.last is None or self.last[0] != z.tobytes():
-            self.last = (z.tobytes(), *self._rows(z))
+        key = z.tobytes(), self.weight
+        if self.last is None or self.last[0] != key:
+            self.last = (key, *self._rows(z))
         return self.last[1], self.last[2]
 
     def _rows(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:

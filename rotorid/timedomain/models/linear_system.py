@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fem.state_space import StateSpace
 
 
-def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float = 0.0) -> StateSpace:
+def state_space(model: OdeModel, theta: ArrayLike | None = None) -> StateSpace:
     """Write a linear model as s' = A s + B u, y = C s + D u.
 
     Parameters
@@ -24,8 +24,6 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float
         Of `ode_model`, `second_order` or a file, with its inputs and outputs.
     theta
         Parameters, shape (n_p,); by default the starting values.
-    speed
-        At which the model holds, rad/s; it is only handed on.
 
     Returns
     -------
@@ -51,8 +49,6 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float
     values = model.start if theta is None else np.asarray(theta, dtype=float)
     if not np.isfinite(values).all():
         raise ValueError("the parameters must be finite numbers")
-    if not np.isfinite(speed):
-        raise ValueError(f"the speed must be a finite number in rad/s, not {speed}")
     zero, none = np.zeros(len(model.states)), np.zeros(len(model.inputs))
     table, n = model.matrices(values)[0], len(zero)
     A, constant, B = table[:, :n], table[:, n], table[:, n + 1 :]
@@ -68,7 +64,7 @@ def state_space(model: OdeModel, theta: ArrayLike | None = None, *, speed: float
     # linear, and 0 without inputs: the outputs of unit inputs are the columns of D
     units = np.eye(len(none))
     D = model.h(np.zeros(len(none)), np.zeros((len(none), len(zero))), values, units).T
-    return StateSpace(A, B, C, D.copy(), model.states, model.inputs, model.outputs, float(speed))
+    return StateSpace(A, B, C, D.copy(), model.states, model.inputs, model.outputs)
 
 
 def _check_linear(model: OdeModel) -> None:

@@ -13,7 +13,7 @@ from scipy.linalg import eigh
 import fem
 from rotorid.reduction import reduce
 from rotorid.reduction.equivalent.plane_at_rest import plane_at_rest
-from rotorid.reduction.guyan_irs_serep import compare_methods, guyan, irs, serep
+from rotorid.reduction.guyan_irs_serep import compare_methods, reduce_by
 
 MASTERS = (7, 12, 18)
 
@@ -187,9 +187,11 @@ def test_400_elements_give_the_same_model():
 
 
 def test_single_methods_are_those_of_the_comparison(methods):
-    for function, name in ((guyan, "Guyan"), (irs, "IRS"), (serep, "SEREP")):
-        one = function(rotor23(), MASTERS)
+    for name in ("Guyan", "IRS", "SEREP"):
+        one = reduce_by(rotor23(), MASTERS, name.lower())
         np.testing.assert_array_equal(one.frequencies, methods.row(name).frequencies)
+    with pytest.raises(ValueError, match="ritz"):
+        reduce_by(rotor23(), MASTERS, "ritz")
 
 
 def overhung(stiffness=1e16):
@@ -206,9 +208,9 @@ def test_shapes_that_depend_on_one_another_are_said():
     assert result.row("Guyan").M is not None
     assert "no model" in result.summary()
     with pytest.raises(ValueError, match=r"depend on one another at the nodes \[1, 5\]"):
-        serep(overhung(), (1, 5))
+        reduce_by(overhung(), (1, 5), "serep")
     with pytest.raises(ValueError, match="node 1 is a node of the rotor's first mode"):
-        serep(overhung(), [1])
+        reduce_by(overhung(), [1], "serep")
     soft = compare_methods(overhung(1e12), (1, 5))
     assert any("nearly depend" in text for text in soft.warnings)
 
@@ -226,7 +228,7 @@ def test_a_singular_mass_matrix_is_said():
     assert result.row("IRS").M is None
     assert any(text.startswith("IRS: Guyan's mass matrix is singular") for text in result.warnings)
     with pytest.raises(ValueError, match="mass matrix is singular"):
-        irs(rotor, (3, 6))
+        reduce_by(rotor, (3, 6), "irs")
     guess = result.row("Guyan")
     assert guess.relative_error[0] == pytest.approx(0.0, abs=1e-9)
     assert np.isnan(guess.frequencies[1])

@@ -152,9 +152,9 @@ def test_what_only_the_prior_knows_is_told_apart():
 
 
 def test_the_best_of_several_minima_counts_the_prior():
-    model = ode_model({}, outputs={"y": "a**2 + 0*t"}, estimate={"a": 1.0})
+    model = ode_model({}, outputs={"y": "a**2 + 0*t"}, estimate={"a": 1.0}, bounds={"a": (-10.0, 10.0)})
     data = record(np.full(25, 4.0) + 0.01 * np.sin(7 * T), 0.1)
-    found = fit(replace(model, prior={"a": (-1.0, 1.0)}), data, starts=9, bounds={"a": (-10.0, 10.0)})
+    found = fit(replace(model, prior={"a": (-1.0, 1.0)}), data, starts=9)
     assert found.values[0] == pytest.approx(-2.0, abs=0.01)
     assert [m.values["a"] > 0 for m in found.minima] == [False, True]
     assert found.minima[1].cost - found.minima[0].cost == pytest.approx((3**2 - 1) / 2, rel=0.01)

@@ -11,7 +11,7 @@ from cases import each_of
 from matplotlib.figure import Figure
 
 from rotorid.report.document import Document, fixed, significant
-from rotorid.report.page import inline_svg, json_inside, render, render_report
+from rotorid.report.page import inline_svg, json_inside, render_report
 
 PROVENANCE = {
     "program": "rotorid",
@@ -57,8 +57,8 @@ class Scripts(HTMLParser):
 
 
 def test_a_name_that_the_context_does_not_hold_is_an_error():
-    with pytest.raises(jinja2.UndefinedError, match="warnings"):
-        render("base.html", title="x", provenance=PROVENANCE, json_text="")
+    with pytest.raises(jinja2.UndefinedError, match="about"):
+        render_report("parts.html", {}, title="x", warnings=[], provenance=PROVENANCE)
 
 
 def test_text_is_escaped_and_the_document_cannot_end_its_element():

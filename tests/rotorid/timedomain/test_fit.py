@@ -53,11 +53,11 @@ def test_multiple_shooting_finds_a_limit_cycle(start):
 
 def test_several_starts_report_minima():
     t = np.linspace(0, 10, 101)
-    model = ode_model({}, outputs={"y": "sin(w*t)"}, estimate={"w": 5.0})
+    model = ode_model({}, outputs={"y": "sin(w*t)"}, estimate={"w": 5.0}, bounds={"w": (0.5, 8.0)})
     record = Record(t, {"y": np.sin(2 * t)})
-    one = fit(model, record, bounds={"w": (0.5, 8.0)})
+    one = fit(model, record)
     assert not one.reliable
-    found = fit(model, record, starts=12, bounds={"w": (0.5, 8.0)})
+    found = fit(model, record, starts=12)
     assert found.values == pytest.approx([2.0], abs=1e-8)
     assert len(found.minima) > 1
     assert found.minima[0].cost <= found.minima[1].cost
@@ -99,8 +99,6 @@ def test_json_and_text():
     [
         ({"method": "newton"}, "method 'newton' is not known"),
         ({"start": {"z": 1.0}}, "z is no parameter"),
-        ({"bounds": {"z": (0.0, 1.0)}}, "z is no parameter"),
-        ({"bounds": {"a": (1.0, 0.0)}}, "below the upper"),
         ({"starts": 0}, "at least 1"),
         ({"loss": "square"}, "loss 'square' is not known"),
     ],

@@ -68,7 +68,7 @@ def test_stated_errors_that_do_not_explain_the_residuals():
 
 
 def test_parameter_at_its_bound():
-    found = fit(decay(), decay_record(), bounds={"a": (0.0, 0.7)})
+    found = fit(decay(bounds={"a": (0.0, 0.7)}), decay_record())
     assert found.at_bounds == ("a",)
     assert found.values[0] == 0.7
     assert any("stands at its bound" in text for text in found.warnings)

@@ -12,7 +12,7 @@ from rotorid.tables import read_ode_model, read_record
 from rotorid.timedomain.fit import fit
 from rotorid.timedomain.models.ode_model import ode_model
 from rotorid.timedomain.models.record import Record
-from rotorid.timedomain.plots import draw_parameters, draw_residuals, draw_signal, figure_fit
+from rotorid.timedomain.plots import draw_parameters, draw_residuals, draw_signal, figure_fit, fine_curves
 
 FOLDER = sample_data() / "fit"
 T = np.linspace(0, 3, 31)
@@ -65,7 +65,7 @@ def test_every_signal_has_a_panel_with_its_residuals_below(result):
 
 def test_points_are_the_record_and_lines_pass_through_the_model(result):
     axes = Figure().add_subplot()
-    draw_signal(result, "y2", axes)
+    draw_signal(result, "y2", axes, fine_curves(result))
     points, line = axes.lines
     np.testing.assert_array_equal(points.get_ydata(), result.records[0].outputs["y2"])
     t, y = line.get_data()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -206,7 +207,8 @@ def test_every_record_has_its_own_initial_state():
         assert found.parameters == ("a", "x0_1", "x0_2")
         assert found.converged
         np.testing.assert_array_less(np.abs(found.values - [0.8, 2.0, 1.0]), 4 * found.std)
-    bounded = fit(model, records, bounds={"x0": (0.0, 1.9)}, start={"x0": 1.0})
+    limits = np.array([[-np.inf, np.inf], [0.0, 1.9]])
+    bounded = fit(replace(model, bounds=limits), records, start={"x0": 1.0})
     assert bounded.at_bounds == ("x0_1",)
     assert fit(model, records[0]).parameters == ("a", "x0")
 

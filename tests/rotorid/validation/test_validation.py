@@ -99,23 +99,15 @@ def test_what_is_no_printed_number_is_refused(text):
         number(text)
 
 
-@each_of(
-    ("options", "message"),
-    [
-        ({"tolerance": 0.1}, "needs a reason"),
-        ({"tolerance": 0.1, "reason": " "}, "needs a reason"),
-        ({"tolerance": 0.0, "reason": "because"}, "positive and finite"),
-        ({"tolerance": math.nan, "reason": "because"}, "positive and finite"),
-        ({"reason": "because"}, "belongs to a stated tolerance"),
-        ({"corrected": "2.0"}, "reason of its erratum"),
-        ({"erratum": " "}, "needs its reason"),
-        ({"erratum": "wrong", "corrected": "two"}, "no printed number"),
-        ({"quantity": ""}, "its source and its quantity"),
-    ],
-)
-def test_a_row_without_its_reason_is_refused(options, message):
-    with pytest.raises(ValueError, match=message):
-        row(**{"source": "a source", "quantity": "a number", "printed": "1.0", "computed": 1.0, **options})
+def test_every_row_says_why_it_is_not_judged_as_printed(proof):
+    for r in proof.rows:
+        assert r.source.strip()
+        assert r.quantity.strip()
+        assert bool(r.reason.strip()) == (r.tolerance != half_unit(r.text)), r
+        assert 0 < r.tolerance < math.inf
+        assert r.corrected is None or number(r.corrected) != r.printed
+        assert bool(r.erratum.strip()) >= (r.corrected is not None)
+        assert bool(r.erratum) == bool(r.erratum.strip())
 
 
 def test_an_erratum_really_differs_and_is_what_the_correction_says():

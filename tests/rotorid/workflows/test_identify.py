@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from rotorid.samples import sample_data
@@ -46,3 +47,34 @@ def test_models_and_experiments_need_no_files():
 def test_without_data_there_is_nothing_to_identify():
     with pytest.raises(ValueError, match="give a table of measured amplitudes"):
         identify(FILES[0])
+
+
+HIDDEN = """
+M = [[1, 0], [0, 2]]
+C = [["c", 0], [0, 0.3]]
+K = [[300, -100], [-100, "k"]]
+coordinates = ["x1", "x2"]
+inputs = ["F"]
+[force]
+x1 = "F"
+[outputs]
+x1 = "x1"
+[estimate]
+c = 0.5
+k = 250
+"""
+
+
+def test_a_design_reads_only_what_the_outputs_show(tmp_path):
+    """Expected deviations beside those of the closed form of the one amplitude that is read."""
+    path, w = tmp_path / "model.toml", np.array([8.0, 10.0, 18.0])
+    path.write_text(HIDDEN, encoding="utf-8")
+    options = IdentifyOptions(amplitude_error=2.0, phase_error=1.0, design=w.tolist(), choose=3)
+
+    def logarithm(c, k):
+        return np.log(1 / (300 - w**2 + 1j * c * w - 100**2 / (k - 2 * w**2 + 0.3j * w)))
+
+    steps = [(logarithm(0.5 + d, 250 + e) - logarithm(0.5 - d, 250 - e)) / 2e-6 for d, e in np.eye(2) * 1e-6]
+    rows = np.concatenate((np.real(steps) / 0.02, np.imag(steps) / np.radians(1)), axis=1)
+    expected = np.sqrt(np.diag(np.linalg.inv(rows @ rows.T)))
+    assert identify(path, None, options).design.std == pytest.approx(expected, rel=1e-5)

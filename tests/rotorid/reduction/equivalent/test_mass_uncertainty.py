@@ -15,7 +15,7 @@ from book_task_9 import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotorid.reduction import equivalent_masses, mass_sensitivity, natural_frequencies
+from rotorid.reduction import equivalent_masses, natural_frequencies
 from rotorid.reduction.equivalent.mass_uncertainty import InputErrors, mass_uncertainty
 
 ALPHA12 = 11.2e-8 / COMPLIANCE[0, 1] - 1
@@ -107,8 +107,6 @@ def test_standard_deviations_agree_with_drawn_inputs(modes, sigma):
     np.testing.assert_allclose(
         found.masses_covariance / np.outer(found.masses_std, found.masses_std), m, atol=0.05
     )
-    own = found.draw(InputErrors(sigma, sigma, sigma), 2000, seed=2)
-    np.testing.assert_allclose(own.std(axis=0).ravel(), std, rtol=0.06)
 
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
@@ -126,9 +124,9 @@ def test_contributions_add_up_to_the_variance(modes):
 @pytest.mark.parametrize("modes", [1, 2])
 def test_sensitivity_is_the_uncertainty_of_equal_errors(modes):
     found = mass_uncertainty(*book(modes), InputErrors(compliance=1e-4, shapes=1e-4))
-    np.testing.assert_allclose(
-        found.masses_std / found.masses / 1e-4, mass_sensitivity(*book(modes)), rtol=1e-10
-    )
+    np.testing.assert_allclose(found.masses_std / found.masses / 1e-4, found.sensitivity, rtol=1e-10)
+    unstated = mass_uncertainty(*book(modes), InputErrors())
+    np.testing.assert_array_equal(unstated.sensitivity, found.sensitivity)
 
 
 # what the error of the printed α12 does: first order, and exactly (kg; second frequency, rad/s)
@@ -303,6 +301,5 @@ def test_impossible_questions_are_refused():
         found.shift({"U12": 0.1})
     with pytest.raises(ValueError, match="must be finite"):
         found.shift({"alpha12": np.nan})
-    for function in (mass_sensitivity, lambda *x: mass_uncertainty(*x, InputErrors(0.01))):
-        with pytest.raises(ValueError, match="m3 by itself is not"):
-            function(COMPLIANCE, [100.0], [[1.0], [1.0], [0.0]])
+    with pytest.raises(ValueError, match="m3 by itself is not"):
+        mass_uncertainty(COMPLIANCE, [100.0], [[1.0], [1.0], [0.0]], InputErrors(0.01))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 from cases import each_of
+from keys_in_files import key_lines
 
 from rotorid.tables.reader import units, value_kinds
 from rotorid.tables.reader.problems import InputError, Problems
-from rotorid.tables.reader.settings_keys import Key, Quantity, file_schema, key_lines, object_schema, take
+from rotorid.tables.reader.settings_keys import Key, Quantity, file_schema, object_schema, take
 from rotorid.tables.reader.toml_file import Section
 
 WEIGHT = {**units.MASS, **units.UNBALANCE}

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tables_data import RUNS, WEIGHTS, complaints, the_only, write_book, write_csv
 
 from balancing import Labels, correct, estimate_influence
+from balancing.data.conventions import opposite
 from rotorid.tables import job_from_files, read_influence, read_job, write_influence
 from rotorid.tables.runs.stated_conventions import STATED_ANGLES, check_angles, resolve_angles
 
@@ -177,11 +180,10 @@ def test_words():
 def test_seen_from_the_other_end(angles, rotation):
     """The picture is mirrored, the words turn round, and every number stays."""
     ours = Labels(angles=angles, rotation=rotation, view="drive end", clock=True)
-    theirs = ours.seen_from("free end")
+    theirs = replace(ours, view="free end", rotation=opposite(rotation))
     assert theirs.rotation != ours.rotation
     assert theirs.angle_words != ours.angle_words
     assert theirs.angle_sign == ours.angle_sign
-    assert (theirs.seen_from("drive end"), ours.seen_from("drive end")) == (ours, ours)
     weight = 3e-3 * np.exp(0.4j)
     assert theirs.weight(weight) == ours.weight(weight)
     # on the paper: what stands at angle a counter-clockwise stands, from behind, at −a
@@ -201,5 +203,3 @@ def test_captions():
     seen = Labels(rotation="clockwise", view="drive end")
     assert seen.turning_in_words().endswith("which is clockwise seen from the drive end")
     assert (Labels().drawn_sign, turning.drawn_sign) == (1, -1)
-    with pytest.raises(ValueError, match="the end from which it is seen are not stated"):
-        turning.seen_from("free end")

@@ -342,13 +342,6 @@ def test_small_states_are_solved_as_well_as_large_ones():
     np.testing.assert_allclose(small.x, 1e-9 * large.x, rtol=0, atol=1e-18)
 
 
-def test_given_initial_states_replace_those_of_the_model():
-    run = simulate(oscillator(), [2.0, 0.3], [0.0, 1.0], x0=[2.0, 0.0])
-    assert run.x[1, 0] == pytest.approx(2 * damped(1.0, 2.0, 0.3), rel=1e-13)
-    with pytest.raises(ValueError, match=r"x0 must be 2 numbers \(x, v\)"):
-        simulate(oscillator(), [2.0, 0.3], [0.0, 1.0], x0=[2.0])
-
-
 def test_one_sample_is_the_initial_state():
     for method in ("auto", "dop853", "lsoda", "heun"):
         run = simulate(oscillator(), [2.0, 0.3], [3.0], method=method)

@@ -91,8 +91,6 @@ def test_divergence_is_said():
 
 
 def test_what_it_does_not_know():
-    with pytest.raises(ValueError, match="no bounds"):
-        fit(decay(), decay_record(), method="quasilinearization", bounds={"a": (0, 1)})
     with pytest.raises(ValueError, match="no robust loss"):
         fit(decay(), decay_record(), method="quasilinearization", loss="huber")
     with pytest.raises(ValueError, match="every state"):
