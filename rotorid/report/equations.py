@@ -119,7 +119,7 @@ class Equations:
         """Name of each row, the matrix, the right side."""
         matrix, unknowns, right = self.names
         columns = zip(
-            (*self.columns, f"| {right}"), np.column_stack((self.matrix, self.right)).T, strict=True
+            (*self.columns, f"| {right}"), (np.column_stack((self.matrix, self.right)) + 0.0).T, strict=True
         )
         numbers = [Column(name, values, "{:.6g}".format, cut(name, _LONGEST)) for name, values in columns]
         return [Column(f"{matrix} {unknowns} = {right}", self.rows, str), *numbers]
