@@ -44,6 +44,8 @@ class FittedModes(Answered):
         First and last frequency around each resonance, rad/s.
     trend
         Correlation of neighbouring residuals, in its standard deviations.
+    worst
+        Point and frequency (rad/s) of the largest residual, and it over its error.
     same
         What errors that are not stated were taken to be the same in.
     axis
@@ -56,19 +58,37 @@ class FittedModes(Answered):
     spread: FloatArray
     ends: tuple[tuple[float, float], ...]
     trend: float
+    worst: tuple[str, float, float]
     same: str
     axis: Shown
 
     @cached_property
+    def unit(self) -> float:
+        """Variance of residuals where no errors are stated, else 1; NaN where nothing is left to tell it."""
+        estimate = self.fit.estimate
+        if estimate.errors_stated or estimate.dof < 1:
+            return 1.0 if estimate.errors_stated else np.nan
+        return float(np.fmax(estimate.residuals @ estimate.residuals, 1e-300) / estimate.dof)
+
+    @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words."""
+        from scipy.special import chdtrc
+
         found = [] if self.fit.converged else [self.fit.message]
+        parts = np.stack((self.residues.real, self.residues.imag), axis=-1)
+        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(self.spread), parts) / self.unit
+        chance = (self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size)
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
         for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
             zip(told, self.ends, strict=True), 1
         ):
-            if not 2 * error < high - low:
+            if chance[mode - 1] > RARE:
+                found.append(
+                    f"mode {mode} ({omega:.5g} rad/s) is no more than noise: say in --bands where modes are"
+                )
+            elif not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
             elif not low < omega < high:
                 found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
@@ -82,10 +102,7 @@ class FittedModes(Answered):
         phase = np.angle((self.residues**2 / np.trace(self.spread, axis1=2, axis2=3)).sum(axis=1)) / 2
         turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
         turned = self.residues * np.exp(-1j * phase[:, None])
-        estimate = self.fit.estimate
-        unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
-        variances = np.einsum("aik,kpij,ajk->akp", turn, self.spread, turn)
-        variances *= 1.0 if estimate.errors_stated else unit
+        variances = np.einsum("aik,kpij,ajk->akp", turn, self.unit * self.spread, turn)
         least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
         return np.stack((np.copysign(least, turned.real), turned.imag)), variances
 
@@ -108,7 +125,12 @@ class FittedModes(Answered):
         lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
         chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
         minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
-        misfits = [*misfit(self.fit.estimate)]
+        misfits, (point, omega, size) = [*misfit(self.fit.estimate)], self.worst
+        if (self.fit.estimate.dof + 1) * np.exp(-(size**2) / self.unit / 2) < RARE:
+            off = size / self.unit**0.5
+            misfits.append(
+                f"{point} at {omega:.5g} rad/s is {off:.2g} standard deviations off: a wild reading"
+            )
         if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
             misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
         return (
