@@ -1,4 +1,4 @@
-"""The three references in their own order, with their numbers and errata, one section per chapter.
+"""The three references in their own order, with their numbers and errata; docs/book has a page a chapter.
 
 [S] is V. I. Simonovskiy's book on estimating coefficients of models of oscillating systems, [Q] a guide to
 quasilinearization, [F] one to sensitivity functions. Run `python examples/book_walkthrough.py`.
@@ -7,6 +7,7 @@ quasilinearization, [F] one to sensitivity functions. Run `python examples/book_
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def forced_vibration() -> dict[str, float]:
     """[S] 1.6 to 1.8: complex equations become real ones, K θ = Y."""
     print("[S] 1.6: three dampers of two coupled masses from four amplitudes")
     dampers = _values(_task("section_1_6", "data_exact.csv"))
-    print("  ", dampers)
+    print("  ", ", ".join(f"{name} = {value:.6g} kg/s" for name, value in dampers.items()))
     print("[S] 1.8: the printed K and Y of a feedback system, T2 and T1 T2, stretched into real rows")
     K = np.array([[-0.052 - 1.1j, 1.1 - 0.052j], [1.1 - 3.5j, 7.0 + 2.2j]])
     Y = np.array([0.41 - 0.93j, 3.7 - 2.0j])
@@ -41,20 +42,35 @@ def forced_vibration() -> dict[str, float]:
     return {"1.6 alpha1": dampers["alpha1"], "1.8 T2": found.values[0], "1.8 T1*T2": found.values[1]}
 
 
+def _corrections(found: balancing.Correction) -> dict[str, Any]:
+    """Print a correction; return its first plane."""
+    rows = found.to_dict()["corrections"]
+    for row in rows:
+        unit = row["unit"].replace("_", "·")
+        print(f"   plane {row['plane']}: {row['mass']:.4g} {unit} at {row['angle_deg']:.1f}°")
+    return dict(rows[0])
+
+
 def balancing_a_rotor() -> dict[str, float]:
     """[S] 1.9: influence coefficients, Y = W D; the correction stands opposite to D."""
     print("[S] 1.9: two planes of a rigid rotor (the example of Brüel & Kjær)")
     job = rotorid.read_job(SAMPLES / "bk_two_plane" / "job.toml")
     correction = balancing.correct(balancing.estimate_influence(job.trials))
-    for row in correction.to_dict()["corrections"]:
-        print(f"   plane {row['plane']}: {row['mass']:.4g} {row['unit']} at {row['angle_deg']:.1f}°")
-    first = correction.to_dict()["corrections"][0]
-    return {"1.9 mass": first["mass"], "1.9 angle": first["angle_deg"]}
+    first = _corrections(correction)
+    print("[S] 1.9.3: Den Hartog's method, three planes, four probes, five speeds around two critical ones")
+    job = rotorid.read_job(SAMPLES / "turbo_job" / "job.toml")
+    left = _corrections(balancing.correct(balancing.estimate_influence(job.trials), method="least-squares"))
+    return {
+        "1.9 mass": first["mass"],
+        "1.9 angle": first["angle_deg"],
+        "1.9.3 mass": left["mass"],
+        "1.9.3 angle": left["angle_deg"],
+    }
 
 
 def lessons_1_to_6() -> dict[str, float]:
     """[S] lessons 1 to 6: coefficients from amplitudes; some of the exercises cannot be solved as printed."""
-    print("[S] 5.1: one mass (the printed formula for Im X lacks a minus sign)")
+    print("[S] 5.1: one mass (the printed formula for Im X has m where ω belongs)")
     one = _values(_task("task_5_1"))
     print(f"   c = {one['c']:.3f} N/m, alpha = {one['alpha']:.3f} N·s/m")
     print("[S] 4.1: the columns of b and delta b are opposite, so the exercise is singular:")
@@ -71,7 +87,7 @@ def lessons_7_and_8() -> dict[str, float]:
     print("[S] 7.1: a chain of three masses (c3 is 5e3 N/m, printed as 5e4)")
     chain = _values(_task("task_7_1"))
     print("  ", ", ".join(f"{name} = {value:.1f}" for name, value in chain.items()))
-    print("[S] 8.1: a beam with two masses in compliance form (the formulas lack a factor 1/l, l = 1 m)")
+    print("[S] 8.1: a beam with two masses in compliance form (the formula of δ12 is 8 times too large)")
     beam = _values(_task("task_8_1"))
     print("  ", ", ".join(f"{name} = {value:.4g}" for name, value in beam.items()))
     return {"7.1 c1": chain["c1"], "7.1 c3": chain["c3"], "8.1 c1": beam["c1"], "8.1 c2": beam["c2"]}

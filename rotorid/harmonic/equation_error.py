@@ -30,6 +30,7 @@ from rotorid.harmonic.result import Identification
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import NonlinearEstimate
+from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.undetermined_combinations import FoundCombination, echelon
 
 Bounds = Mapping[str, tuple[float | None, float | None]]
@@ -180,6 +181,7 @@ def equation_error(
         converged=fit.settled,
         warnings=tuple(warnings),
         notes=_notes(model, experiments, estimate),
+        normal_matrix=normal_matrix(estimate.names, fit.K),
     )
 
     return replace(found, warnings=(*found.warnings, *_doubts(fit, found, bounds)))

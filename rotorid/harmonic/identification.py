@@ -16,6 +16,7 @@ from rotorid.harmonic.output_identification import identify_outputs
 from rotorid.harmonic.regression_rows import ask_about_case
 from rotorid.harmonic.result import Identification
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
+from rotorid.regression.prior import Known
 
 Identify = Callable[
     [HarmonicModel, Experiments, Bounds | None, str, Mapping[str, float] | None], Identification
@@ -31,6 +32,8 @@ def identify(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> Identification:
     """Identify a model's parameters from measured amplitudes.
 
@@ -51,6 +54,8 @@ def identify(
         Of output error: one of `LOSSES` in `rotorid.regression.robust`.
     start
         Starting values by name for output error, where the linear estimate is not to be used.
+    prior, ridge
+        Of output error: what is known beside the data, or λ of a ridge towards where it begins.
 
     Raises
     ------
@@ -58,16 +63,26 @@ def identify(
         For signals that were not measured at all, options that do not go together, unknown names.
     """
     chosen = find(METHODS, method, "method")
-    for what, given in (("bounds", bounds), ("start", start)):
+    for what, given in (("bounds", bounds), ("start", start), ("prior", prior)):
         for name in given or {}:
             if name not in model.parameters:
                 raise ValueError(f"{what}: {name} is no parameter; those are {', '.join(model.parameters)}")
     for name, (low, high) in limits(bounds).items():
         if not low <= high:
             raise ValueError(f"the bounds of {name} must be (lowest, highest); got ({low}, {high})")
+    if (prior or ridge) and chosen.function is not identify_outputs:
+        raise ValueError("[prior] and --ridge belong to --method output-error")
+    if prior and not experiments.stated:
+        raise ValueError(
+            "[prior] is weighed against the errors of the amplitudes: state them (--amplitude-error and "
+            "--phase-error, or [errors] in the model file)"
+        )
     ask_about_case(model, experiments)
     experiments, copies = experiments.without_copies()
-    found = chosen.function(model, experiments, bounds, loss, start)
+    if prior or ridge:
+        found = identify_outputs(model, experiments, bounds, loss, start, prior, ridge)
+    else:
+        found = chosen.function(model, experiments, bounds, loss, start)
     return replace(found, left_out=(*copies, *found.left_out))
 
 

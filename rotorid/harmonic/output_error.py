@@ -29,6 +29,7 @@ from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.starting_values import starting_values
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds, NonlinearEstimate, nonlinear_least_squares
+from rotorid.regression.prior import Known, PriorEffect, effect, prior_rows
 
 REWEIGHTINGS = 2
 """Rounds with weights from predicted amplitudes after the first with measured ones."""
@@ -62,6 +63,8 @@ class OutputError:
         Readings that could not be used, in words.
     warnings
         In words.
+    prior
+        What a prior or a ridge did; None without any.
     """
 
     fit: NonlinearEstimate
@@ -73,15 +76,17 @@ class OutputError:
     relative: Mapping[str, ComplexArray]
     left_out: tuple[str, ...]
     warnings: tuple[str, ...]
+    prior: PriorEffect | None = None
 
 
 def output_error(
     model: HarmonicModel,
     experiments: Experiments,
     start: Mapping[str, float] | ArrayLike,
-    *,
     bounds: Bounds | None = None,
     loss: str = "linear",
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> OutputError:
     """Fit predicted to measured amplitudes.
 
@@ -97,6 +102,8 @@ def output_error(
         First guess of each parameter, by name or in the model's order; NaN where there is none.
     bounds, loss
         As in `nonlinear_least_squares`.
+    prior, ridge
+        As in `identify`.
 
     Raises
     ------
@@ -110,6 +117,7 @@ def output_error(
     """
     comparison = compare(model, experiments)
     point = starting_values(model, experiments, start)[0]
+    own = prior_rows(model.parameters, prior or {}, ridge, point, comparison.jacobian)
     rounds: list[NonlinearEstimate] = []
     while True:
         fit = nonlinear_least_squares(
@@ -121,6 +129,7 @@ def output_error(
             bounds=bounds,
             loss=loss,
             near=bool(rounds),
+            prior=own,
         )
         rounds.append(fit)
         if len(rounds) > REWEIGHTINGS or not fit.converged or not comparison.depends_on_prediction:
@@ -130,8 +139,10 @@ def output_error(
         point = fit.estimate.solution
         comparison = comparison.reweighted(point)
     joined = _joined(rounds)
-    J = comparison.jacobian(joined.estimate.solution)
-    return _result(replace(joined, estimate=_spare(joined.estimate, J)), comparison)
+    estimate, J = joined.estimate, comparison.jacobian(joined.estimate.solution)
+    told = effect(own, J, estimate.residuals, estimate.solution)
+    estimate = told.apart(estimate, stated=experiments.stated) if told else estimate
+    return replace(_result(replace(joined, estimate=_spare(estimate, J)), comparison), prior=told)
 
 
 def _moved(before: NonlinearEstimate, after: NonlinearEstimate) -> float:

@@ -20,6 +20,8 @@ from rotorid.harmonic.starting_values import starting_values
 from rotorid.harmonic.unmeasured_amplitudes import hidden_outputs, without
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.nonlinear import Bounds
+from rotorid.regression.normal_matrix import normal_matrix
+from rotorid.regression.prior import Known
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 MOST_STARTS = 8
@@ -36,12 +38,14 @@ def identify_outputs(
     bounds: Bounds | None = None,
     loss: str = "linear",
     start: Mapping[str, float] | None = None,
+    prior: Known | None = None,
+    ridge: float = 0.0,
 ) -> Identification:
     """Identify by output error from the linear estimate, from each of its solutions where it has several.
 
     Parameters
     ----------
-    model, experiments, bounds, loss, start
+    model, experiments, bounds, loss, start, prior, ridge
         As in `identify`.
 
     Returns
@@ -53,7 +57,7 @@ def identify_outputs(
     found, problem = [], None
     for begin in starts:
         try:
-            found.append(output_error(model, experiments, begin, bounds=bounds, loss=loss))
+            found.append(output_error(model, experiments, begin, bounds, loss, prior, ridge))
         except ValueError as error:  # one of several starts may have no answer
             problem = error
     if problem is not None and not found:
@@ -71,6 +75,11 @@ def identify_outputs(
         covariance[apart, :] = covariance[:, apart] = np.nan
     residuals = np.stack([chosen.relative[name] for name in model.outputs], axis=1)
     free_of_bounds = not chosen.fit.at_bounds and estimate.full_rank and loss == "linear"
+    K, r, experiment, told = chosen.jacobian, estimate.residuals, chosen.experiment, chosen.prior
+    if told:  # its rows belong to no experiment
+        K, r = told.rows.below(K), np.append(r, told.rows.residual(estimate.solution))
+        experiment = np.append(experiment, np.full(len(told.rows), -1))
+        told = replace(told, alone=told.alone and (reasons or (told.alone,))[0])
     identification = Identification(
         model=model,
         experiments=experiments,
@@ -91,21 +100,20 @@ def identify_outputs(
         residual_names=model.outputs,
         residual_rms=_rms(residuals),
         predicted=chosen.predicted,
-        influence=leave_one_out(chosen.jacobian, -estimate.residuals, chosen.experiment, len(experiments))
-        if free_of_bounds
-        else None,
+        influence=leave_one_out(K, -r, experiment, len(experiments)) if free_of_bounds else None,
         left_out=chosen.left_out,
         converged=chosen.fit.converged,
         warnings=tuple(w for w in chosen.warnings if w != estimate.describe_rank()),
         notes=("residuals are relative to each amplitude", chosen.fit.message),
+        prior=told,
+        normal_matrix=normal_matrix(model.parameters, chosen.jacobian),
     )
 
     def refit(others: Experiments) -> Sequence[FloatArray]:
         return linear_fit(model, others).recovery.solutions
 
-    return replace(
-        identification, warnings=(*identification.warnings, *doubts(identification, estimate, bounds, refit))
-    )
+    said = (*doubts(identification, estimate, bounds, refit), *(told.warnings if told else ()))
+    return replace(identification, warnings=(*identification.warnings, *said))
 
 
 def _linear_starts(

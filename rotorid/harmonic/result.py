@@ -16,6 +16,8 @@ from rotorid.base.text import percent, sentence
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.regression.estimate import Uncertain, parameter_columns, parameter_dict, parameter_text
+from rotorid.regression.normal_matrix import NormalMatrix
+from rotorid.regression.prior import PriorEffect
 from rotorid.regression.undetermined_combinations import FoundCombination
 
 if TYPE_CHECKING:
@@ -68,6 +70,8 @@ class Identification(Answered, Uncertain):
         False: the search did not end at a minimum; `values` are where it stopped, and have no intervals.
     notes
         How the numbers came about, in words.
+    prior, normal_matrix
+        What a prior or a ridge did, None without any; the normal matrix of the last step.
     warnings
         What should be known before the numbers are used.
     """
@@ -94,6 +98,8 @@ class Identification(Answered, Uncertain):
     converged: bool = True
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    prior: PriorEffect | None = None
+    normal_matrix: NormalMatrix | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -140,6 +146,8 @@ class Identification(Answered, Uncertain):
                     {"experiment": experiment, "change": by_name(row)}
                     for experiment, row in zip(self.experiments.names, influence, strict=True)
                 ],
+                "normal_matrix": self.normal_matrix and self.normal_matrix.to_dict(),
+                **(self.prior.to_dict() if self.prior else {}),
             }
         )
 
@@ -150,13 +158,14 @@ class Identification(Answered, Uncertain):
     @property
     def answer(self) -> Answer:
         """What is determined and how well the model fits, the values, and what it leaves of each reading."""
-        why = {name: SEVERAL for name in self.parameters if self._several(name)}
+        why = dict(self.prior.why) if self.prior else {}
+        why |= {name: SEVERAL for name in self.parameters if self._several(name)}
         found = [parameter_text(self.parameters, self, why), *(f"  {c.line()}" for c in self.combinations)]
         for i, solution in enumerate(self.solutions if len(self.solutions) > 1 else ()):
             values = ", ".join(f"{k} = {v:.6g}" for k, v in solution.items() if np.isfinite(v))
             found.append(f"  solution {i + 1}: {values}")
         notes = [f"left out: {row}" for row in self.left_out]
-        if self.covariance is None and self.converged:
+        if self.covariance is None and self.converged and not self.prior:
             notes.append("no intervals: no errors are stated and there are no more equations than unknowns")
         columns = self.misfit
         left = np.array(columns[-1].values)
@@ -169,8 +178,8 @@ class Identification(Answered, Uncertain):
             "\n".join(found),
             self.warnings[::-1],  # what speaks against the answer comes last there
             (*notes, *self.notes),
-            (text(columns),) if known else (),
-            "what it leaves of each reading",
+            (text(columns),) * known + ((self.normal_matrix.text(),) if self.normal_matrix else ()),
+            "what it leaves of each reading, " * known + "the normal matrix",
         )
 
     def _judgement(self) -> str:
@@ -180,7 +189,8 @@ class Identification(Answered, Uncertain):
             return "\n".join(map(sentence, self.unidentifiable))
         n = len(self.parameters)
         known = "The parameter is" if n == 1 else f"All {n} parameters are"
-        return f"{known} determined (condition number {self.condition_number:.3g})."
+        said = f"{known} determined (condition number {self.condition_number:.3g})."
+        return self.prior.judgement(said) if self.prior else said
 
     def _several(self, name: str) -> bool:
         """Whether a parameter has several values that explain the data alike."""

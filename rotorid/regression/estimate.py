@@ -233,15 +233,16 @@ class Estimate(Answered, Uncertain):
         """Values ± standard deviations, intervals, and what is not determined."""
         return self.told()
 
-    def told(self, at_bounds: Sequence[str] = ()) -> Answer:
-        """The answer where some parameters stand at a bound, which is said instead of an interval."""
+    def told(self, at_bounds: Sequence[str] = (), why: Mapping[str, str] | None = None) -> Answer:
+        """The answer with words beside parameters: that they stand at a bound, or what a prior says."""
         notes = []
         if self.chi_square is not None and self.dof > 0:
             ratio = np.sqrt(self.chi_square / self.dof)
             notes.append(f"residuals are {ratio:.2g} times as large as the stated errors explain")
         if self.covariance is None and self.dof <= 0:
             notes.append("no intervals: no errors are stated and there are no more equations than parameters")
-        found = [parameter_text(self.names, self, dict.fromkeys(at_bounds, "at its bound"))]
+        beside = {**(why or {}), **dict.fromkeys(at_bounds, "at its bound")}
+        found = [parameter_text(self.names, self, beside)]
         found += [f"  {c.line()}" for c in self.combinations]
         return Answer(sentence(self.describe_rank()), "\n".join(found), notes=tuple(notes))
 

@@ -18,6 +18,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find
 from rotorid.base.text import counted
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.prior import Prior
 from rotorid.regression.robust import LOSSES
 from rotorid.regression.search import Function, Search, drive, inside, polish
 
@@ -109,6 +110,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
     loss: str = "linear",
     max_iterations: int = 200,
     near: bool = False,
+    prior: Prior | None = None,
 ) -> NonlinearEstimate:
     """Minimise the sum of squared residuals over the parameters of a nonlinear model.
 
@@ -135,12 +137,14 @@ def nonlinear_least_squares(  # noqa: PLR0913
         Of the driver.
     near
         The start is near the minimum: Gauss–Newton alone, the driver only if that does not contract.
+    prior
+        Rows that count with those of the data, in χ² and degrees of freedom, too; not in `residuals`.
 
     Raises
     ------
     ValueError
         For shapes that do not fit, unknown names or losses, empty bounds, residuals that are not finite at
-        the start.
+        the start, a robust loss with a prior.
 
     Notes
     -----
@@ -168,6 +172,10 @@ def nonlinear_least_squares(  # noqa: PLR0913
     r0 = np.asarray(residual(first), dtype=np.float64)
     if r0.ndim != 1 or not np.isfinite(r0).all():
         raise ValueError("the residuals at the starting values are not finite: choose other starting values")
+    if prior is not None and len(prior):
+        if loss != "linear":
+            raise ValueError("a prior or a ridge needs --loss linear: a robust loss would discount it, too")
+        residual, jacobian = prior.beside(residual, jacobian)
     search = Search(residual, jacobian, loss)
     left = False
     if near and loss == "linear":
@@ -185,6 +193,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
         why = f"converged in {counted(len(search.path) - 1, 'iteration')}"
     if not converged:
         judged = replace(judged, covariance=None, solution_covariance=None)
+    judged = replace(judged, residuals=judged.residuals[: len(r0)])
     fixed = (x <= lower) | (x >= upper)
     return NonlinearEstimate(
         estimate=judged,

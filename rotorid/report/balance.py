@@ -135,7 +135,7 @@ def _method(result: Correction) -> str:
     words = method_words(result.method, weighted=result.row_weights is not None)
     if len(result.speeds) == 1 or result.method == "minmax":
         return words
-    return f"{words} Den Hartog's multi-speed method: least squares over all speeds."
+    return f"{words} Den Hartog's method: influence coefficients at several speeds, least squares."
 
 
 def _coefficients(influence: Influence, job: Job, provenance: Mapping[str, Any]) -> str:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorid.harmonic import Identification
-    from rotorid.harmonic.experiment_design import Design
+    from rotorid.regression.d_optimal import Design
     from rotorid.timedomain.result import Fit
 
 READINGS = 40

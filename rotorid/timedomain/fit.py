@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
 from rotorid.base.registry import find
+from rotorid.regression.prior import Prior, prior_rows
 from rotorid.regression.search import inside
 from rotorid.timedomain.fit_diagnostics import judge
 from rotorid.timedomain.integration.simulate import SimulationError
 from rotorid.timedomain.methods.fit_methods import METHODS, Search, Trajectories
-from rotorid.timedomain.methods.iteration_history import Path, Stop
+from rotorid.timedomain.methods.iteration_history import Path, Stop, half_square
 from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
 from rotorid.timedomain.methods.multiple_starts import Minimum, merge, spread_starts
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -48,6 +48,7 @@ def fit(  # noqa: PLR0913
     seed: int = 0,
     weigh: bool = False,
     max_seconds: float = SECONDS,
+    ridge: float = 0.0,
 ) -> Fit:
     """Estimate the parameters of a model from time records.
 
@@ -89,11 +90,13 @@ def fit(  # noqa: PLR0913
         Without stated errors all samples count alike otherwise, whatever their unit.
     max_seconds
         Limit of time of the search; what it has found by then is given, without intervals.
+    ridge
+        λ of a ridge towards the starting values, as `rotorid.regression.prior` has it.
 
     Raises
     ------
     ValueError
-        Unknown names or methods, records that do not suit the model.
+        Unknown names or methods, records that do not suit the model, a prior without errors to weigh it by.
     SimulationError
         The states diverge with the starting values.
 
@@ -121,27 +124,29 @@ def fit(  # noqa: PLR0913
     if starts < 1 or max_iterations < 1 or not max_seconds > 0:
         raise ValueError("starts and max_iterations must be at least 1, max_seconds above 0")
     several = (records,) if isinstance(records, Record) else tuple(records)
-    if weigh and any(record.sigma is not None for record in several):
+    stated = any(record.sigma is not None for record in several)
+    if weigh and stated:
         raise ValueError("standard deviations are stated: there is nothing to estimate them for")
+    if model.prior and not (weigh or stated):
+        raise ValueError(
+            "[prior] is weighed against the errors of the records: state them (--sigma 0.01, or columns "
+            "NAME_std), or have them estimated (--sigma auto)"
+        )
     problem = Problem(model, several, integrator, rtol, seconds=max_seconds)
     names = problem.model.parameters
     limits = _bounds(problem.model, for_copies(model, len(several), bounds or {}))
     recorded = recorded_starts(model, problem.records)
     begin = _start(problem.model, recorded | for_copies(model, len(several), start or {}))
     begin = inside(begin, limits[:, 0], limits[:, 1])
+    prior = prior_rows(names, for_copies(model, len(several), model.prior), ridge, begin, problem.jacobian)
+    if ridge or not weigh:
+        problem.prior = prior
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
     search = Search(way, limits, loss, kind, pieces, max_iterations, Stop(tolerance))
     path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
-    for _ in range(WEIGHINGS if weigh and path.converged else 0):
-        errors = output_errors(problem, path.estimate.residuals, len(names))
-        stopped = problem.late and not path.converged
-        if stopped or errors is None or settled(errors, problem.errors):
-            break
-        left = problem.limit - time.monotonic()
-        problem = Problem(model, several, integrator, rtol, errors, left)
-        problem.seconds = max_seconds  # what a message says
-        path = search(problem, path.estimate.solution).after(path.history)
+    if weigh:
+        problem, path = _weighed(search, problem, path, prior)
     problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
@@ -166,7 +171,26 @@ def fit(  # noqa: PLR0913
         autocorrelation=judged.autocorrelation,
         residual_rms=float(np.sqrt(np.mean(problem.plain(path.estimate.residuals) ** 2))),
         errors=problem.errors or None,
+        prior=judged.prior,
+        normal_matrix=judged.normal_matrix,
     )
+
+
+def _weighed(search: Searching, problem: Problem, path: Path, prior: Prior) -> tuple[Problem, Path]:
+    """Weights from the residuals of the last fit, until they stay; only then a prior, whatever it says."""
+    for _ in range(WEIGHINGS if path.converged else 0):
+        errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
+        stopped = problem.late and not path.converged
+        if stopped or errors is None or settled(errors, problem.errors):
+            break
+        problem = problem.weighed(errors)
+        path = search(problem, path.estimate.solution).after(path.history)
+    if len(prior) and problem.prior is not prior:
+        if not (path.converged and problem.errors):
+            raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
+        problem.prior = prior
+        path = search(problem, path.estimate.solution).after(path.history)
+    return problem, path
 
 
 def search_all(
@@ -185,9 +209,13 @@ def search_all(
     if not paths:
         assert failure is not None
         raise failure
+
     # one that did not converge is no minimum; where it describes the record better, it is given, and said
-    best = min(paths, key=lambda p: float(p.estimate.residuals @ p.estimate.residuals))
-    return best, merge([p for p in paths if p.converged], problem.model.parameters) if len(begins) > 1 else ()
+    def cost(path: Path) -> float:
+        return half_square(path.estimate.residuals, problem.prior.residual(path.estimate.solution))
+
+    best = min(paths, key=cost)
+    return best, merge([p for p in paths if p.converged], cost) if len(begins) > 1 else ()
 
 
 def _start(model: OdeModel, start: Mapping[str, float] | None) -> FloatArray:

@@ -9,6 +9,8 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import gain, solution
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.normal_matrix import NormalMatrix, normal_matrix
+from rotorid.regression.prior import PriorEffect, effect
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import STEPWISE, SimulationError, inputs_of
@@ -35,6 +37,8 @@ class Judgement:
     warnings: tuple[str, ...]
     integration_change: FloatArray | None
     autocorrelation: float | None
+    prior: PriorEffect | None
+    normal_matrix: NormalMatrix | None
 
 
 @dataclass(eq=False)
@@ -45,6 +49,8 @@ class _Draft:
     reliable: bool
     warnings: list[str] = field(default_factory=list)
     integration_change: FloatArray | None = None
+    prior: PriorEffect | None = None
+    normal_matrix: NormalMatrix | None = None
 
     def note(self, *words: str, spoils: bool = False) -> None:
         """Add warnings, empty ones left out; those that spoil the fit leave no intervals."""
@@ -55,7 +61,7 @@ class _Draft:
 
 def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     """Look at convergence, bounds, rank, sensitivity, integration error and residuals of a fit."""
-    draft, r = _Draft(path.estimate, path.converged), path.estimate.residuals
+    draft = _Draft(path.estimate, path.converged)
     draft.note("" if path.converged else f"{path.message}; no intervals are given", path.bound_warning)
     try:
         _note_sensitivities(draft, problem, path, loss)
@@ -67,6 +73,7 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
     if not problem.data.any():
         draft.note("the record is zero throughout: a sensor without a signal?")
     draft.note(*_integration_words(found, draft.integration_change, problem.model.parameters))
+    r = found.residuals if draft.prior is None else draft.prior.best  # of the data alone
     seen = correlation(problem, r)
     poor = misfit(problem, found.dof, r, loss)
     draft.note(poor, spoils=True)
@@ -80,17 +87,26 @@ def judge(problem: Problem, path: Path, loss: str) -> Judgement:
         curved = found.curved and tuple(replace(c, std=None) for c in found.curved)
         found = replace(found, covariance=None, solution_covariance=None, curved=curved)
     neighbours = None if seen is None else seen.neighbours
-    return Judgement(found, draft.reliable, tuple(draft.warnings), draft.integration_change, neighbours)
+    change, warnings = draft.integration_change, tuple(draft.warnings)
+    return Judgement(found, draft.reliable, warnings, change, neighbours, draft.prior, draft.normal_matrix)
 
 
 def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) -> None:
     """What needs the model simulated at the values found; SimulationError where it cannot be."""
     found, r = draft.estimate, draft.estimate.residuals
     J = problem.jacobian(found.solution)
+    s, V = found.singular_values, found.row_space
+    # of the step itself where it is known: that of quasilinearization is not about a solution of the model
+    own = not len(problem.prior) and len(s) == len(V)
+    draft.normal_matrix = normal_matrix(found.names, s[:, None] * V if own else J)
+    draft.prior = effect(problem.prior, J, r, found.solution)
+    if draft.prior is not None:
+        draft.note(*draft.prior.warnings, spoils=problem.prior.ridge > 0)
+        draft.estimate, r = draft.prior.apart(found, stated=problem.stated), draft.prior.best
     if weak := _insensitive(problem, J, found):
         draft.note(f"the record hardly depends on {', '.join(weak)}")
     if path.converged:
-        draft.estimate, local = combined(problem, found)
+        draft.estimate, local = combined(problem, draft.estimate)
         draft.note(local)
     spread = None if problem.stated or loss != "linear" else unequal(problem, J.shape[1], r)
     if spread is not None:
@@ -133,7 +149,8 @@ def _integration_change(problem: Problem, found: Estimate, J: FloatArray) -> Flo
     missed = r - exact
     if np.linalg.norm(missed) <= ROUNDING * np.linalg.norm(problem.data):
         return np.zeros(len(found.names))
-    change: FloatArray = solution(J, missed, rcond=RCOND)
+    K = problem.prior.below(J)
+    change: FloatArray = solution(K, np.append(missed, np.zeros(len(K) - len(J))), rcond=RCOND)
     return change
 
 

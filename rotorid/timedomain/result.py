@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows
 from rotorid.base.text import counted, percent
 from rotorid.regression.estimate import parameter_columns
+from rotorid.regression.normal_matrix import NormalMatrix
+from rotorid.regression.prior import PriorEffect
 from rotorid.timedomain.integration.simulate import Trajectory
 from rotorid.timedomain.methods.iteration_history import Path
 from rotorid.timedomain.methods.multiple_starts import Minimum
@@ -57,6 +59,10 @@ class Fit(Answered, Path):
         In the unit of the outputs.
     errors
         Standard deviation of each output as estimated from its residuals, where these were the weights.
+    prior
+        What a prior or a ridge did to the estimate; None without any.
+    normal_matrix
+        Of the last step; None where the states diverge.
     """
 
     models: tuple[OdeModel, ...]
@@ -72,6 +78,8 @@ class Fit(Answered, Path):
     autocorrelation: float | None
     residual_rms: float
     errors: dict[str, float] | None = None
+    prior: PriorEffect | None = None
+    normal_matrix: NormalMatrix | None = None
 
     @property
     def model(self) -> OdeModel:
@@ -136,6 +144,8 @@ class Fit(Answered, Path):
                     "warnings": self.warnings,
                 }
             ),
+            "normal_matrix": self.normal_matrix and self.normal_matrix.to_dict(),
+            **(self.prior.to_dict() if self.prior else {}),
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -146,7 +156,9 @@ class Fit(Answered, Path):
     @property
     def answer(self) -> Answer:
         """Whether there is an answer, the values with their intervals, and what the model leaves."""
-        own, judged = self.estimate.told(self.at_bounds), self.estimate.describe_rank()
+        prior, judged = self.prior, self.estimate.describe_rank()
+        own = self.estimate.told(self.at_bounds, prior.why if prior else {})
+        own = replace(own, judgement=prior.judgement(own.judgement)) if prior else own
         said = own.judgement if self.reliable else f"NO intervals, see why. {own.judgement}"
         if not self.converged:  # nothing is said of a place that is no minimum
             said = "No estimates: the values are where the search stopped."
@@ -168,4 +180,6 @@ class Fit(Answered, Path):
             "\n".join(found),
             tuple(w for w in self.warnings if w != judged and not w.startswith(self.message)),
             own.notes if self.reliable or self.estimate.dof <= 0 else (),
+            (self.normal_matrix.text(),) if self.normal_matrix else (),
+            "the normal matrix",
         )

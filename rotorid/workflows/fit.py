@@ -12,18 +12,22 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.suggestions import one_of
 from rotorid.base.text import listing
 from rotorid.workflows.input_checks import check_choices, file_of, refuse
-from rotorid.workflows.option_values import check_names, number, pairs
+from rotorid.workflows.option_values import Times, check_names, number, pairs, times
 from rotorid.workflows.result_provenance import Parts, log, phase, provenance, text_of, workflow
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
     from rotorid.base.registry import Method
+    from rotorid.regression.d_optimal import Design
     from rotorid.timedomain import OdeModel, Record
     from rotorid.timedomain.result import Fit
 
 WITHOUT_CONTROL = ("expm", "heun", "sequential-heun", "rk4")
 """Integrators that know no tolerance."""
+MOST_CANDIDATES = 2000
+_NO_RECORD = "give a record after the model file (only --design does without)"
 Values = str | Mapping[str, float]
 """As "k=2,d=0.1", or by name."""
 
@@ -62,9 +66,17 @@ class FitOptions:
         Relative tolerance of the integration; default: 1e-10.
     allow_missing
         Blank cells, NaN and absent outputs were not measured.
+    ridge : LAMBDA
+        Regularise: add λ times the diagonal of the normal matrix at the start, which pulls towards it; no
+        intervals.
     sigma : LIST
         Standard deviation of a sample: 0.01, or y1=0.01,y2=0.02; auto: estimate the error of each output
         from its residuals, and weigh by it; default: NAME_std of the record, or else all alike.
+    design : FIRST:LAST:STEP
+        Which of these times to sample, s, such as 0:10:0.5: from the starting values, or with a record from
+        what it tells; needs --sigma.
+    choose : N
+        How many of them; default: as many as the parameters, at least 2.
     """
 
     method: str = "levenberg-marquardt"
@@ -80,7 +92,10 @@ class FitOptions:
     pieces: int | None = None
     rtol: float | None = None
     allow_missing: bool = False
+    ridge: float | None = None
     sigma: Values | float | None = None
+    design: Times | None = None
+    choose: int | None = None
 
 
 def choices() -> dict[str, tuple[Method[Any], ...]]:
@@ -94,33 +109,42 @@ def choices() -> dict[str, tuple[Method[Any], ...]]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordFit(Parts):
-    """What the fit found, and the text of the model's file."""
+    """What the fit found, which times to sample, of which one may be missing, and the text of the model."""
 
-    fit: Fit
+    fit: Fit | None
+    design: Design | None = None
     model: str = ""
 
     @property
     def parts(self) -> Mapping[str, Any]:
-        """The fit."""
-        return {"": self.fit}
+        """Both of them."""
+        return {"": self.fit, "design": self.design}
+
+    def to_frame(self) -> pd.DataFrame:
+        """The times, or else one row per parameter."""
+        return super().to_frame() if self.design is None else self.design.to_frame()
 
     def figure(self) -> Figure:
         """Each signal with the model and its residuals, the inputs, the parameters."""
         from rotorid.timedomain.plots import figure_fit
 
+        if self.fit is None:
+            raise ValueError(_NO_RECORD)
         return figure_fit(self.fit)
 
     def sheet(self) -> bytes:
         """To print or to send, one HTML file."""
         from rotorid.report.estimation import fit_report
 
+        if self.fit is None:
+            raise ValueError(_NO_RECORD)
         return fit_report(self.to_dict(), self.fit, provenance=self.provenance, model=self.model)
 
 
 @workflow
 def fit(
     model: OdeModel | Path | str,
-    records: Sequence[Record | Path | str] | Path | str,
+    records: Sequence[Record | Path | str] | Path | str = (),
     options: FitOptions | None = None,
 ) -> RecordFit:
     """Estimate parameters of differential equations from time records, with intervals.
@@ -130,7 +154,7 @@ def fit(
     model
         A model, or its file.
     records
-        Records, or their files; or one file.
+        Records, or their files; or one file; only the choice of times does without.
     options
         Those that differ from the defaults.
 
@@ -152,10 +176,15 @@ def fit(
     _check_once(paths)
     files = [*([Path(model)] if isinstance(model, Path | str) else []), *paths]
     equations = model if isinstance(model, OdeModel) else read_ode_model(file_of(model, "a model"))
-    begin = None if options.start is None else _start(options.start, equations, len(records))
+    if not records and options.design is None:
+        raise ValueError(_NO_RECORD)
+    begin = None if options.start is None else _start(options.start, equations, max(len(records), 1))
     weigh = isinstance(options.sigma, str) and options.sigma.strip() == "auto"
     deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
     data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
+    if not data:
+        plan = _plan(equations, options, deviations, begin or {}, None)
+        return RecordFit(fit=None, design=plan, provenance=provenance(files, options))
     with phase("fit"):
         found = estimate(
             equations,
@@ -173,10 +202,43 @@ def fit(
             pieces=options.pieces,
             rtol=RTOL if options.rtol is None else options.rtol,
             weigh=weigh,
+            ridge=options.ridge or 0.0,
         )
     log.info("degrees_of_freedom = %s", found.estimate.dof)
     log.info("singular_values = %s", ", ".join(f"{s:.6g}" for s in found.estimate.singular_values))
-    return RecordFit(fit=found, model=text_of(model), provenance=provenance(files, options))
+    plan = _plan(equations, options, deviations or found.errors, begin or {}, found)
+    return RecordFit(fit=found, design=plan, model=text_of(model), provenance=provenance(files, options))
+
+
+def _plan(
+    model: OdeModel,
+    options: FitOptions,
+    sigma: Mapping[str, float] | None,
+    begin: Mapping[str, float],
+    found: Fit | None,
+) -> Design | None:
+    """Choose times for a model whose parameters are known roughly, driven as in the record."""
+    if options.design is None:
+        return None
+    from rotorid.timedomain.sampling_times import design_times
+
+    candidates = sorted(set(times(options.design, "--design")))
+    if len(candidates) > MOST_CANDIDATES:
+        raise ValueError(f"--design takes at most {MOST_CANDIDATES} times, not {len(candidates)}")
+    if sigma is None:
+        raise ValueError("--design needs the errors of the samples: --sigma 0.01, or y1=0.01,y2=0.02")
+    if found and (len(found.records) > 1 or not found.reliable):
+        raise ValueError("--design needs one record that the model describes, or none")
+    guess = dict(zip(model.parameters, model.start.tolist(), strict=True)) | dict(begin)
+    if found:
+        values = zip(model.parameters, found.values.tolist(), strict=True)
+        guess |= {name: value for name, value in values if math.isfinite(value)}
+    if lost := [name for name, value in guess.items() if math.isnan(value)]:
+        raise ValueError(f"--design needs a guess of {listing(lost, 'and')}: --start {lost[0]}=1")
+    number = options.choose or min(max(2, len(guess)), len(candidates))
+    record = found.records[0] if found else None
+    theta = [guess[name] for name in model.parameters]
+    return design_times(model, theta, candidates, number, sigma=sigma, driven_by=record)
 
 
 def _check(options: FitOptions) -> None:
@@ -192,6 +254,8 @@ def _check(options: FitOptions) -> None:
         refuse(options, ("pieces",), "belongs to --method multiple-shooting")
     if options.starts == 1:
         refuse(options, ("seed",), "belongs to --starts N: it chooses the other places to begin from")
+    if options.design is None:
+        refuse(options, ("choose",), "belongs to --design FIRST:LAST:STEP")
     if options.rtol is None:
         return
     if not 1e-13 <= options.rtol <= 0.01:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from rotorid.base.registry import Method
     from rotorid.harmonic import AmplitudeErrors, Experiments, HarmonicModel, Identification
-    from rotorid.harmonic.experiment_design import Design
+    from rotorid.regression.d_optimal import Design
     from rotorid.tables import HarmonicFile
 
 MOST_CANDIDATES = 2000
@@ -39,6 +39,9 @@ class IdentifyOptions:
         One standard deviation of an amplitude, in place of the one that the model states.
     phase_error : DEGREES
         One standard deviation of a phase, in place of the one that the model states.
+    ridge : LAMBDA
+        Regularise output-error: add λ times the diagonal of the normal matrix at the start, which pulls
+        towards it; no intervals.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N
@@ -49,6 +52,7 @@ class IdentifyOptions:
     loss: str = "linear"
     amplitude_error: float | None = None
     phase_error: float | None = None
+    ridge: float | None = None
     design: Speeds | None = None
     choose: int | None = None
 
@@ -142,6 +146,8 @@ def identify(
                 bounds=file.bounds or None,
                 loss=options.loss,
                 start=(file.start or None) if options.method == "output-error" else None,
+                prior=file.prior,
+                ridge=options.ridge or 0.0,
             )
         log.info("degrees_of_freedom = %s", result.dof)
     return Coefficients(
@@ -182,6 +188,8 @@ def compare(
     pair = []
     for model in models:
         file = read_harmonic_model(model)
+        if file.prior:
+            raise ValueError(f"{model}: two models are compared by the data alone, without [prior]")
         errors = amplitude_errors(file.errors, options.amplitude_error, options.phase_error)
         rows = read_measurements(data, replace(file, errors=errors)).without_copies()[0]
         pair.append(Structure(str(model), file.model, rows, file.bounds, file.start))

@@ -14,7 +14,9 @@ from rotorid.samples import sample_data
 DOCS = sample_data().parent / "docs"
 STARTS = sorted((DOCS / "getting_started").glob("*.md"))
 QUESTIONS = sorted(set((DOCS / "questions").glob("*.md")) - {DOCS / "questions" / "index.md"})
-PAGES = [*STARTS, *QUESTIONS, DOCS / "rk4.md", DOCS / "validation.md", *sorted((DOCS / "api").glob("*.md"))]
+BOOK = sorted(set((DOCS / "book").glob("*.md")) - {DOCS / "book" / "index.md"})
+SINGLE = [DOCS / "rk4.md", DOCS / "validation.md"]
+PAGES = [*STARTS, *QUESTIONS, *BOOK, *SINGLE, *sorted((DOCS / "api").glob("*.md"))]
 
 
 @pytest.fixture
@@ -43,6 +45,8 @@ def test_every_block_of_a_page_runs_and_prints_what_the_page_says(page, workplac
     assert ran == sum(
         len(commands(block)) if block.kind == "console" else block.kind == "python" for block in blocks(page)
     )
+    if page in BOOK:
+        assert ran >= 1
     if page in STARTS or page in QUESTIONS:
         assert ran >= (5 if page.stem in USERS else 2)
         for block in blocks(page):

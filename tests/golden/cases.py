@@ -228,6 +228,7 @@ identify-output-error       identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/t
 identify-stated             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --output i.csv --plot i.png --verbose
 identify-robust             identify {IDENTIFY}/section_1_7/model.toml {IDENTIFY}/section_1_7/data.csv --method output-error --loss soft_l1
 identify-design             identify {IDENTIFY}/task_5_1/model.toml {IDENTIFY}/task_5_1/data.csv --amplitude-error 2 --phase-error 1 --design 5:40:1 --choose 3
+identify-prior              identify prior.toml {IDENTIFY}/task_4_1/data.csv --method output-error --amplitude-error 2 --phase-error 1
 identify-report             identify {IDENTIFY}/task_3_3/model.toml {IDENTIFY}/task_3_3/data.csv --report identify.html
 identify-misspelt           identify misspelt.toml {IDENTIFY}/task_5_1/data.csv
 identify-no-column          identify {IDENTIFY}/task_5_1/model.toml misspelt.csv
@@ -263,6 +264,11 @@ fit-tolerance-refused       fit {FIT}/quasilinearization/model.toml {FIT}/quasil
 fit-not-measured            fit unmeasured.toml {FIT}/three_masses/record.csv
 fit-no-convergence          fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --max-iterations 1
 fit-no-output               fit {FIT}/quasilinearization/model.toml {FIT}/limit_cycle/record.csv
+fit-prior                   fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma 0.02
+fit-prior-auto              fit prior.toml {FIT}/quasilinearization/record_noisy.csv --sigma auto
+fit-prior-unweighed         fit prior.toml {FIT}/quasilinearization/record_noisy.csv
+fit-ridge                   fit {FIT}/quasilinearization/model.toml {FIT}/quasilinearization/record_noisy.csv --ridge 0.001 --table
+fit-design                  fit {FIT}/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1 --sigma 0.02 --design 0:10:0.5 --choose 4
 identify-equations          identify {IDENTIFY}/task_1_1/model.toml {IDENTIFY}/task_1_1/data.csv --show equations
 identify-equations-lifted   identify {IDENTIFY}/task_4_2/model.toml {IDENTIFY}/task_4_2/data.csv --show equations --table
 identify-equations-none     identify {IDENTIFY}/task_4_1/model.toml {IDENTIFY}/task_4_1/data.csv --method output-error --show equations
@@ -329,6 +335,13 @@ ALIKE = {
         "trial 1,middle,800,0\ntrial 2,left,400,90\ntrial 2,middle,400,90\n",
     )
 }
+PRIOR = {
+    "prior.toml": (
+        f"{FIT}/quasilinearization/model.toml",
+        "[estimate]",
+        "[prior]\ntheta1 = [1.0, 0.004]\ntheta2 = [-0.9, 0.02]\n\n[estimate]",
+    )
+}
 MASS = {
     "mass.toml": (
         f"{IDENTIFY}/task_5_1/model.toml",
@@ -337,6 +350,16 @@ MASS = {
     )
 }
 EDITS = {
+    "fit-prior": PRIOR,
+    "fit-prior-auto": PRIOR,
+    "fit-prior-unweighed": PRIOR,
+    "identify-prior": {
+        "prior.toml": (
+            f"{IDENTIFY}/task_4_1/model.toml",
+            '"delta"]',
+            '"delta"]\n\n[prior]\ndelta = [0.1, 0.02]',
+        )
+    },
     "critical-misspelt": {"misspelt.csv": (ROTOR23, "length_m", "lenght_m")},
     "balance-misspelt-column": {"misspelt.csv": (f"{TURBO}/runs.csv", "sensor", "senzor")},
     "identify-misspelt": {

@@ -19,7 +19,7 @@ JUDGEMENTS = {
     "split": r"Mount |Instead of adding .*(take away opposite:|grind off )|.* from two weights:$",
     "trial-weight": r"Trial weight in plane ",
     "tolerance": r"G[\d.]+ for .*: permissible residual unbalance [\d.]+ g·mm",
-    "simulate": r"(Amplitudes|Natural modes|Record) ",
+    "simulate": r"(Amplitudes|Natural modes|Record)\b",
     "unbalance": r"The readings determine ",
 }
 """How the first line begins."""

@@ -67,6 +67,8 @@ def balance(
 
     Example: rotorid balance --template job.xlsx
 
+    Den Hartog's method: influence coefficients at several speeds, least squares over all of them.
+
     The workbook, filled in, is a job: --output sheet.xlsx writes it with its results, and --output
     weights.csv the corrections alone.
     """

@@ -25,7 +25,7 @@ def demo(
     sample: Annotated[
         str, typer.Option(metavar="NAME", help=f"One of {', '.join(SAMPLES)}.")
     ] = DemoOptions.sample,
-    show: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="What the samples are; nothing is written.")] = False,
     *,
     to: Destination,
 ) -> None:
@@ -35,7 +35,7 @@ def demo(
 
     Example: rotorid demo demo --sample holes
     """
-    if show:
+    if listed:
         to.deliver("samples", samples)
         return
     made = work(folder, DemoOptions(sample))

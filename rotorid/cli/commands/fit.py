@@ -15,10 +15,11 @@ from rotorid.workflows.fit import fit as work
 
 @command(
     FitOptions,
-    least={"starts": 1, "seed": 0, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1},
+    least={"starts": 1, "seed": 0, "choose": 1, "max_iterations": 1, "max_seconds": 0.01, "pieces": 1},
     panels={
         "Input": "sigma start allow_missing",
-        "Method": "method loss starts",
+        "Method": "method loss starts ridge",
+        "Next record": "design choose",
         "Limits": "max_seconds max_iterations tolerance",
         OUTPUT: "",
         "Expert": "integrator rtol trajectory pieces seed",
@@ -31,13 +32,14 @@ def fit(
         typer.Argument(metavar="MODEL.toml", help="Differential equations, outputs, what to estimate."),
     ],
     records: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="RECORD…",
             help="Time records, .csv or .xlsx: t_s, outputs and inputs; NAME_std beside an output NAME: "
-            "standard deviation of each sample.",
+            "standard deviation of each sample; only --design does without.",
         ),
-    ],
+    ] = None,
+    *,
     options: FitOptions,
     to: Destination,
 ) -> None:
@@ -47,5 +49,10 @@ def fit(
 
     Example: rotorid fit sample_data/fit/three_masses/model.toml sample_data/fit/three_masses/record.csv
     --sigma auto --plot fit.png
+
+    Which times to sample:
+
+    Example: rotorid fit sample_data/fit/quasilinearization/model.toml --start theta1=1,theta2=-1,theta3=-1
+    --sigma 0.02 --design 0:10:0.5 --choose 4
     """
-    to.deliver("fit", lambda: work(model, records, options))
+    to.deliver("fit", lambda: work(model, records or (), options))

@@ -16,7 +16,7 @@ from rotorid.workflows.identify import identify as work
 @command(
     IdentifyOptions,
     least={"choose": 1},
-    panels={"Method": "method loss", "Next test": "design choose"},
+    panels={"Method": "method loss ridge", "Next test": "design choose"},
     to=(*WITH_REPORT, *EQUATIONS),
 )
 def identify(

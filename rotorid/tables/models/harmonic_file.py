@@ -16,10 +16,12 @@ from rotorid.tables.models.shared_keys import (
     BOUNDS,
     NAMES,
     NUMBERS,
+    PRIOR,
     STATED_ERRORS,
     is_missing,
     limits,
     names_in,
+    priors,
     unlike,
     unlike_a_name,
 )
@@ -54,6 +56,8 @@ class HarmonicFile:
         Where it was read.
     unmeasured
         Outputs that a model in time does not show.
+    prior
+        Value and standard deviation of parameters that are known beside the data.
     """
 
     model: HarmonicModel
@@ -62,6 +66,7 @@ class HarmonicFile:
     errors: AmplitudeErrors | None = None
     path: Path | None = None
     unmeasured: tuple[str, ...] = ()
+    prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def read_harmonic_model(path: str | Path) -> HarmonicFile:
@@ -70,8 +75,8 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
     Its keys are `equations` (texts with p = d/dt), `estimate` (names), `known` (name = number), optional
     `inputs` (names of the exciting amplitudes), `varying` (names of known quantities that change from row to
     row of the measurements, where that does not follow from the equations), `[bounds]` (name = [lowest,
-    highest]), `[start]` (name = guess) and `[errors]` (`amplitude_percent`, `phase_deg`, `floor`: one
-    standard deviation of a reading).
+    highest]), `[start]` (name = guess), `[prior]` (name = [value, standard deviation]) and `[errors]`
+    (`amplitude_percent`, `phase_deg`, `floor`: one standard deviation of a reading).
 
     Instead of equations there may be a linear model in time as `read_ode_model` reads it, such as the one
     that `rotorid reduce --model` writes: `M`, `C`, `K` (then (M p² + C p + K) X = F with amplitudes named
@@ -128,6 +133,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         low, high = bounds.get(name, (-math.inf, math.inf))
         if not low <= value <= high:
             section.complain("start", f"{name} within its bounds, {low:g} to {high:g}")
+    prior = priors(said["prior"], estimate or ())
     problems.stop()
     from rotorid.harmonic.operator_equations import harmonic_model
 
@@ -143,7 +149,7 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         section.complain("equations", f"a usable model: {error}", value=False)
         problems.stop()
         raise
-    return HarmonicFile(model, bounds, start, said["errors"], path)
+    return HarmonicFile(model, bounds, start, said["errors"], path, prior=prior)
 
 
 def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile:
@@ -179,8 +185,9 @@ def _from_time(section: Section, path: Path, problems: Problems) -> HarmonicFile
         stand = "stands" if len(operators.left_out) == 1 else "stand"
         message = f"{path}: {lost} {stand} in initial values only, which amplitudes do not show: left out"
         warnings.warn(message, TableWarning, stacklevel=3)
-    bounds = {name: limits for name, limits in form.bounds.items() if name in start}
-    return HarmonicFile(model, bounds, start, form.errors, path, tuple({*own} & {*model.outputs}))
+    bounds, prior = ({n: two for n, two in each.items() if n in start} for each in (form.bounds, form.prior))
+    unmeasured = tuple({*own} & {*model.outputs})
+    return HarmonicFile(model, bounds, start, form.errors, path, unmeasured, prior)
 
 
 def _equations(section: Section, key: str) -> list[str] | None:
@@ -244,6 +251,7 @@ HARMONIC = (
     ),
     Key("known", NUMBERS, "names with their numbers"),
     BOUNDS,
+    PRIOR,
     Key("start", NUMBERS, "guesses, for output error, `--design`, and models with several solutions"),
     STATED_ERRORS,
 )

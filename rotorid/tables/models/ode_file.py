@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,11 +15,13 @@ from rotorid.tables.models.shared_keys import (
     BOUNDS,
     NAMES,
     NUMBERS,
+    PRIOR,
     STATED_ERRORS,
     TEXTS,
     is_missing,
     limits,
     names_in,
+    priors,
     unlike,
     unlike_a_name,
 )
@@ -49,8 +51,8 @@ class TimeForm:
         Numbers by name.
     inputs, per_record
         Names.
-    bounds
-        Lowest and highest value of parameters.
+    bounds, prior
+        Lowest and highest value of parameters; value and standard deviation.
     errors
         Stated errors of amplitudes, for harmonic tests only.
     speed
@@ -69,6 +71,7 @@ class TimeForm:
     inputs: list[str]
     per_record: list[str]
     bounds: dict[str, tuple[float, float]]
+    prior: dict[str, tuple[float, float]]
     errors: AmplitudeErrors | None
     speed: float
     nuisance: tuple[bool, bool, list[float]]
@@ -80,12 +83,13 @@ def read_ode_model(path: str | Path) -> OdeModel:
     Its tables are `[states]` (name = "rate of change", with the time as t), `[initial]` (name = number,
     an expression of parameters, or "record": as measured at the first time, with its error), `[outputs]`
     (name = "expression"; default: the states), `[estimate]` (name = starting value; empty where a model
-    is only to be simulated), optional `[known]` (name = number) and `[bounds]` (name = [lowest,
-    highest]), `inputs`, a list of measured inputs (columns of the record), and `per_record`, a list of
-    parameters (such as unknown initial values) that every one of several records has for itself. `t0` of
-    `[initial]` is the time to which the initial values belong (or "first"); `[nuisance]` adds `offset`,
-    `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every output, with factors to
-    be estimated for every record. Without states the outputs are functions of the time.
+    is only to be simulated), optional `[known]` (name = number), `[bounds]` (name = [lowest, highest]) and
+    `[prior]` (name = [value, standard deviation]), `inputs`, a list of measured inputs (columns of the
+    record), and `per_record`, a list of parameters (such as unknown initial values) that every one of several
+    records has for itself. `t0` of `[initial]` is the time to which the initial values belong (or "first");
+    `[nuisance]` adds `offset`, `drift` (true) and `hum_Hz` (a frequency or several) of the sensors to every
+    output, with factors to be estimated for every record. Without states the outputs are functions of the
+    time.
 
     Instead of `[states]` there may be `M`, `K` and optional `C`, matrices of numbers and expressions of
     parameters of M y'' + C y' + K y = f, with optional `coordinates` (names; y1, y2, … by default; the
@@ -132,9 +136,10 @@ def read_ode_model(path: str | Path) -> OdeModel:
     }
     try:
         if form.matrices is None:
-            return ode_model(form.states, **given)
+            return replace(ode_model(form.states, **given), prior=form.prior)
         m = form.matrices
-        return second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
+        model = second_order(m.M, m.C, m.K, names=m.coordinates, force=form.force, **given)
+        return replace(model, prior=form.prior)
     except ValueError as error:
         problems.add(str(path), None, None, None, f"a usable model: {error}")
         problems.stop()
@@ -198,6 +203,7 @@ def read_time_form(section: Section, problems: Problems, *, initial: bool = True
         inputs=inputs,
         per_record=[item for item in own if item in estimate],
         bounds=_bounds(said["bounds"], estimate),
+        prior=priors(said["prior"], estimate),
         errors=said["errors"],
         speed=said["speed_rad_s"],
         nuisance=said["nuisance"],
@@ -383,6 +389,7 @@ _OUTPUTS = (
 FORCE = (Key("force", TEXTS, 'with matrices: coordinate = "expression" of time and inputs'),)
 _LAST = (
     BOUNDS,
+    PRIOR,
     STATED_ERRORS,
     Key("speed_rad_s", number(0.0), "the speed at which matrices of a rotor hold", default=0.0),
     Key(

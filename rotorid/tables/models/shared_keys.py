@@ -55,6 +55,9 @@ ERRORS = (
 STATED_ERRORS = Key(
     "errors", value_kinds.table(ERRORS, _errors), "of readings of amplitudes, one standard deviation"
 )
+PRIOR = Key(
+    "prior", by_own_name(_LIMITS), "name = [value, standard deviation]: what is known of it beside the data"
+)
 BOUNDS = Key("bounds", by_own_name(_LIMITS), "name = [lowest, highest], `inf` for none")
 
 
@@ -95,6 +98,20 @@ def limits(section: Section, name: str) -> tuple[float, float] | None:
     found = pair(section.take(name))
     if found is None:
         section.complain(name, "two numbers, [lowest, highest], such as [0, 2e6] or [0, inf]")
+    return found
+
+
+def priors(section: Section | None, names: Collection[str]) -> dict[str, tuple[float, float]]:
+    """Value and standard deviation of parameters with a prior; anything else is complained about."""
+    found = {}
+    for name in names_in(section, lambda name: unlike(name, names, "estimate")):
+        value = section.take(name) if section else None
+        numbers: list[float] = value if isinstance(value, list) and len(value) == 2 else [math.inf, 0.0]
+        good = [isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in numbers]
+        if all(good) and numbers[1] >= 1 / LARGEST:
+            found[name] = float(numbers[0]), float(numbers[1])
+        elif section:
+            section.complain(name, "[value, standard deviation above 0], such as [1.0, 0.5]")
     return found
 
 

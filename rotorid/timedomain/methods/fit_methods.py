@@ -50,11 +50,12 @@ def _levenberg_marquardt(search: Search, problem: Problem, start: FloatArray) ->
         problem.jacobian,
         start,
         names=names,
-        sigma_stated=problem.stated,
+        sigma_stated=problem.scaled,
         bounds={name: (low, high) for name, (low, high) in zip(names, search.limits.tolist(), strict=True)},
         loss=search.loss,
         max_iterations=search.max_iterations,
         near=search.loss == "linear",
+        prior=problem.prior,
     )
     return Path(**vars(found))
 
@@ -113,5 +114,5 @@ def _so_far(problem: Problem, start: FloatArray) -> Path:
         f"not converged: the search was stopped after {seconds:.3g} s; allow more (--max-seconds), start "
         "nearer or take another method"
     )
-    costs = np.array([np.nan, half_square(r)])
-    return Path(at(problem.linear_fit(J, -r), theta, r), np.stack([start, theta]), costs, False, words)
+    costs = np.array([np.nan, half_square(r, problem.prior.residual(theta))])
+    return Path(at(problem.linear_fit(J, -r, theta), theta, r), np.stack([start, theta]), costs, False, words)

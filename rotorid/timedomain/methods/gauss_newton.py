@@ -35,8 +35,8 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, st
     """
     theta = start.copy()
     r, K = problem.evaluate(theta)
-    history, costs = [theta], [half_square(r)]
-    found = problem.linear_fit(K, -r)
+    history, costs = [theta], [half_square(r, problem.prior.residual(theta))]
+    found = problem.linear_fit(K, -r, theta)
     converged, message = False, f"not converged in {counted(max_iterations, 'iteration')}"
     ended: str | None = None
     for _ in range(max_iterations):
@@ -50,9 +50,9 @@ def gauss_newton(problem: Problem, start: FloatArray, *, max_iterations: int, st
             break
         step, theta = found.solution, new
         history.append(theta)
-        costs.append(half_square(r))
+        costs.append(half_square(r, problem.prior.residual(theta)))
         met = stop.met(negligible(step, theta, found, stop.short), costs)
-        found = problem.linear_fit(K, -r)
+        found = problem.linear_fit(K, -r, theta)
         # a minimum, not only a short step: the next one is no longer either
         converged = met is not None and negligible(found.solution, theta, found, stop.near)
         if met and (converged or stop.tolerance is not None):

@@ -101,6 +101,6 @@ def negligible(
     return bool((size <= limit).all())
 
 
-def half_square(r: FloatArray) -> float:
-    """The cost of residuals."""
-    return 0.5 * float(r @ r)
+def half_square(r: FloatArray, prior: FloatArray | None = None) -> float:
+    """The cost of residuals, and of those of a prior."""
+    return 0.5 * float(r @ r) + (0.0 if prior is None else 0.5 * float(prior @ prior))

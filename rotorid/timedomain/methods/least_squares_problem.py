@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.regression import least_squares
 from rotorid.regression.estimate import Estimate
+from rotorid.regression.prior import Prior, prior_rows
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.simulate import SimulationError, Trajectory, simulate
 from rotorid.timedomain.models.ode_model import OdeModel
@@ -46,6 +48,8 @@ class Problem:
         Estimated standard deviation of each output, to weigh by; not stated ones.
     seconds
         Limit of time of the search, which begins now.
+    prior
+        Rows that count with those of the records; none by default.
 
     Raises
     ------
@@ -62,6 +66,7 @@ class Problem:
         rtol: float = RTOL,
         errors: Mapping[str, float] | None = None,
         seconds: float = np.inf,
+        prior: Prior | None = None,
     ) -> None:
         self.records, self._given = tuple(from_t0(model, record) for record in records), model
         self.integrator, self.rtol = integrator, rtol
@@ -74,6 +79,7 @@ class Problem:
         self.models = models_of(model, len(self.records))
         """One per record, all with the same parameters."""
         self.model = self.models[0]
+        self.prior = prior or prior_rows(self.model.parameters, {})
         tables = [self._table(record) for record in self.records]
         known = {given for _, _, given in tables if given is not None}
         if len(known) > 1:
@@ -103,9 +109,21 @@ class Problem:
         """Whether the limit of time has come."""
         return time.monotonic() > self.limit
 
+    @property
+    def scaled(self) -> bool:
+        """Whether a residual of 1 is one standard deviation, stated or estimated: a prior counts on it."""
+        return self.stated or (len(self.prior) > 0 and not self.prior.ridge)
+
     def again(self, integrator: str, rtol: float) -> Problem:
         """The same problem, integrated otherwise."""
-        return Problem(self._given, self.records, integrator, rtol, self.errors)
+        return Problem(self._given, self.records, integrator, rtol, self.errors, prior=self.prior)
+
+    def weighed(self, errors: Mapping[str, float]) -> Problem:
+        """The same problem with estimated errors to weigh by, and with the time that is left."""
+        left = self.limit - time.monotonic()
+        other = Problem(self._given, self.records, self.integrator, self.rtol, errors, left, self.prior)
+        other.seconds = self.seconds  # what a message says
+        return other
 
     @cached_property
     def rows(self) -> int:
@@ -189,10 +207,12 @@ class Problem:
         """Derivatives (m, n)."""
         return self.evaluate(theta)[1]
 
-    def linear_fit(self, K: FloatArray, Y: FloatArray) -> Estimate:
-        """The step of the parameters from linearised rows K δ = Y, (m, n) and (m,)."""
-        sigma = 1.0 if self.stated else None
-        return least_squares(K, Y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
+    def linear_fit(self, K: FloatArray, Y: FloatArray, theta: FloatArray) -> Estimate:
+        """The step of the parameters (n,) from linearised rows K δ = Y, (m, n) and (m,), and the prior's."""
+        A, y = self.prior.below(K), np.append(Y, -self.prior.residual(theta))
+        sigma = 1.0 if self.scaled else None
+        found = least_squares(A, y, names=self.model.parameters, sigma=sigma, rcond=RCOND)
+        return replace(found, residuals=found.residuals[: len(Y)])
 
     def _table(self, record: Record) -> tuple[FloatArray, FloatArray, bool | None]:
         """Measured values and standard deviations (n, n_y); whether these are stated (None: no values)."""

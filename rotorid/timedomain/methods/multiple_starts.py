@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.timedomain.methods.iteration_history import Path, half_square
+from rotorid.timedomain.methods.iteration_history import Path
 
 SAME = 1e-3
 """Relative difference of parameters below which two minima are one."""
@@ -72,20 +72,21 @@ def spread_starts(first: FloatArray, limits: FloatArray, count: int, seed: int) 
     return [first, *table]
 
 
-def merge(paths: Sequence[Path], names: tuple[str, ...]) -> tuple[Minimum, ...]:
+def merge(paths: Sequence[Path], cost: Callable[[Path], float]) -> tuple[Minimum, ...]:
     """Different minima, the best first."""
     kept: list[tuple[FloatArray, float, int]] = []
-    ends = [(half_square(path.estimate.residuals), path.estimate) for path in paths]
-    for reached, found in sorted(ends, key=lambda end: end[0]):
+    for path in sorted(paths, key=cost):
+        reached, found = cost(path), path.estimate
         theta = found.solution
-        for i, (other, cost, count) in enumerate(kept):
+        for i, (other, least, count) in enumerate(kept):
             # parameters that are not determined may differ at the same cost
             near = np.abs(theta - other) <= SAME * np.maximum(np.abs(theta), np.abs(other)) + 1e-12
-            if near.all() or (not found.full_rank and abs(reached - cost) <= 1e-6 * cost):
-                kept[i] = other, cost, count + 1
+            if near.all() or (not found.full_rank and abs(reached - least) <= 1e-6 * least):
+                kept[i] = other, least, count + 1
                 break
         else:
             kept.append((theta, reached, 1))
     return tuple(
-        Minimum(dict(zip(names, theta.tolist(), strict=True)), cost, count) for theta, cost, count in kept
+        Minimum(dict(zip(paths[0].names, theta.tolist(), strict=True)), least, count)
+        for theta, least, count in kept
     )

@@ -78,7 +78,7 @@ def quasilinearization(
         curves = [_next(curve, step) for _, curve in parts]
         before, states = states, tuple(table @ np.append(1.0, step) for table, _ in parts)
         history.append(theta)
-        costs.append(half_square(found.residuals))
+        costs.append(half_square(found.residuals, problem.prior.residual(theta)))
         trajectories.append(states)
         change = max(_change(a, b) for a, b in zip(before, states, strict=True)) if model.states else 0.0
         earlier = last if stop.tolerance is None else None
@@ -175,7 +175,7 @@ def _solve(
     K, Y = problem.vector(slopes), problem.vector(outputs)
     if not (np.abs(K).max() < LARGEST and np.abs(Y).max() < LARGEST):
         raise SimulationError("the linearised outputs are beyond all bounds; start from another trajectory")
-    return problem.linear_fit(K, Y)
+    return problem.linear_fit(K, Y, theta)
 
 
 def _next(curve: Curve, step: FloatArray) -> Curve:

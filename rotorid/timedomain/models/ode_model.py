@@ -50,6 +50,8 @@ class OdeModel:
     recorded
         Parameters that are initial states as the record says, each with the output that measures it; their
         starting values are NaN here, see `recorded_starts`.
+    prior
+        Value and standard deviation of parameters that are known beside the records, by name.
     """
 
     states: tuple[str, ...]
@@ -66,6 +68,7 @@ class OdeModel:
     per_record: tuple[str, ...] = ()
     t0: float | str | None = None
     recorded: Mapping[str, str] = field(default_factory=dict)
+    prior: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     rates_alone: ClassVar[bool] = True
     """Whether `rates` are the whole right side."""
 

@@ -8,10 +8,11 @@ import pytest
 from cases import each_of
 from harmonic_cases import STATED, simulate, task51, two_masses
 
-from rotorid.harmonic.experiment_design import d_optimal, design
+from rotorid.harmonic.experiment_design import design
 from rotorid.harmonic.experiments import AmplitudeErrors
 from rotorid.harmonic.operator_equations import harmonic_model
 from rotorid.harmonic.output_error import output_error
+from rotorid.regression.d_optimal import d_optimal
 
 
 def log_det(J, chosen):
@@ -143,7 +144,7 @@ def test_the_result_speaks():
     assert frame["chosen"].sum() == 2
     assert list(frame.columns) == ["frequency_rad_s", "chosen", "a1_std", "a2_std", "a_std"]
     document = json.loads(json.dumps(found.to_dict(), allow_nan=False))
-    assert document["frequencies_rad_s"] == found.frequencies.tolist()
+    assert document["frequencies_rad_s"] == found.where.tolist()
 
 
 @each_of(

@@ -338,6 +338,7 @@ def test_the_method_of_several_speeds_is_named():
     for job, named in (("turbo_job", True), ("bk_two_plane", False)):
         text, _, _, _ = sheet_of(DATA / job / "job.toml")
         assert ("Den Hartog" in text) == named
+        assert ("influence coefficients at several speeds, least squares" in text) == named
 
 
 def test_what_stays_mounted_is_said(tmp_path):

@@ -1,0 +1,195 @@
+"""What is known of parameters beside the data: a prior, or a ridge; both are more measured rows.
+
+A prior θ_j = v ± s is the row θ_j / s = v / s beside rows that are divided by their errors. A ridge λ is a
+prior at the start with s = 1 / (√λ |K_j|), K_j the column of θ_j there: it minimises
+|K θ − Y|² + λ Σ |K_j|² (θ_j − v_j)², and adds λ times the diagonal of KᵀK at the start to KᵀK. [Q] 2.3
+asks for regularisation where its information matrix (2.28) is ill-conditioned, and leaves open which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray, IntArray
+from rotorid.base.json import plain
+from rotorid.base.text import percent
+from rotorid.regression.estimate import Estimate
+from rotorid.regression.linear import least_squares, solution
+from rotorid.regression.search import RCOND, Function
+
+FAR = 3.0
+"""Standard deviations between a prior and the data from which on they contradict each other."""
+SILENT = 1e-6
+"""Share of the data below which they say nothing of a parameter."""
+Known = Mapping[str, tuple[float, float]]
+"""Value and standard deviation of parameters, by name, in their units."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Rows below those of the data: value and deviation of p of the n parameters, by `place`.
+
+    `ridge` is λ, or 0 for a prior.
+    """
+
+    names: tuple[str, ...]
+    place: IntArray
+    value: FloatArray
+    std: FloatArray
+    ridge: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    @property
+    def own(self) -> list[str]:
+        """Names of the p parameters."""
+        return [self.names[j] for j in self.place]
+
+    def residual(self, theta: FloatArray) -> FloatArray:
+        """Residuals (p,) at the parameters (n,)."""
+        return np.asarray((theta[self.place] - self.value) / self.std)
+
+    def below(self, K: FloatArray) -> FloatArray:
+        """Derivatives (m, n) of the data, and those of these rows below them."""
+        return np.vstack((K, np.eye(len(self.names))[self.place] / self.std[:, None]))
+
+    def beside(self, residual: Function, jacobian: Function) -> tuple[Function, Function]:
+        """Functions of the parameters with these rows."""
+        return (
+            lambda theta: np.append(residual(theta), self.residual(theta)),
+            lambda theta: self.below(jacobian(theta)),
+        )
+
+
+def prior_rows(
+    names: tuple[str, ...],
+    known: Known,
+    ridge: float = 0.0,
+    start: FloatArray | None = None,
+    slopes: Function | None = None,
+) -> Prior:
+    """Rows of what is known, or of a ridge λ at the start (n,), by the derivatives of the data there.
+
+    ValueError for both of them, and a λ that is not above 0.
+    """
+    if not (np.isfinite(ridge) and ridge >= 0) or (ridge and known):
+        raise ValueError("--ridge takes a number above 0, such as 0.01, and a model without [prior]")
+    value, std = np.array([known.get(name, (0.0, np.inf)) for name in names]).T
+    if ridge and start is not None and slopes is not None:
+        with np.errstate(divide="ignore"):
+            value, std = start, 1.0 / (np.sqrt(ridge) * np.linalg.norm(slopes(start), axis=0))
+    place = np.flatnonzero(np.isfinite(std))
+    return Prior(names, place, value[place], std[place], ridge)
+
+
+@dataclass(frozen=True, eq=False)
+class PriorEffect:
+    """What a prior or a ridge did to an estimate: `share` and `away` (p,), the rest once.
+
+    `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
+    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
+    is what the data alone determine, in words, if that is not everything, `lost` what they do not, `rank` and
+    `best` their rank and residuals (m,). Condition numbers and rms are those without and with the prior; a
+    nonlinear model is linearised.
+    """
+
+    rows: Prior
+    share: FloatArray
+    away: FloatArray
+    alone: str
+    lost: tuple[str, ...]
+    rank: int
+    best: FloatArray
+    condition_numbers: tuple[float, float]
+    residual_rms: tuple[float, float]
+
+    @property
+    def why(self) -> dict[str, str]:
+        """Beside each parameter, how much of it is from the data, where the prior says anything."""
+        if self.rows.ridge:
+            return dict.fromkeys(self.lost, "by the ridge only")
+        return dict.fromkeys(self.lost, "through the prior") | {
+            name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
+            for name, share in zip(self.rows.own, self.share, strict=True)
+            if share < 0.995
+        }
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The prior that all the rest contradicts most; that a ridge has no intervals."""
+        if self.rows.ridge:
+            (rms, rms_now), (condition, now) = self.residual_rms, self.condition_numbers
+            return (
+                f"--ridge {self.rows.ridge:g} biases the estimate by nobody knows how much: no intervals. "
+                f"Residual rms {rms_now:.3g}, condition number {now:.3g}; without it, linearised, {rms:.3g} "
+                f"and {condition:.3g}",
+            )
+        far = np.nan_to_num(np.abs(self.away))
+        i = int(np.argmax(far))
+        if far[i] <= FAR:
+            return ()
+        rest = "the data" if len(far) == 1 else "the data and the other priors"
+        return (
+            f"{rest} contradict the prior {self.rows.own[i]} = {self.rows.value[i]:.6g} ± "
+            f"{self.rows.std[i]:.2g} by {far[i]:.2g} standard deviations: one of these or the model is wrong",
+        )
+
+    def judgement(self, words: str) -> str:
+        """What is determined with it, and by the data alone."""
+        which = "ridge" if self.rows.ridge else "prior"
+        with_it = f"With the {which} {words[0].lower()}{words[1:]}"
+        return f"{with_it}\nWithout it {self.alone}." if self.alone else words
+
+    def apart(self, found: Estimate, *, stated: bool) -> Estimate:
+        """The estimate with χ² and degrees of freedom of the data alone, however far off the prior is."""
+        if self.rows.ridge:
+            found = replace(found, covariance=None, solution_covariance=None)
+        chi_square = float(self.best @ self.best) if stated else None
+        return replace(found, errors_stated=stated, chi_square=chi_square, dof=len(self.best) - self.rank)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Part of a document, `prior` or `ridge`, as JSON types."""
+        numbers = zip(self.rows.value, self.rows.std, self.share, self.away, strict=True)
+        keys = ("value", "std", "data_share", "deviation")
+        each = (dict(zip(keys, four, strict=True)) for four in numbers)
+        told = {
+            "lambda": self.rows.ridge or None,
+            "parameters": dict(zip(self.rows.own, each, strict=True)),
+            "data_alone": self.alone or None,
+            "condition_number": dict(zip(("without", "with"), self.condition_numbers, strict=True)),
+            "residual_rms": dict(zip(("without", "with"), self.residual_rms, strict=True)),
+        }
+        return plain({"ridge" if self.rows.ridge else "prior": told})
+
+
+def effect(rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray) -> PriorEffect | None:
+    """What the rows of a prior did to the estimate (n,); None without any.
+
+    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors.
+    """
+    if not len(rows):
+        return None
+    alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=RCOND)
+    A = rows.below(K)
+    both = least_squares(A, np.zeros(len(A)), sigma=1.0, rcond=RCOND)
+    assert both.std is not None
+    share = np.nan_to_num(1.0 - (both.std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = rows.residual(theta) / np.sqrt(share)
+    best = r + K @ solution(K, -r, rcond=RCOND)
+    return PriorEffect(
+        rows=rows,
+        share=share,
+        away=np.where(share > SILENT, away, np.nan),
+        alone="" if alone.full_rank else alone.describe_rank(),
+        lost=alone.undetermined,
+        rank=alone.rank,
+        best=best,
+        condition_numbers=(alone.condition_number, both.condition_number),
+        residual_rms=(float(np.sqrt(np.mean(best**2))), float(np.sqrt(np.mean(r**2)))),
+    )

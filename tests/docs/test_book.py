@@ -1,0 +1,123 @@
+"""The coverage table of `docs/book/index.md`: no number of the three texts is missing, every command runs."""
+
+import re
+import shlex
+import shutil
+
+import pytest
+from golden.cases import CASES, TEXT
+from golden.storing import read
+
+from rotorid.samples import sample_data
+
+PAGE = sample_data().parent / "docs" / "book" / "index.md"
+
+
+def _to(last, first=1, text="({})"):
+    return [text.format(n) for n in range(first, last + 1)]
+
+
+def _tasks(*lessons):
+    return [f"task {i}.{j}" for i, number in enumerate(lessons, 1) for j in range(1, number + 1)]
+
+
+# Read from the texts. Some numbers the scan has lost; they stand between their neighbours.
+NUMBERED = {
+    "[S]": [
+        *_to(50),
+        *("(2)′", "(6)′", "(28)′"),
+        *("2.1 (1)", "2.2 (1)", "3.1 (1)", "4.1 (1)", "7.1 (1)", "7.1 (2)", "8.1 (1)"),
+        *_tasks(2, 3, 3, 3, 2, 2, 2, 2, 2),
+        *(f"table of {place}" for place in ("task 5.1", "task 5.2", "task 6.1", "task 9.1", "figure 14")),
+        "section 1.8",
+    ],
+    "[Q]": [*_to(36, text="(2.{})"), *_to(3, text="table 2.{}"), "section 2.3"],
+    "[F]": [
+        *_to(8, text="(3.{})"),
+        "definition 3.1",
+        "Runge–Kutta",
+        "algorithm",
+        *_to(4, text="laboratory task {}"),
+        "record 1",
+    ],
+}
+
+
+def rows(text, source):
+    """Of the table of one text: numbers, what it is, command, words of its answer."""
+    table = text.split(f"\n### {source}\n", 1)[1].split("\n### ", 1)[0]
+    lines = [line for line in table.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in lines[1:]]
+
+
+def numbers(cell):
+    """The numbers that a cell names, ranges spelt out."""
+    found = []
+    for words in cell.split(", "):
+        first, _, last = words.partition("–")
+        if last and re.fullmatch(r"\([\d.]+\)", last):
+            chapter = first.strip("()").rpartition(".")[0]
+            begin, end = (int(word.strip("()").rpartition(".")[2]) for word in (first, last))
+            found += _to(end, begin, f"({chapter}.{{}})" if chapter else "({})")
+        else:
+            found.append(words)
+    return found
+
+
+TEXT_OF_PAGE = PAGE.read_text(encoding="utf-8")
+ROWS = {source: rows(TEXT_OF_PAGE, source) for source in (*NUMBERED, "In words")}
+SAID = {}
+for _row in [row for table in ROWS.values() for row in table]:
+    for _command in re.findall(r"`(rotorid [^`]+)`", _row[2]):
+        SAID.setdefault(_command, set()).update(re.findall(r"`([^`]+)`", _row[3]))
+
+
+@pytest.mark.parametrize("source", NUMBERED)
+def test_every_number_of_the_texts_is_in_the_table_once(source):
+    named = [number for row in ROWS[source] for number in numbers(row[0])]
+    assert sorted(named) == sorted(NUMBERED[source])
+
+
+def test_ranges_are_spelt_out():
+    assert numbers("(2.9)–(2.11), task 1.1, (6)′") == ["(2.9)", "(2.10)", "(2.11)", "task 1.1", "(6)′"]
+    assert numbers("(3)–(5), 2.1 (1), Runge–Kutta") == ["(3)", "(4)", "(5)", "2.1 (1)", "Runge–Kutta"]
+
+
+def test_every_row_has_a_command_and_its_words_or_says_why_not():
+    for row in [row for table in ROWS.values() for row in table]:
+        if row[2].startswith("not computed, because "):
+            assert len(row) == 3, row
+        else:
+            assert re.fullmatch(r"`rotorid [^`]+`", row[2]), row
+            assert re.fullmatch(r"`[^`]+`", row[3]), row
+
+
+def test_den_hartog_is_named_where_one_looks_for_him(cli):
+    readme = (PAGE.parents[2] / "README.md").read_text(encoding="utf-8")
+    page = (PAGE.parent / "den_hartog.md").read_text(encoding="utf-8")
+    for text in (cli("balance", "--help").out, readme, page):
+        said = _once(text.replace("*", " ").replace("│", " "))
+        assert "Den Hartog's method" in said
+        assert "influence coefficients at several speeds, least squares" in said
+
+
+def _once(text):
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("command", SAID)
+def test_every_command_answers_as_the_table_says(command, tmp_path, monkeypatch, cli):
+    """What the net runs and compares is not run again."""
+    words = shlex.split(command)[1:]
+    stored = [n for n, case in CASES.items() if case.words == words and case.stored and TEXT in case.forms]
+    if stored:
+        texts, _ = read(stored[0])
+        status, output = int(texts["status"].split()[-1]), texts["output"]
+    else:
+        shutil.copytree(sample_data(), tmp_path / "sample_data")
+        monkeypatch.chdir(tmp_path)
+        outcome = cli(*words)
+        status, output = outcome.code, outcome.out
+    assert status == 0
+    for said in SAID[command]:
+        assert _once(said) in _once(output), said

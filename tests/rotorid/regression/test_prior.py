@@ -1,0 +1,375 @@
+"""Priors and ridges: against Bayesian linear regression in numpy, and parameters drawn from their prior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
+from rotorid.harmonic.experiments import experiments
+from rotorid.regression.normal_matrix import normal_matrix
+from rotorid.regression.prior import prior_rows
+from rotorid.samples import sample_data
+from rotorid.tables import read_harmonic_model, read_ode_model
+from rotorid.timedomain import Record, ode_model
+from rotorid.timedomain.fit import fit
+from rotorid.workflows.fit import FitOptions
+from rotorid.workflows.fit import fit as work
+from rotorid.workflows.identify import compare
+
+T = np.linspace(0.0, 3.0, 25)
+K = np.column_stack((np.ones(25), T, np.exp(-T)))
+KNOWN = {"b": (-0.4, 0.3), "c": (1.5, 0.2)}
+SIGMA = 0.3
+
+
+def line(prior):
+    model = ode_model({}, outputs={"y": "a + b*t + c*exp(-t)"}, estimate={"a": 0.0, "b": 0.0, "c": 0.0})
+    return replace(model, prior=prior)
+
+
+def readings(seed=1, truth=(1.0, -0.5, 1.2)):
+    return K @ truth + SIGMA * np.random.default_rng(seed).standard_normal(25)
+
+
+def record(y, sigma=SIGMA):
+    return Record(T, {"y": y}, sigma=None if sigma is None else {"y": sigma})
+
+
+def bayes(y, known=KNOWN, sigma=SIGMA):
+    """Mean and covariance of Bayesian linear regression, from the normal matrix."""
+    names = ("a", "b", "c")
+    P, v = np.zeros((3, 3)), np.zeros(3)
+    for name, (value, std) in known.items():
+        i = names.index(name)
+        P[i, i], v[i] = std**-2, value
+    C = np.linalg.inv(K.T @ K / sigma**2 + P)
+    return C @ (K.T @ y / sigma**2 + P @ v), C
+
+
+@pytest.mark.parametrize(
+    "method", ["levenberg-marquardt", "gauss-newton", "quasilinearization", "multiple-shooting"]
+)
+def test_a_fit_with_a_prior_is_bayesian_linear_regression(method):
+    y = readings()
+    found = fit(line(KNOWN), record(y), method=method)
+    mean, C = bayes(y)
+    assert found.values == pytest.approx(mean, rel=1e-8)
+    assert found.estimate.covariance == pytest.approx(C, rel=1e-8)
+    assert found.estimate.errors_stated
+    assert found.reliable
+    # chi-square and degrees of freedom are those of the data, whatever the prior says
+    assert found.estimate.chi_square == pytest.approx(np.linalg.lstsq(K, y)[1][0] / SIGMA**2, rel=1e-8)
+    assert found.estimate.dof == 22
+    shares = 1 - np.diag(C)[1:] / np.array([0.3, 0.2]) ** 2
+    assert found.prior.share == pytest.approx(shares, rel=1e-8)
+    # what the data pay for: the trace of their hat matrix
+    assert 1 + shares.sum() == pytest.approx(np.trace(K @ C @ K.T) / SIGMA**2, rel=1e-10)
+    for i, name in enumerate(KNOWN):  # a prior against an estimate that does not know it
+        value, std = KNOWN[name]
+        without, D = bayes(y, {other: two for other, two in KNOWN.items() if other != name})
+        expected = (without[1 + i] - value) / np.hypot(std, np.sqrt(D[1 + i, 1 + i]))
+        assert found.prior.away[i] == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_normal_matrix_is_that_of_the_data():
+    y = readings()
+    document = fit(line(KNOWN), record(y)).to_dict()["normal_matrix"]
+    assert document["names"] == ["a", "b", "c"]
+    assert np.array(document["matrix"]) == pytest.approx(K.T @ K / SIGMA**2, rel=1e-9)
+    assert document["condition_number"] == pytest.approx(np.linalg.cond(K.T @ K), rel=1e-3)
+    assert normal_matrix(("a", "b"), np.ones((3, 2))).condition_number == np.inf
+
+
+@pytest.mark.parametrize("sigma", [None, 0.3])
+@pytest.mark.parametrize("method", ["levenberg-marquardt", "gauss-newton"])
+def test_a_ridge_multiplies_the_diagonal_of_the_normal_matrix(method, sigma):
+    y, start = readings(), np.array([0.5, -1.0, 2.0])
+    found = fit(
+        line({}), record(y, sigma), ridge=0.3, method=method, start=dict(zip("abc", start, strict=True))
+    )
+    M = K.T @ K
+    D = 0.3 * np.diag(np.diag(M))
+    assert found.values == pytest.approx(np.linalg.solve(M + D, K.T @ y + D @ start), rel=1e-8)
+    assert found.estimate.covariance is None
+    assert not found.reliable
+    (words,) = (w for w in found.warnings if "ridge" in w)
+    assert "biases the estimate" in words
+    told = found.to_dict()["ridge"]
+    assert told["lambda"] == 0.3
+    weight = 1.0 if sigma is None else sigma
+    left = np.linalg.lstsq(K, y)[1][0]
+    assert told["residual_rms"]["without"] == pytest.approx(np.sqrt(left / 25) / weight, rel=1e-8)
+    assert told["residual_rms"]["with"] == pytest.approx(found.residual_rms / weight, rel=1e-8)
+    assert told["condition_number"]["with"] < told["condition_number"]["without"]
+
+
+def test_a_small_ridge_is_none():
+    y = readings()
+    plain, tiny = fit(line({}), record(y)), fit(line({}), record(y), ridge=1e-12)
+    assert tiny.values == pytest.approx(plain.values, rel=1e-9)
+    with pytest.raises(ValueError, match="--ridge takes a number above 0"):
+        fit(line({}), record(y), ridge=-1.0)
+    with pytest.raises(ValueError, match="--ridge takes"):
+        fit(line(KNOWN), record(y), ridge=0.1)
+
+
+def test_a_prior_that_the_data_contradict_is_named():
+    found = fit(line({"b": (2.0, 0.1), "c": (1.2, 0.5)}), record(readings()))
+    (words,) = (w for w in found.warnings if "contradict the prior" in w)
+    assert words.startswith(
+        "the data and the other priors contradict the prior b"
+    )  # not c, that b pulls away
+    assert np.abs(found.prior.away).min() > 3
+    assert f"b = 2 ± 0.1 by {abs(found.prior.away[0]):.2g} standard" in words
+    assert found.prior.away[0] < -5
+    assert not any("stated errors" in w for w in found.warnings)  # those of the data are right
+
+
+def test_what_only_the_prior_knows_is_told_apart():
+    model = ode_model(
+        {"x": "-(a + b)*x"},
+        initial={"x": "x0"},
+        outputs={"y": "x + 0*c"},
+        estimate={"a": 0.3, "b": 0.3, "x0": 1.0, "c": 3.0},
+    )
+    model = replace(model, prior={"b": (0.2, 0.05), "c": (1.0, 0.5)})
+    y = 2 * np.exp(-0.7 * T) + 0.02 * np.random.default_rng(3).standard_normal(25)
+    found = fit(model, record(y, 0.02))
+    lines = {line.split()[0]: line for line in found.summary().splitlines() if line.startswith("  ")}
+    assert lines["a"].endswith("through the prior")
+    assert lines["b"].endswith("by its prior only")
+    assert lines["c"].endswith("by its prior only")
+    assert lines["x0"].split()[-1][-1].isdigit()
+    assert "Without it only x0 and a + b are determined" in found.summary()
+    assert found.values[[1, 3]] == pytest.approx([0.2, 1.0], rel=1e-6)
+    assert found.std[[1, 3]] == pytest.approx([0.05, 0.5], rel=1e-6)
+    assert np.isnan(found.prior.away).all()
+    document = found.to_dict()
+    assert document["prior"]["data_alone"].startswith("only x0 and a + b")
+    assert document["prior"]["parameters"]["b"]["data_share"] == pytest.approx(0.0, abs=1e-6)
+    assert document["normal_matrix"]["condition_number"] is None
+
+
+def test_the_best_of_several_minima_counts_the_prior():
+    model = ode_model({}, outputs={"y": "a**2 + 0*t"}, estimate={"a": 1.0})
+    data = record(np.full(25, 4.0) + 0.01 * np.sin(7 * T), 0.1)
+    found = fit(replace(model, prior={"a": (-1.0, 1.0)}), data, starts=9, bounds={"a": (-10.0, 10.0)})
+    assert found.values[0] == pytest.approx(-2.0, abs=0.01)
+    assert [m.values["a"] > 0 for m in found.minima] == [False, True]
+    assert found.minima[1].cost - found.minima[0].cost == pytest.approx((3**2 - 1) / 2, rel=0.01)
+
+
+def test_copies_for_each_record_have_the_prior_of_their_parameter():
+    model = ode_model({"x": "-k*x"}, initial={"x": "x0"}, estimate={"k": 1.0, "x0": 1.0}, per_record=["x0"])
+    model = replace(model, prior={"x0": (2.0, 0.01)})
+    rng = np.random.default_rng(0)
+    data = [
+        Record(T, {"x": x * np.exp(-T) + rng.standard_normal(25) / 10}, sigma={"x": 0.1}) for x in (2, 2.005)
+    ]
+    found = fit(model, data)
+    assert found.parameters == ("k", "x0_1", "x0_2")
+    assert list(found.to_dict()["prior"]["parameters"]) == ["x0_1", "x0_2"]
+    assert found.values[1:] == pytest.approx([2.0, 2.0], abs=0.02)
+
+
+def test_a_prior_needs_errors_to_be_weighed_by():
+    y = readings()
+    with pytest.raises(ValueError, match="weighed against the errors of the records: state them"):
+        fit(line(KNOWN), record(y, None))
+    with pytest.raises(ValueError, match="a robust loss would discount it"):
+        fit(line(KNOWN), record(y), loss="huber")
+    with pytest.raises(ValueError, match="finds no errors without"):
+        fit(line(KNOWN), record(K @ [1.0, 2.0, 3.0], None), weigh=True)
+
+
+@pytest.mark.parametrize("far", [0.0, 5.0])
+def test_estimated_errors_are_those_without_the_prior(far):
+    """However far off it is: the scale is that of the data alone, with its degrees of freedom."""
+    y = readings()
+    found = fit(line({"b": (-0.5 + far, 0.3)}), record(y, None), weigh=True)
+    s = np.sqrt(np.linalg.lstsq(K, y)[1][0] / 22)
+    assert found.errors["y"] == pytest.approx(s, rel=1e-6)
+    mean, C = bayes(y, {"b": (-0.5 + far, 0.3)}, s)
+    assert found.values == pytest.approx(mean, rel=1e-6)
+    assert found.estimate.covariance == pytest.approx(C, rel=1e-6)
+    assert (found.estimate.dof, found.estimate.errors_stated) == (22, False)
+
+
+def covered(found, truth):
+    low, high = found.ci95.T
+    return (low <= truth) & (truth <= high)
+
+
+def rates(hits):
+    """Share of hits, and 3.5 standard deviations of a share of 95 %."""
+    return np.mean(hits, axis=0), 3.5 * np.sqrt(0.05 * 0.95 / len(hits))
+
+
+@pytest.mark.parametrize("weigh", [False, True])
+def test_intervals_cover_parameters_drawn_from_their_prior(weigh):
+    outputs = {"x": "u0/k + (x0 - u0/k)*exp(-k*t)"}
+    model = ode_model({}, outputs=outputs, estimate={"k": 1.0, "x0": 2.0, "u0": 0.5})
+    known = {"k": (1.0, 0.05), "u0": (0.5, 0.03)}
+    rng = np.random.default_rng(7)
+    silent, warned = [], 0
+    for _ in range(200):
+        k, u0 = rng.normal(1.0, 0.05), rng.normal(0.5, 0.03)
+        x = u0 / k + (2.0 - u0 / k) * np.exp(-k * T) + 0.05 * rng.standard_normal(25)
+        data = Record(T, {"x": x}, sigma=None if weigh else {"x": 0.05})
+        found = fit(replace(model, prior=known), data, weigh=weigh)
+        warned += bool(found.warnings)
+        if not found.warnings:
+            silent.append(covered(found.estimate, np.array([k, 2.0, u0])))
+    share, room = rates(silent)
+    assert (np.abs(share - 0.95) < room).all(), share
+    assert warned <= 6
+
+
+def test_output_error_covers_parameters_drawn_from_their_prior():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    rng, w = np.random.default_rng(11), np.array([9.0, 10.0, 11.0, 12.0])
+    errors = AmplitudeErrors(relative=0.05, phase=0.05)
+    silent, warned, shares = [], 0, []
+    for _ in range(200):
+        c, b = rng.normal(1000, 20), rng.normal(20, 0.5)
+        X = 10 / (c - 10 * w**2 + 1j * b * w)
+        noise = np.exp(0.05 * (rng.standard_normal(4) + 1j * rng.standard_normal(4)))
+        data = experiments(model, w, {"X": X * noise, "F": 10.0}, errors=errors)
+        found = identify(model, data, method="output-error", prior={"c": (1000.0, 20.0), "b": (20.0, 0.5)})
+        shares.append(found.prior.share)
+        warned += bool(found.warnings)
+        if not found.warnings:
+            silent.append(covered(found, np.array([c, b])))
+    assert 0.2 < np.mean(shares, axis=0)[1] < 0.8  # the prior matters, and so do the data
+    share, room = rates(silent)
+    assert (np.abs(share - 0.95) < room).all(), share
+    assert warned <= 8
+
+
+def test_a_ridge_of_output_error_goes_from_the_estimate_to_the_start():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    w, start = np.array([8.0, 9.0, 11.0]), {"c": 1200.0, "b": 30.0}
+    X = 10 / (1000 - 10 * w**2 + 20j * w) * np.array([1.01, 1 + 0.02j, 0.98])
+    data = experiments(model, w, {"X": X, "F": 10.0})
+    plain = identify(model, data, method="output-error")
+    found = [
+        identify(model, data, method="output-error", start=start, ridge=ridge) for ridge in (1e-10, 0.1, 1e8)
+    ]
+    c, b = np.array([one.values for one in found]).T
+    assert (c[0], b[0]) == pytest.approx(plain.values, rel=1e-6)
+    assert (c[2], b[2]) == pytest.approx((1200.0, 30.0), rel=1e-6)
+    assert plain.values[0] + 1 < c[1] < 1199
+    assert all(one.covariance is None and "biases" in one.warnings[-1] for one in found)
+    assert found[1].to_dict()["ridge"]["parameters"]["c"]["value"] == 1200.0
+    assert "no intervals: no errors" not in found[1].answer.whole()
+
+
+def test_identify_says_what_it_needs():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    data = experiments(model, [9.0, 11.0], {"X": [0.05 - 0.05j, -0.02 - 0.03j], "F": 10.0})
+    with pytest.raises(ValueError, match="belong to --method output-error"):
+        identify(model, data, prior={"c": (1.0, 1.0)})
+    with pytest.raises(ValueError, match="belong to --method output-error"):
+        identify(model, data, ridge=0.1)
+    with pytest.raises(ValueError, match="weighed against the errors of the amplitudes"):
+        identify(model, data, method="output-error", prior={"c": (1.0, 1.0)})
+    with pytest.raises(ValueError, match="prior: d is no parameter"):
+        identify(model, data, method="output-error", prior={"d": (1.0, 1.0)})
+
+
+def test_a_prior_chooses_among_values_that_can_be_exchanged():
+    """Two time constants in a row: only their sum and product are determined; a prior of one tells which."""
+    model = harmonic_model(["(T1*p + 1)*(T2*p + 1)*X = F"], estimate=["T1", "T2"])
+    w = np.array([0.5, 1.0, 2.0])
+    X = 1 / ((0.5j * w + 1) * (0.8j * w + 1))
+    data = experiments(model, w, {"X": X, "F": 1.0}, errors=AmplitudeErrors(0.01, 0.01))
+    assert np.isnan(identify(model, data, method="output-error").values).all()
+    found = identify(model, data, method="output-error", prior={"T1": (0.6, 0.1)})
+    assert found.values == pytest.approx([0.5, 0.8], rel=0.05)
+    assert found.identifiable
+
+
+def test_leaving_out_an_experiment_keeps_the_prior():
+    model = harmonic_model(["(m*p**2 + b*p + c)*X = F"], known={"m": 10.0}, estimate=["c", "b"])
+    w, F, errors = np.array([5.0, 9.0, 12.0]), 10.0, AmplitudeErrors(0.01, 0.01)
+    X = F / (1003.0 - 10 * w**2 + 20j * w) * np.array([1.004, 1 + 0.006j, 0.997])
+    known = {"b": (19.0, 0.3)}
+
+    def found(keep):
+        data = experiments(model, w[keep], {"X": X[keep], "F": F}, errors=errors)
+        return identify(model, data, method="output-error", prior=known)
+
+    whole = found([0, 1, 2])
+    for i in range(3):
+        others = found([j for j in range(3) if j != i])
+        assert whole.influence[i] == pytest.approx(others.values - whole.values, rel=0.1, abs=0.05)
+
+
+def test_no_rows_change_nothing():
+    none = prior_rows(("a", "b"), {})
+    J = np.arange(6.0).reshape(3, 2)
+    assert len(none) == 0
+    assert (none.below(J) == J).all()
+
+
+MODEL = """outputs = { y = "a + b*t" }
+estimate = { a = 0.0, b = 0.0 }
+[prior]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("b = 1.0", r"\[value, standard deviation above 0\], such as"),
+        ("b = [1.0, 0.0]", "standard deviation above 0"),
+        ("b = [1.0, 1e-320]", "standard deviation above 0"),
+        ("b = [1.0, inf]", "standard deviation above 0"),
+        ('b = [1.0, "2"]', "standard deviation above 0"),
+        ("b = [true, 2]", "standard deviation above 0"),
+        ("bb = [1.0, 0.5]", r"a name of estimate \(did you mean 'b'\?\)"),
+    ],
+)
+@pytest.mark.parametrize("read", [read_ode_model, read_harmonic_model])
+def test_a_wrong_prior_in_a_file_is_named(tmp_path, read, text, expected):
+    path = tmp_path / "model.toml"
+    harmonic = 'equations = ["(a + b*p)*X = F"]\nestimate = ["a", "b"]\n[prior]\n'
+    path.write_text((MODEL if read is read_ode_model else harmonic) + text, encoding="utf-8")
+    with pytest.raises(ValueError, match=expected) as raised:
+        read(path)
+    assert "prior." in str(raised.value)
+
+
+def test_a_prior_in_a_file_is_that_of_the_model(tmp_path):
+    path, data = tmp_path / "model.toml", tmp_path / "record.csv"
+    path.write_text(MODEL + "b = [1, 0.5]\n", encoding="utf-8")
+    assert dict(read_ode_model(path).prior) == {"b": (1.0, 0.5)}
+    data.write_text("t_s,y\n0,1\n1,2.1\n2,2.9\n3,4.2\n", encoding="utf-8")
+    document = work(path, data, FitOptions(sigma=0.1)).to_dict()
+    assert document["prior"]["parameters"]["b"]["std"] == 0.5
+    time = '[states]\nx = "v"\nv = "(u - b*v - c*x)/m"\n[estimate]\nb = 1\nc = 2\nx0 = 1\n'
+    more = '[known]\nm = 1\n[initial]\nx = "x0"\nv = 0\n[prior]\nc = [2, 0.1]\nx0 = [1, 1]\n'
+    path.write_text('inputs = ["u"]\n' + time + more, encoding="utf-8")
+    with pytest.warns(UserWarning, match="x0 stands in initial values only"):
+        assert read_harmonic_model(path).prior == {"c": (2.0, 0.1)}
+
+
+def test_two_models_are_compared_without_a_prior(tmp_path):
+    folder, path = sample_data() / "identify" / "task_5_1", tmp_path / "prior.toml"
+    text = (folder / "model.toml").read_text(encoding="utf-8")
+    path.write_text(f"{text}\n[prior]\nc = [1000, 10]\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"by the data alone, without \[prior\]"):
+        compare([folder / "model.toml", path], folder / "data.csv")
+
+
+def test_the_normal_matrix_of_the_last_step_is_the_one_that_q_prints():
+    """[Q] (2.35), without the minus signs that the scan has lost, to half a unit of its last digit."""
+    folder = sample_data() / "fit" / "quasilinearization"
+    options = FitOptions(method="quasilinearization", integrator="sequential-heun")
+    found = work(folder / "model.toml", folder / "record.csv", options)
+    printed = [[41.75, -78.46, 39.49], [-78.46, 340.4, -75.76], [39.49, -75.76, 70.04]]
+    assert found.to_dict()["normal_matrix"]["matrix"] == [
+        [pytest.approx(x, abs=0.05 if x == 340.4 else 0.005) for x in row] for row in printed
+    ]
+    assert "normal matrix of the last step, condition number 32.4" in found.answer.whole()
