@@ -52,7 +52,7 @@ def fit_modes(
     Raises
     ------
     ValueError
-        Where there is no peak, and where readings are fewer than unknowns.
+        Where there is no peak, bands overlap, and where readings are fewer than unknowns.
     """
     omega, read = experiments.frequencies, ~np.isnan(experiments.table(points)).all(axis=1)
     if bands is not None:
@@ -64,6 +64,8 @@ def fit_modes(
     omega, Z = experiments.frequencies, experiments.table(points)
     H = Z / excitation[:, None]
     sections = _peaks(omega, H) if bands is None else sorted(bands)
+    if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
+        raise ValueError("--bands overlap: each holds one mode")
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
     spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
     if min(spare) < 0 or sum(spare) < len(rows) or min(len(np.unique(omega[row])) for row in rows) < 3:

@@ -236,6 +236,8 @@ def test_too_few_readings_are_refused():
     assert "do not tell" in thrice.undetermined[0]
     with pytest.raises(ValueError, match="no readings in --bands"):
         near_one(bands=[(1.0, 2.0)])
+    with pytest.raises(ValueError, match="--bands overlap"):
+        near_one(bands=[(10.0, 14.0), (11.0, 14.0)])
 
 
 def test_readings_that_lack_are_left_out():
