@@ -242,6 +242,13 @@ GALLERY = (
         "damping coefficients to 7, 16 and 11 %.",
     ),
     Picture(
+        "circles",
+        "identification",
+        "modes sample_data/modes/amplitudes.csv --excitation force --amplitude-error 2 --phase-error 1",
+        "All three resonances are read on both sides, and the readings lie on the circles and peaks of "
+        "one fit; in the third mode the circle of X3 is small.",
+    ),
+    Picture(
         "shapes",
         "identification",
         f"identify {IDENTIFY}/task_7_1/model.toml {IDENTIFY}/task_7_1/data.csv",

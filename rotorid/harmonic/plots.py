@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
-from rotorid.base.plot_style import MARKERS, QUIET, TEXT, legend_above, look, new_figure, plain
+from rotorid.base.plot_style import MARKERS, QUIET, TEXT, legend_above, look, new_figure, plain, plain_numbers
 from rotorid.base.unit_words import Shown
 from rotorid.regression.interval_plot import ROOM, draw_intervals
 
@@ -69,14 +69,20 @@ def draw_amplitudes(result: Identification, axes: Axes, outputs: Sequence[str]) 
         )
         for w, z, style in _fitted(result, name, curve):
             axes.plot(w, scale * np.abs(z), **style)
+    axes.set(xlabel=result.experiments.axis.word, ylabel=f"amplitude, {_unit(result, outputs)}")
+    scale_amplitudes(axes)
+
+
+def scale_amplitudes(axes: Axes) -> None:
+    """Logarithmic where the amplitudes that are drawn are very different, else from 0."""
     every = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()])
     every = every[np.isfinite(every) & (every > 0)]
     if len(every) and every.max() > WIDE * every.min():
         axes.set_yscale("log")
         axes.set_ylim(every.min() / 1.5, every.max() * 1.5)
+        plain_numbers(axes)
     else:
         axes.set_ylim(bottom=0.0)
-    axes.set(xlabel=result.experiments.axis.word, ylabel=f"amplitude, {_unit(result, outputs)}")
     plain(axes)
 
 

@@ -13,6 +13,8 @@ from rotorid.workflows.option_values import Band, band, one_of
 from rotorid.workflows.result_provenance import Found, phase, provenance, workflow
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from rotorid.harmonic.modal.modal_result import FittedModes
 
 Excitation = Literal["force", "unbalance"]
@@ -48,6 +50,12 @@ class ModesOfReadings(Found):
     """The modes that explain the readings."""
 
     found: FittedModes
+
+    def figure(self) -> Figure:
+        """Readings and fit around each resonance, in the complex plane and over frequency."""
+        from rotorid.harmonic.modal.modal_plot import figure_modes
+
+        return figure_modes(self.found)
 
 
 @workflow

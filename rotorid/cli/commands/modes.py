@@ -13,7 +13,7 @@ from rotorid.workflows.modes import ModesOptions
 from rotorid.workflows.modes import modes as work
 
 
-@command(ModesOptions, to=("output", "table", "json"))
+@command(ModesOptions)
 def modes(
     data: Annotated[
         Path,

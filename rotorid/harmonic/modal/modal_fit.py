@@ -86,16 +86,11 @@ def fit_modes(
     ]
     best = found[0] if found[-1][0] < found[0][0] + CLEARLY else found[-1]
     _, fit, readings, left = best
-    q = fit.estimate.solution
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
-    residues = np.transpose(readings.each(2, q))[: len(rows)]
-    spread = np.swapaxes(readings.each(3, q), 0, 1)[: len(rows)]
     same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
     i, p = divmod(int(np.abs(left).argmax()), len(points))
     worst = points[p], float(omega[i]), float(np.abs(left[i, p]))
-    return FittedModes(
-        tuple(points), fit, residues, spread, ends, float(trend), worst, same, experiments.axis
-    )
+    return FittedModes(tuple(points), fit, ends, float(trend), worst, same, experiments, readings)
 
 
 def _search(

@@ -13,8 +13,9 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, error_figures, listing
-from rotorid.base.unit_words import Shown
 from rotorid.harmonic.comparison import reference_amplitude
+from rotorid.harmonic.experiments import Experiments
+from rotorid.harmonic.modal.modal_readings import Readings
 from rotorid.harmonic.plausibility import misfit
 from rotorid.regression.nonlinear import NonlinearEstimate
 
@@ -37,9 +38,6 @@ class FittedModes(Answered):
         Where amplitudes were read, length P.
     fit
         ω_r in rad/s, then ζ_r.
-    residues, spread
-        R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for the variance
-        of the residuals where no errors are stated.
     ends
         First and last frequency around each resonance, rad/s.
     trend
@@ -48,19 +46,18 @@ class FittedModes(Answered):
         Point and frequency (rad/s) of the largest residual, and it over its error.
     same
         What errors that are not stated were taken to be the same in.
-    axis
-        How people see frequencies.
+    experiments, readings
+        What was fitted, by rising frequency, and the same under its excitation, whitened.
     """
 
     points: tuple[str, ...]
     fit: NonlinearEstimate
-    residues: ComplexArray
-    spread: FloatArray
     ends: tuple[tuple[float, float], ...]
     trend: float
     worst: tuple[str, float, float]
     same: str
-    axis: Shown
+    experiments: Experiments
+    readings: Readings
 
     @cached_property
     def unit(self) -> float:
@@ -71,13 +68,20 @@ class FittedModes(Answered):
         return float(np.fmax(estimate.residuals @ estimate.residuals, 1e-300) / estimate.dof)
 
     @cached_property
+    def residues(self) -> tuple[ComplexArray, FloatArray]:
+        """R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for `unit`."""
+        k, q = len(self.ends), self.fit.estimate.solution
+        return np.transpose(self.readings.each(2, q))[:k], np.swapaxes(self.readings.each(3, q), 0, 1)[:k]
+
+    @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words."""
         from scipy.special import chdtrc
 
         found = [] if self.fit.converged else [self.fit.message]
-        parts = np.stack((self.residues.real, self.residues.imag), axis=-1)
-        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(self.spread), parts) / self.unit
+        residues, spread = self.residues
+        parts = np.stack((residues.real, residues.imag), axis=-1)
+        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
         chance = (self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size)
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
@@ -99,10 +103,11 @@ class FittedModes(Answered):
     @cached_property
     def parts(self) -> tuple[FloatArray, FloatArray]:
         """Residues along and across the common phase of their mode, and their variances, (2, k, P) each."""
-        phase = np.angle((self.residues**2 / np.trace(self.spread, axis1=2, axis2=3)).sum(axis=1)) / 2
+        residues, spread = self.residues
+        phase = np.angle((residues**2 / np.trace(spread, axis1=2, axis2=3)).sum(axis=1)) / 2
         turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
-        turned = self.residues * np.exp(-1j * phase[:, None])
-        variances = np.einsum("aik,kpij,ajk->akp", turn, self.unit * self.spread, turn)
+        turned = residues * np.exp(-1j * phase[:, None])
+        variances = np.einsum("aik,kpij,ajk->akp", turn, self.unit * spread, turn)
         least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
         return np.stack((np.copysign(least, turned.real), turned.imag)), variances
 
@@ -180,7 +185,8 @@ class FittedModes(Answered):
         estimate = self.fit.estimate
         if self.undetermined:
             return Answer("Not every mode is determined: no table of modes.", "", self.warnings)
-        told = [f"{self.axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
+        axis = self.experiments.axis
+        told = [f"{axis.scale * omega:.5g}" for omega in estimate.solution[: len(self.ends)]]
         shapes = [Column("point", self.points, str)]
         for mode, (shape, std) in enumerate(zip(self.shapes, self.shape_std, strict=True), 1):
             shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
@@ -191,7 +197,7 @@ class FittedModes(Answered):
                 f"errors are not stated: the same {self.same}, as what is left of the amplitudes shows"
             )
         return Answer(
-            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {self.axis.word.rpartition(', ')[2]}.",
+            f"{counted(len(told), 'mode')}: {listing(told, 'and')} {axis.word.rpartition(', ')[2]}.",
             f"{estimate.told().found}\n\n{text(shapes, width=COLUMNS)}",
             self.warnings,
             tuple(notes),

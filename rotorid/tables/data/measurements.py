@@ -128,6 +128,7 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
         table.in_header(None, "amplitudes of points: columns X_amplitude and X_phase_deg, or X_re and X_im")
     labels = _experiments(table)
     problems.stop()
+    axis, shown = _shown(table, signals)
     for name, values in signals.items():
         part = next(f"{name}_{part}" for part in ("amplitude", "re") if f"{name}_{part}" in table)
         bad = (omega == 0) | ((name == "F") & (np.isnan(values) | (values == 0)))
@@ -135,10 +136,11 @@ def read_amplitudes(path: str | Path, errors: AmplitudeErrors | None) -> Experim
         if not np.nan_to_num(values).any():
             table.as_whole(table.fields[part].name, "a number that is not 0 in at least one row")
         order = {"velocity": 1, "acceleration": 2}.get(table.unit(part).kind, 0)
-        signals[name] = values / (1j * np.where(bad, 1.0, omega)) ** order
+        if order:
+            signals[name] = values / (1j * np.where(bad, 1.0, omega)) ** order
+            shown[name] = Shown(vibration_unit_words("um"), 1e6)
     problems.stop()
-    axis, units = _shown(table, signals)
-    return Experiments(labels, omega, signals, np.zeros(len(table), bool), errors, axis=axis, units=units)
+    return Experiments(labels, omega, signals, np.zeros(len(table), bool), errors, axis=axis, units=shown)
 
 
 def _free_vibrations(path: str | Path, model: HarmonicModel, file: HarmonicFile | None) -> Experiments:
