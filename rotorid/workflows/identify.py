@@ -185,8 +185,6 @@ def compare(
     if len(models) != 2:
         raise ValueError(f"two models are compared, not {len(models)}")
     refuse(options, {*vars(options)} - {"method", "amplitude_error", "phase_error"}, "belongs to one model")
-    if options.method not in (IdentifyOptions.method, "output-error"):
-        raise ValueError(f"--method {options.method} belongs to one model: two are compared by output error")
     pair = []
     for model in models:
         file = read_harmonic_model(model)
