@@ -150,13 +150,15 @@ class Comparison:
             root = np.sqrt(mode[0])
             over = self.whiten[i, :, 0, 0]
             # without an error of its own the frequency has the relative one of the reference amplitude
-            share = over[reference] * abs(shape[reference]) / omega
+            share, white = over[reference] * abs(shape[reference]) / omega, np.diag(over[others])
             if self.experiments.frequency_std is not None:
                 share = 1 / self.experiments.frequency_std[i]
-            r = np.concatenate(
-                ([(root - omega) * share], over[others] * (w * shape[reference] - shape)[others])
-            )
-            J = np.vstack((dz / (2 * root) * share, (over * shape[reference])[others, None] * dw[others]))
+                # then the error of the reference is one of all that is told relative to it
+                common = shape[others] / (shape[reference] * over[reference])
+                own = np.diag(over[others] ** -2) + np.outer(common, common)
+                white = np.linalg.inv(np.linalg.cholesky(own))
+            r = np.concatenate(([(root - omega) * share], white @ (w * shape[reference] - shape)[others]))
+            J = np.vstack((dz / (2 * root) * share, shape[reference] * white @ dw[others]))
             parts.append((r, J))
         return parts
 

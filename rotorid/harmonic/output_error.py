@@ -96,9 +96,8 @@ def output_error(
         With as many equations as outputs.
     experiments
         Harmonic tests, with the inputs known; free vibrations (the predicted mode most like the measured
-        shape is compared: its frequency, and its amplitudes relative to the first measured one, taken as
-        exact; the frequency counts with its error, or else with the relative one of an amplitude). Some
-        amplitudes may be missing.
+        shape is compared: its frequency, and its amplitudes relative to the first measured one; the frequency
+        counts with its error, or else with that of this amplitude). Some amplitudes may be missing.
     start
         First guess of each parameter, by name or in the model's order; NaN where there is none.
     bounds, loss

@@ -19,6 +19,7 @@ from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import percent
 from rotorid.harmonic.comparison import compare
+from rotorid.harmonic.equation_error import limits
 from rotorid.harmonic.experiments import Experiments
 from rotorid.harmonic.operator_model import HarmonicModel
 from rotorid.harmonic.output_identification import identify_outputs
@@ -82,7 +83,8 @@ class StructureComparison(Answered):
         said = "Neither model is a special case of the other: the F test does not apply. Compare the misfits."
         if self.special is not None:
             said = f"{self.names[self.special]} is a special case of the other model."
-        if self.special is not None and self.dof[0] == self.dof[1]:
+        ranks = [fit.rank for fit in self.fits]
+        if self.special is not None and ranks[0] == ranks[1] and self.dof[0] == self.dof[1]:
             said = "The models predict the same amplitudes: no such readings tell them apart."
         elif self.special is not None and self.f_test is not None:
             many = self.dof[1 - self.special]
@@ -137,7 +139,8 @@ def compare_structures(pair: Sequence[Structure]) -> StructureComparison:
     if {*plans[0].rows} != {*plans[1].rows}:
         raise ValueError("the models predict different readings: both need the same outputs and inputs")
     alone = [one.fit(one.data, one.start)[0] for one in pair]
-    less = int(alone[0].rank > alone[1].rank)
+    sizes = [(fit.rank, not one.bounds) for one, fit in zip(pair, alone, strict=True)]
+    less = int(sizes[0] > sizes[1])
     more = 1 - less
     # the errors of the larger model's amplitudes, as covariances, for both
     root = np.linalg.inv(plans[more].reweighted(_values(alone[more])).whiten)
@@ -148,6 +151,8 @@ def compare_structures(pair: Sequence[Structure]) -> StructureComparison:
     fits = [one.fit(rows, fit.starts[0]) for one, rows, fit in zip(pair, data, alone, strict=True)]
     theta = _values(fits[less][0])
     elsewhere = theta * np.random.default_rng(7).uniform(0.8, 1.25, len(theta))
+    for i, name in enumerate(pair[less].model.parameters):
+        elsewhere[i] = np.clip(elsewhere[i], *limits(pair[less].bounds).get(name, (-np.inf, np.inf)))
     begin, again = (_reproduced(pair[less], point, pair[more]) for point in (theta, elsewhere))
     nested = begin is not None and again is not None
     if begin is not None and nested:  # the larger model is nowhere worse than there
@@ -157,10 +162,15 @@ def compare_structures(pair: Sequence[Structure]) -> StructureComparison:
         f"{one.name}: {words}" for one, fit in zip(pair, alone, strict=True) for words in fit.warnings
     ]
     left = left_over(pair[more].model, pair[more].data, _values(fits[more][0]))
-    few, test = dof[less] - dof[more], None
-    if not dof[more] or (left is not None and left < EXACT) or not all(fit.converged for fit, _ in fits):
-        words = "no F test: a fit leaves no degree of freedom or only rounding, or it did not converge"
-        warnings.insert(0, words)
+    few, test, why = dof[less] - dof[more], None, ""
+    if nested and few != fits[more][0].rank - fits[less][0].rank:
+        why = "a parameter stands at its bound, where F does not hold"
+    elif nested and plans[more].warnings:  # the misfits are too small for their degrees of freedom
+        why = "an amplitude or a phase counts as exact: state both errors"
+    elif not dof[more] or (left is not None and left < EXACT) or not all(fit.converged for fit, _ in fits):
+        why = "a fit leaves no degree of freedom or only rounding, or it did not converge"
+    if why:
+        warnings.insert(0, f"no F test: {why}")
     elif nested and few > 0:
         F = max(misfits[less] - misfits[more], 0.0) / few * dof[more] / misfits[more]
         test = F, float(fdtrc(few, dof[more], F))
@@ -180,7 +190,7 @@ def _values(fit: Identification) -> FloatArray:
 
 
 def _reproduced(one: Structure, theta: FloatArray, other: Structure) -> Mapping[str, float] | None:
-    """Parameters of another model that give the same readings as these of this one; None: there are none."""
+    """Parameters of another model within its bounds that give the same readings as these of this one."""
     plan = compare(one.model, one.data)
     predicted, natural = plan.predict(theta)
     table = dict(zip(one.model.outputs, np.where(np.isnan(plan.measured), np.nan, predicted).T, strict=True))
@@ -188,7 +198,7 @@ def _reproduced(one: Structure, theta: FloatArray, other: Structure) -> Mapping[
     w = np.where(one.data.free, natural, one.data.frequencies)
     with suppress(ValueError):  # no such mode, no start
         exact = replace(other.data, signals=signals, frequencies=w, errors=None, covariances={})
-        found = identify_outputs(other.model, exact)
+        found = identify_outputs(other.model, exact, other.bounds or None)
         left = left_over(other.model, exact, _values(found))
         return found.starts[0] if left is not None and left < EXACT else None
     return None

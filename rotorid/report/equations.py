@@ -119,7 +119,7 @@ class Equations:
         """Name of each row, the matrix, the right side."""
         matrix, unknowns, right = self.names
         columns = zip(
-            (*self.columns, f"| {right}"), np.column_stack((self.matrix, self.right)).T, strict=True
+            (*self.columns, f"| {right}"), (np.column_stack((self.matrix, self.right)) + 0.0).T, strict=True
         )
         numbers = [Column(name, values, "{:.6g}".format, cut(name, _LONGEST)) for name, values in columns]
         return [Column(f"{matrix} {unknowns} = {right}", self.rows, str), *numbers]
@@ -150,8 +150,8 @@ def _words(expression: Expression) -> str:
     """As text: `m1·ω²`."""
     from sympy import sstr
 
-    told = sstr(_decimals(expression)).replace(BEHIND, "").replace("Abs(", "abs(")
-    told = re.sub(r"\*\*(\d+)", lambda found: found[1].translate(_RAISED), told)
+    told = sstr(expression).replace(BEHIND, "").replace("Abs(", "abs(")
+    told = re.sub(r"\*\*(\d+)(?![\w.])", lambda found: found[1].translate(_RAISED), told)
     return re.sub(r"(?<!\*)\*(?!\*)", "·", told)
 
 
@@ -159,21 +159,23 @@ def _formula(expression: Expression) -> str:
     from sympy import latex
 
     names = {symbol: _formula_of(symbol.name) for symbol in expression.free_symbols}
-    return str(latex(_decimals(expression), symbol_names=names))
+    return str(latex(expression, symbol_names=names))
 
 
 def _decimals(expression: Expression) -> Expression:
-    """Long fractions as decimals."""
-    from sympy import Float, Rational
+    """Long fractions as decimals; sympy multiplies a sum out by such a factor."""
+    from sympy import Float, Rational, sympify
 
-    return expression.xreplace({q: Float(q, 6) for q in expression.atoms(Rational) if q.q > 100})
+    whole = sympify(expression)
+    return whole.xreplace({q: Float(q, 6) for q in whole.atoms(Rational) if q.q > 100})
 
 
 def _sum(terms: Terms, *, latex: bool) -> str:
     """Coefficient times factor, term by term; 0 and 1 are not written."""
     write, times, brackets = (_formula, r" \cdot ", r"\left({}\right)") if latex else (_words, "·", "({})")
     told = []
-    for parts in terms:
+    for pair in terms:
+        parts = [*map(_decimals, pair)]
         if 0 in parts:
             continue
         inside = [one for one in parts if one not in (1, -1)]

@@ -103,8 +103,11 @@ class Simulation(Outcome):
     notes: tuple[str, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON types."""
-        return {"parameters": dict(self.parameters), "notes": list(self.notes), "rows": rows(self.columns)}
+        """As JSON types: the names of the columns, and a row of numbers for each line of the table."""
+        values = [list(row.values()) for row in rows(self.columns)]
+        signals = [column.name for column in self.columns]
+        told = {"parameters": dict(self.parameters), "notes": list(self.notes)}
+        return {**told, "signals": signals, "values": values}
 
     def to_frame(self) -> pd.DataFrame:
         """The table."""

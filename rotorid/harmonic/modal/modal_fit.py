@@ -22,7 +22,9 @@ UNSTATED = {
     "share of every amplitude": AmplitudeErrors(1.0, 1.0),
     "size everywhere": AmplitudeErrors(floor=1.0),
 }
-"""What errors are the same in, if none are stated: what the readings make more likely."""
+"""What errors are the same in, if none are stated: the first, if the readings do not speak for the other."""
+CLEARLY = 3.0
+"""By so much more likely (logarithm, of as many readings as are spare) the other must be."""
 ROUNDS = 3
 """With errors at the measured amplitudes, then at the fitted ones."""
 
@@ -50,7 +52,7 @@ def fit_modes(
     Raises
     ------
     ValueError
-        Where there is no peak, and where readings are fewer than unknowns.
+        Where there is no peak, bands overlap, and where readings are fewer than unknowns.
     """
     omega, read = experiments.frequencies, ~np.isnan(experiments.table(points)).all(axis=1)
     if bands is not None:
@@ -62,6 +64,8 @@ def fit_modes(
     omega, Z = experiments.frequencies, experiments.table(points)
     H = Z / excitation[:, None]
     sections = _peaks(omega, H) if bands is None else sorted(bands)
+    if bands is not None and any(low < high for (_, high), (low, _) in pairwise(sections)):
+        raise ValueError("--bands overlap: each holds one mode")
     rows = [np.flatnonzero((omega >= low) & (omega <= high)) for low, high in sections]
     spare = np.count_nonzero(~np.isnan(Z), axis=0) - len(rows) - 2
     if min(spare) < 0 or sum(spare) < len(rows) or min(len(np.unique(omega[row])) for row in rows) < 3:
@@ -80,11 +84,13 @@ def fit_modes(
         _search(replace(experiments, errors=errors), points, excitation, q, bounds, experiments.stated)
         for errors in kinds
     ]
-    best = max(found, key=lambda one: one[0])
+    best = found[0] if found[-1][0] < found[0][0] + CLEARLY else found[-1]
     _, fit, readings, left = best
     trend = np.vdot(left[:-1], left[1:]).real / np.vdot(left, left).real * np.sqrt(2 * left.size)
     same = "" if experiments.errors else list(UNSTATED)[found.index(best)]
-    return FittedModes(tuple(points), fit, ends, float(trend), same, experiments, readings)
+    i, p = divmod(int(np.abs(left).argmax()), len(points))
+    worst = points[p], float(omega[i]), float(np.abs(left[i, p]))
+    return FittedModes(tuple(points), fit, ends, float(trend), worst, same, experiments, readings)
 
 
 def _search(
@@ -95,7 +101,7 @@ def _search(
     bounds: Bounds,
     stated: bool,
 ) -> tuple[float, NonlinearEstimate, Readings, ComplexArray]:
-    """Likelihood (its logarithm but for a constant), fit, readings, and what is left of these relatively."""
+    """Likelihood (its logarithm but for a constant), fit, readings, and what is left of these over errors."""
     fitted = Z = experiments.table(points)
     for turn in range(ROUNDS):
         root, _ = whitening(experiments, tuple(points), fitted)
@@ -114,8 +120,10 @@ def _search(
         ratio = np.abs(model) / np.abs(Z)
         fitted = np.where((ratio < TRUSTED) & (ratio > 1 / TRUSTED), model, Z)
     r, seen = fit.estimate.residuals, ~np.isnan(Z)
-    likelihood = np.log(np.linalg.det(root[seen])).sum() - seen.sum() * np.log(np.fmax(r @ r, 1e-300))
-    return float(likelihood), fit, readings, np.nan_to_num((Z - model) / np.abs(model))
+    likelihood = np.log(np.linalg.det(root[seen])).mean() - np.log(np.fmax(r @ r, 1e-300))
+    gap = np.nan_to_num(np.stack(((Z - model).real, (Z - model).imag), axis=-1))
+    left = np.einsum("npij,npj->npi", root, gap) @ (1, 1j)
+    return float(likelihood * fit.estimate.dof / 2), fit, readings, left
 
 
 def _peaks(omega: FloatArray, H: ComplexArray) -> list[tuple[float, float]]:

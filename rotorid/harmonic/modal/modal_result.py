@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotorid.base.answer import COLUMNS, Answer, Answered
-from rotorid.base.arrays import FloatArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
 from rotorid.base.text import counted, error_figures, listing
@@ -42,6 +42,8 @@ class FittedModes(Answered):
         First and last frequency around each resonance, rad/s.
     trend
         Correlation of neighbouring residuals, in its standard deviations.
+    worst
+        Point and frequency (rad/s) of the largest residual, and it over its error.
     same
         What errors that are not stated were taken to be the same in.
     experiments, readings
@@ -52,20 +54,45 @@ class FittedModes(Answered):
     fit: NonlinearEstimate
     ends: tuple[tuple[float, float], ...]
     trend: float
+    worst: tuple[str, float, float]
     same: str
     experiments: Experiments
     readings: Readings
 
     @cached_property
+    def unit(self) -> float:
+        """Variance of residuals where no errors are stated, else 1; NaN where nothing is left to tell it."""
+        estimate = self.fit.estimate
+        if estimate.errors_stated or estimate.dof < 1:
+            return 1.0 if estimate.errors_stated else np.nan
+        return float(np.fmax(estimate.residuals @ estimate.residuals, 1e-300) / estimate.dof)
+
+    @cached_property
+    def residues(self) -> tuple[ComplexArray, FloatArray]:
+        """R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for `unit`."""
+        k, q = len(self.ends), self.fit.estimate.solution
+        return np.transpose(self.readings.each(2, q))[:k], np.swapaxes(self.readings.each(3, q), 0, 1)[:k]
+
+    @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words."""
+        from scipy.special import chdtrc
+
         found = [] if self.fit.converged else [self.fit.message]
+        residues, spread = self.residues
+        parts = np.stack((residues.real, residues.imag), axis=-1)
+        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
+        chance = (self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size)
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
         for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
             zip(told, self.ends, strict=True), 1
         ):
-            if not 2 * error < high - low:
+            if chance[mode - 1] > RARE:
+                found.append(
+                    f"mode {mode} ({omega:.5g} rad/s) is no more than noise: say in --bands where modes are"
+                )
+            elif not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
             elif not low < omega < high:
                 found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
@@ -76,16 +103,11 @@ class FittedModes(Answered):
     @cached_property
     def parts(self) -> tuple[FloatArray, FloatArray]:
         """Residues along and across the common phase of their mode, and their variances, (2, k, P) each."""
-        k, q = len(self.ends), self.fit.estimate.solution
-        residues = np.transpose(self.readings.each(2, q))[:k]
-        spread = np.swapaxes(self.readings.each(3, q), 0, 1)[:k]  # at this q, of whitened readings
+        residues, spread = self.residues
         phase = np.angle((residues**2 / np.trace(spread, axis1=2, axis2=3)).sum(axis=1)) / 2
         turn = np.array([[np.cos(phase), np.sin(phase)], [-np.sin(phase), np.cos(phase)]])
         turned = residues * np.exp(-1j * phase[:, None])
-        estimate = self.fit.estimate
-        unit = estimate.residuals @ estimate.residuals / estimate.dof if estimate.dof > 0 else np.nan
-        variances = np.einsum("aik,kpij,ajk->akp", turn, spread, turn)
-        variances *= 1.0 if estimate.errors_stated else unit
+        variances = np.einsum("aik,kpij,ajk->akp", turn, self.unit * spread, turn)
         least = np.fmax(np.abs(turned.real), np.sqrt(variances[0]) / LARGEST)
         return np.stack((np.copysign(least, turned.real), turned.imag)), variances
 
@@ -108,7 +130,12 @@ class FittedModes(Answered):
         lost = (across**2).sum(axis=1) / (along**2).sum(axis=1)  # of the real parts, of second order
         chance = chdtrc(max(len(self.points) - 1, 1), (across**2 / variances).sum(axis=1))
         minded = np.maximum(EXACT, np.median(self.shape_std, axis=1) / 2)
-        misfits = [*misfit(self.fit.estimate)]
+        misfits, (point, omega, size) = [*misfit(self.fit.estimate)], self.worst
+        if (self.fit.estimate.dof + 1) * np.exp(-(size**2) / self.unit / 2) < RARE:
+            off = size / self.unit**0.5
+            misfits.append(
+                f"{point} at {omega:.5g} rad/s is {off:.2g} standard deviations off: a wild reading"
+            )
         if not self.fit.estimate.errors_stated and ndtr(-self.trend) < RARE:
             misfits.append("what is left of the amplitudes is no noise: it changes slowly with the frequency")
         return (

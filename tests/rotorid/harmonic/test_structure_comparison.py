@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import f, ncf
 
 from rotorid.harmonic import AmplitudeErrors, harmonic_model
+from rotorid.harmonic.output_identification import identify_outputs
 from rotorid.harmonic.simulated_measurements import as_read, forced_vibration, free_vibration
 from rotorid.harmonic.structure_comparison import Structure, compare_structures
 from rotorid.samples import sample_data
@@ -17,7 +18,7 @@ DAMPED = "(m*p**2 + b*p + c)*X = F"
 
 
 def model(equation, estimate, **known):
-    return harmonic_model([equation], known=known, estimate=estimate)
+    return harmonic_model([equation], known=known, estimate=[*estimate])
 
 
 MASS = model(DAMPED, ["c", "b", "m"])
@@ -96,6 +97,56 @@ def test_the_same_model_in_other_parameters_is_told():
     found = compared(other, MASS, readings())
     assert np.isclose(*found.misfits, rtol=1e-9)
     assert "no such readings tell them apart" in found.summary()
+
+
+def within(bounds, equation=DAMPED, estimate=("c", "b", "m"), data=None):
+    one = model(equation, estimate)
+    pair = Structure("plain", MASS, data, {}, {}), Structure("bounded", one, data, bounds, {})
+    return compare_structures(pair)
+
+
+THIRD = {"equation": "(T*p**3 + m*p**2 + b*p + c)*X = F", "estimate": ("T", "m", "b", "c")}
+
+
+def test_bounds_that_leave_the_special_case_out():
+    """Without the term T = 0, so that a model with T from 0.01 does not hold the plain one."""
+    found = within({"T": (0.01, 1.0)}, **THIRD, data=readings())
+    assert (found.special, found.f_test) == (None, None)
+    assert "the F test does not apply" in found.summary()
+
+
+def test_a_special_case_at_a_bound_is_told_and_not_tested():
+    exact = forced_vibration(model(**THIRD), np.array([-0.3, 10.0, 10.0, 1000.0]), W, {"F": 10.0})
+    data = as_read(exact, ["X"], ERRORS)
+    found = within({"T": (0.0, 1.0)}, **THIRD, data=data)
+    assert (found.special, found.f_test) == (0, None)
+    said = found.summary()
+    assert "no F test: a parameter stands at its bound" in said
+    assert "no such readings tell them apart" not in said
+
+
+def test_the_same_model_within_bounds_is_the_special_case():
+    found = within({"m": (10.5, 11.0)}, data=readings())
+    assert (found.special, found.f_test) == (1, None)
+    assert found.misfits[1] > found.misfits[0] + 1
+    assert "no such readings tell them apart" not in found.summary()
+
+
+def test_bounds_of_both_around_the_estimate_change_nothing():
+    data = readings()
+    near = {"b": (0.0, 1.01 * identify_outputs(FIXED, data).value("b"))}
+    small, large = (
+        Structure(one, one_model, data, near, {}) for one, one_model in (("s", FIXED), ("l", MASS))
+    )
+    assert compare_structures((small, large)).special == 0
+
+
+def test_a_phase_without_an_error_is_not_tested():
+    """It counts with a hundredth of the amplitude's error: 14 of 100 such F were above the level of 5 %."""
+    data = replace(readings(), errors=AmplitudeErrors(0.05))
+    found = compared(FIXED, MASS, data)
+    assert (found.special, found.f_test) == (0, None)
+    assert "no F test: an amplitude or a phase counts as exact" in found.summary()
 
 
 def test_equations_multiplied_by_anything_give_the_same():

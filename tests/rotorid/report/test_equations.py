@@ -571,6 +571,21 @@ def test_terms_keep_their_signs_and_brackets():
     assert Row("", [(long * a, x)], [(sympy.Rational(3, 10), x)]).written() == "1.23457·a·x = 3/10·x"
 
 
+def test_a_sum_with_a_long_fraction_before_it_keeps_its_brackets():
+    x, y, z = sympy.symbols("x y z")
+    sum_of_two = sympy.factor_terms(sympy.Rational(14, 5) * x - sympy.Rational(1277, 250) * y**2)
+    assert sum_of_two.is_Mul  # sympy multiplies it out once its fraction is a decimal
+    row = Row("", [(sum_of_two, z)], [(1, z)])
+    assert row.written() == "(2.8·x - 5.108·y²)·z = z"
+    assert row.written(latex=True) == r"\left(2.8 x - 5.108 y^{2}\right) \cdot z = z"
+
+
+def test_only_whole_powers_are_raised():
+    x = sympy.Symbol("x")
+    row = Row("", [(x**12, 1)], [(x ** sympy.Rational(1333, 1000), 1), (x ** sympy.Float("12.5"), 1)])
+    assert row.written() == "x¹² = x**1.333 + x**12.5"
+
+
 @pytest.mark.parametrize("name", FOUND)
 def test_the_document_has_what_was_solved(name):
     shown = FOUND[name].equations

@@ -212,7 +212,8 @@ def test_python_gives_what_the_command_prints(cli):
     assert {k: v for k, v in told.items() if k != "provenance"} == {
         k: v for k, v in document.items() if k != "provenance"
     }
-    assert (told["rows"][0]["F_re"], told["rows"][0]["F_im"]) == (0, -10)
+    assert told["signals"] == ["frequency_rad_s", "F_re", "F_im", "X_re", "X_im"]
+    assert told["values"][0][:3] == [10, 0, -10]
 
 
 def test_what_changes_from_row_to_row_is_a_column(tmp_path):
@@ -234,17 +235,17 @@ def test_amplitudes_without_a_sensor_are_not_written(cli, tmp_path):
     """The run-down file shows readings in µm in place of the coordinates."""
     words = "--modes", "--with", "d_x7=900,d_x12=1600,d_x18=1300,m_x12=196.6167587206449"
     found = cli("simulate", FIT / "run_down" / "model.toml", *words, "--json").json
-    assert list(found["rows"][0]) == ["frequency_rad_s", "drive_end_re", "middle_re", "free_end_re"]
-    assert abs(found["rows"][0]["frequency_rad_s"] - 135.2358) < 1e-3
+    assert found["signals"] == ["frequency_rad_s", "drive_end_re", "middle_re", "free_end_re"]
+    assert abs(found["values"][0][0] - 135.2358) < 1e-3
     model = tmp_path / "m.toml"
     model.write_text(
         'coordinates = ["x", "y"]\nM = [[1, 0], [0, "m"]]\nK = [["100 + k", "-k"], ["-k", "k"]]\n'
         'inputs = ["F"]\n[force]\nx = "F"\n[outputs]\nx = "x"\n[estimate]\nm = 1\nk = 1\n'
     )
     words = "--with", "m=2,k=50", "--frequencies", "3", "--inputs", "F=1"
-    (row,) = cli("simulate", model, *words, "--json").json["rows"]
-    assert list(row) == ["frequency_rad_s", "F_re", "F_im", "x_re", "x_im"]
-    assert np.isclose(row["x_re"], np.linalg.solve([[150 - 9, -50], [-50, 50 - 18]], [1, 0])[0])
+    found = cli("simulate", model, *words, "--json").json
+    assert found["signals"] == ["frequency_rad_s", "F_re", "F_im", "x_re", "x_im"]
+    assert np.isclose(found["values"][0][3], np.linalg.solve([[150 - 9, -50], [-50, 50 - 18]], [1, 0])[0])
 
 
 UNDAMPED = 'equations = ["(m*p**2 + c)*X = F"]\nknown = { m = 10.0 }\nestimate = ["c"]\n'
@@ -301,7 +302,7 @@ def test_a_sharp_resonance_is_none_without_damping(cli, tmp_path):
     """One part in a million: Q = 1e6 is computed, to the digits of the closed form."""
     words = "--with", "c=1000,alpha=1e-4", "--frequencies", "10", "--inputs", "F=1"
     found = cli("simulate", task("task_5_1"), *words, "--json").json
-    assert np.isclose(found["rows"][0]["X_im"], -1000.0, rtol=1e-12)
+    assert np.isclose(found["values"][0][found["signals"].index("X_im")], -1000.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("times", ["0:50", "0:x:1", "5:0:1", "0:1:0", "0:1e9:1e-9", ""])
