@@ -140,7 +140,9 @@ def output_error(
         comparison = comparison.reweighted(point)
     joined = _joined(rounds)
     estimate, J = joined.estimate, comparison.jacobian(joined.estimate.solution)
-    told = effect(own, J, estimate.residuals, estimate.solution)
+    told = effect(
+        own, J, estimate.residuals, estimate.solution, stated=experiments.stated, at_bounds=joined.at_bounds
+    )
     estimate = told.apart(estimate, stated=experiments.stated) if told else estimate
     return replace(_result(replace(joined, estimate=_spare(estimate, J)), comparison), prior=told)
 

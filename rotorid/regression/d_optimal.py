@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+WITHOUT_PRIOR = ("the expected deviations are those of the readings alone, without [prior]",)
 _WORDS = {"rad/s": ("frequency_rad_s", "frequencies"), "s": ("t_s", "times")}
 """Name of a column of candidates, and of several of them, by their unit."""
 RIDGE = 1e-12
@@ -56,6 +57,8 @@ class Design(Answered):
         the same number evenly over all candidates; NaN where all do not determine the parameters.
     unit
         Of the candidates, "rad/s" or "s".
+    notes
+        What the expected deviations leave out.
     """
 
     parameters: tuple[str, ...]
@@ -67,6 +70,7 @@ class Design(Answered):
     std_all: FloatArray
     efficiency: float
     unit: str = "rad/s"
+    notes: tuple[str, ...] = ()
 
     @property
     def where(self) -> FloatArray:
@@ -98,7 +102,7 @@ class Design(Answered):
             Column("all", every, error_figures, "± of all"),
             Column("why", known, str, ""),
         )
-        return Answer(f"{said}.", text(columns, width=COLUMNS))
+        return Answer(f"{said}.", text(columns, width=COLUMNS), notes=self.notes)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per candidate: frequency, how often chosen, expected standard deviations from it alone."""

@@ -8,7 +8,7 @@ asks for regularisation where its information matrix (2.28) is ill-conditioned, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from rotorid.base.arrays import FloatArray, IntArray
 from rotorid.base.json import plain
 from rotorid.base.text import percent
 from rotorid.regression.estimate import Estimate
-from rotorid.regression.linear import least_squares, solution
+from rotorid.regression.linear import least_squares, solution_and_rank
 from rotorid.regression.search import RCOND, Function
 
 FAR = 3.0
@@ -92,15 +92,17 @@ class PriorEffect:
     """What a prior or a ridge did to an estimate: `share` and `away` (p,), the rest once.
 
     `share` is how much of what is known of a parameter comes from the data, 1 − variance / prior variance;
-    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing. `alone`
-    is what the data alone determine, in words, if that is not everything, `lost` what they do not, `rank` and
-    `best` their rank and residuals (m,). Condition numbers and rms are those without and with the prior; a
-    nonlinear model is linearised.
+    `away` the standard deviations between the prior and all the rest, NaN where the data say nothing, and
+    `limit` from where on that is much. `alone` is what the data alone determine, in words, if that is not
+    everything, `lost` what only the rows determine, `rank` and `best` rank and residuals (m,) of the data,
+    with what stands at a bound held there. Condition numbers and rms are those without and with the prior;
+    a nonlinear model is linearised.
     """
 
     rows: Prior
     share: FloatArray
     away: FloatArray
+    limit: FloatArray
     alone: str
     lost: tuple[str, ...]
     rank: int
@@ -130,8 +132,8 @@ class PriorEffect:
                 f"and {condition:.3g}",
             )
         far = np.nan_to_num(np.abs(self.away))
-        i = int(np.argmax(far))
-        if far[i] <= FAR:
+        i = int(np.argmax(far / self.limit))
+        if far[i] <= self.limit[i]:
             return ()
         rest = "the data" if len(far) == 1 else "the data and the other priors"
         return (
@@ -167,28 +169,40 @@ class PriorEffect:
         return plain({"ridge" if self.rows.ridge else "prior": told})
 
 
-def effect(rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray) -> PriorEffect | None:
+def effect(
+    rows: Prior, K: FloatArray, r: FloatArray, theta: FloatArray, *, stated: bool, at_bounds: Collection[str]
+) -> PriorEffect | None:
     """What the rows of a prior did to the estimate (n,); None without any.
 
-    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors.
+    K (m, n) and r (m,) are derivatives and residuals of the data there, over their errors, which are `stated`
+    or estimated.
     """
     if not len(rows):
         return None
+    from scipy.special import ndtr, stdtrit
+
+    moves = np.array([name not in at_bounds for name in rows.names])
+    free = K * moves
+    nothing = np.zeros(len(K) + len(rows))
     alone = least_squares(K, -r, names=rows.names, sigma=1.0, rcond=RCOND)
-    A = rows.below(K)
-    both = least_squares(A, np.zeros(len(A)), sigma=1.0, rcond=RCOND)
-    assert both.std is not None
-    share = np.nan_to_num(1.0 - (both.std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
+    both = least_squares(rows.below(K), nothing, names=rows.names, rcond=RCOND)
+    std = least_squares(rows.below(free), nothing, sigma=1.0, rcond=RCOND).std
+    assert std is not None
+    share = np.nan_to_num(1.0 - (std[rows.place] / rows.std) ** 2).clip(0.0, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         away = rows.residual(theta) / np.sqrt(share)
-    best = r + K @ solution(K, -r, rcond=RCOND)
+    step, rank = solution_and_rank(free, -r, rcond=RCOND)
+    best, dof = r + free @ step, 1e9 if stated else max(len(r) - rank, 1)
+    # of the difference only the part of the data, 1 - share, has an estimated error (Cochran)
+    limit = np.sqrt(share * FAR**2 + (1.0 - share) * stdtrit(dof, ndtr(FAR)) ** 2)
     return PriorEffect(
         rows=rows,
-        share=share,
+        share=np.where(moves[rows.place], share, np.nan),
         away=np.where(share > SILENT, away, np.nan),
+        limit=limit,
         alone="" if alone.full_rank else alone.describe_rank(),
-        lost=alone.undetermined,
-        rank=alone.rank,
+        lost=tuple(name for name in alone.undetermined if name not in both.undetermined),
+        rank=rank,
         best=best,
         condition_numbers=(alone.condition_number, both.condition_number),
         residual_rms=(float(np.sqrt(np.mean(best**2))), float(np.sqrt(np.mean(r**2)))),

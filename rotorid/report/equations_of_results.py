@@ -174,8 +174,9 @@ def _(found: Fit) -> Equations:
                 outputs.append(Row("output", [(1, Symbol(f"∂{name}/∂{theta}"))], chain(f, theta, S)))
     rows, none = [*equations, *starts, *outputs], np.zeros((0, len(thetas)))
     title = f"Sensitivities, [F] (3.6), (3.7), of {counted(n, 'state')}"
+    notes = ["below these: the rows of [prior] or --ridge, (θ - value)/std = 0"] if found.prior else []
     return Equations(
-        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values
+        title, rows, ("U", "θ", "y"), (), model.parameters, none, none[:, 0], found.estimate.values, notes
     )
 
 

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from rotorid.harmonic import Identification
     from rotorid.regression.d_optimal import Design
+    from rotorid.regression.prior import PriorEffect
     from rotorid.timedomain.result import Fit
 
 READINGS = 40
@@ -54,7 +55,7 @@ def fit_report(
         seen = Markup("; correlation of neighbouring ones {} (0 of noise alone)")
         left += seen.format(document.show("autocorrelation", decimals=2))
     parts = [
-        _estimate(document, result.answer, result.estimate.combinations, result.at_bounds),
+        _estimate(document, result.answer, result.estimate.combinations, result.prior, result.at_bounds),
         Part("What the model leaves", (left + ".",), (Grid("Each signal", shown(result.series)),)),
         *_model(model),
         _picture(figure_fit(result), "Signals and residuals over time"),
@@ -83,7 +84,8 @@ def identification_report(
         note = f"{len(rows)} of {count} readings; --table prints all." if len(rows) < count else ""
         left = Part("What the model leaves", tables=(Grid("Each reading", shown(columns, rows), note),))
         drawn = _picture(figure_identification(result), "Amplitudes or shapes")
-        parts = [_estimate(document, result.answer, result.combinations), *[left][:count], *parts, drawn]
+        first = _estimate(document, result.answer, result.combinations, result.prior)
+        parts = [first, *[left][:count], *parts, drawn]
     if design is not None:
         told = design.answer
         parts.append(Part("Which frequencies to measure next", (told.judgement,), listing=told.found))
@@ -145,11 +147,12 @@ def _estimate(
     document: Document,
     answer: Answer,
     combinations: Sequence[FoundCombination],
+    prior: PriorEffect | None,
     at_bounds: Sequence[str] = (),
 ) -> Part:
     """The judgement, every parameter with its interval or why it has none, and what is determined instead."""
     found, solutions = document["parameters"], document["solutions"]
-    numbers, remarks = [], []
+    numbers, remarks, why = [], [], prior.why if prior else {}
     for name, one in found.items():
         value, std = one["value"], one["std"]
         digits = value_digits(value or 0.0, std)
@@ -158,7 +161,7 @@ def _estimate(
         cells = [document.show(f"parameters.{key}", 3 if key.endswith("std") else digits) for key in keys]
         numbers.append([*cells, NOTHING, NOTHING][:4])
         several = value is None and len({one[name] for one in solutions}) > 1
-        unknown = "several values" if several else "not determined" if value is None else ""
+        unknown = "several values" if several else "not determined" if value is None else why.get(name, "")
         remarks.append("at its bound" if name in at_bounds else unknown)
     value, std, low, high = zip(*numbers, strict=True)
     columns = [words("parameter", found), Cells("estimate", value), Cells("±", std)]

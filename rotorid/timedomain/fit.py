@@ -27,6 +27,8 @@ SECONDS = 60.0
 WEIGHINGS = 20
 """Fits at most with weights from the residuals of the last one."""
 Searching = Callable[[Problem, FloatArray], Path]
+Ends = tuple[Path, tuple[Minimum, ...]]
+"""The best of several searches, and all minima."""
 
 
 @np.errstate(all="ignore")  # what is not finite is looked for
@@ -139,9 +141,10 @@ def fit(  # noqa: PLR0913
     kind = trajectory if trajectory is not None else "data" if method == "multiple-shooting" else "model"
 
     search = Search(way, limits, loss, kind, pieces, max_iterations, Stop(tolerance))
-    path, minima = search_all(search, spread_starts(begin, limits, starts, seed), problem)
+    begins = spread_starts(begin, limits, starts, seed)
+    path, minima = search_all(search, begins, problem)
     if weigh:
-        problem, path = _weighed(search, problem, path, prior)
+        problem, path, minima = _weighed(search, problem, (path, minima), prior, begins)
     problem.limit = np.inf  # of the search alone
     judged = judge(problem, path, loss)
     simulations = problem.runs if np.isfinite(problem.residual(path.estimate.solution)).all() else ()
@@ -171,8 +174,11 @@ def fit(  # noqa: PLR0913
     )
 
 
-def _weighed(search: Searching, problem: Problem, path: Path, prior: Prior) -> tuple[Problem, Path]:
-    """Weights from the residuals of the last fit, until they stay; only then a prior, whatever it says."""
+def _weighed(
+    search: Searching, problem: Problem, found: Ends, prior: Prior, begins: Sequence[FloatArray]
+) -> tuple[Problem, *Ends]:
+    """Weights from the residuals of the last fit, until they stay; only then a prior, from all starts."""
+    path, minima = found
     for _ in range(WEIGHINGS if path.converged else 0):
         errors = output_errors(problem, path.estimate.residuals, path.estimate.rank)
         stopped = problem.late and not path.converged
@@ -183,14 +189,13 @@ def _weighed(search: Searching, problem: Problem, path: Path, prior: Prior) -> t
     if len(prior) and problem.prior is not prior:
         if not (path.converged and problem.errors):
             raise ValueError("--sigma auto finds no errors without [prior] to weigh it by: state them")
-        problem.prior = prior
-        path = search(problem, path.estimate.solution).after(path.history)
-    return problem, path
+        problem.prior, before = prior, path
+        path, minima = search_all(search, [before.estimate.solution, *begins[1:]], problem)
+        path = path.after(before.history)
+    return problem, path, minima
 
 
-def search_all(
-    search: Searching, begins: Sequence[FloatArray], problem: Problem
-) -> tuple[Path, tuple[Minimum, ...]]:
+def search_all(search: Searching, begins: Sequence[FloatArray], problem: Problem) -> Ends:
     """The best of several searches, and all minima; a start from which the states diverge is left out."""
     paths: list[Path] = []
     failure: SimulationError | None = None

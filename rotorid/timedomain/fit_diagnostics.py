@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotorid.base.arrays import FloatArray
-from rotorid.regression import gain, solution
+from rotorid.regression import gain, least_squares, solution
 from rotorid.regression.estimate import Estimate
 from rotorid.regression.normal_matrix import NormalMatrix, normal_matrix
 from rotorid.regression.prior import PriorEffect, effect
 from rotorid.regression.search import RCOND
 from rotorid.timedomain.integration.adaptive import shortest_pulse
 from rotorid.timedomain.integration.simulate import STEPWISE, SimulationError, inputs_of
-from rotorid.timedomain.methods.iteration_history import Path
+from rotorid.timedomain.methods.iteration_history import Path, at
 from rotorid.timedomain.methods.least_squares_problem import RTOL, Problem
 from rotorid.timedomain.nonlinear_combinations import combined
 from rotorid.timedomain.residual_causes import causes, known_initial
@@ -99,10 +99,14 @@ def _note_sensitivities(draft: _Draft, problem: Problem, path: Path, loss: str) 
     # of the step itself where it is known: that of quasilinearization is not about a solution of the model
     own = not len(problem.prior) and len(s) == len(V)
     draft.normal_matrix = normal_matrix(found.names, s[:, None] * V if own else J)
-    draft.prior = effect(problem.prior, J, r, found.solution)
+    stated, theta = problem.stated, found.solution
+    draft.prior = effect(problem.prior, J, r, theta, stated=stated, at_bounds=path.at_bounds)
     if draft.prior is not None:
+        if draft.prior.alone:  # in the words of the nonlinear model, not of its tangents
+            alone = at(least_squares(J, -r, names=found.names, sigma=1.0, rcond=RCOND), theta, r)
+            draft.prior = replace(draft.prior, alone=combined(problem, alone)[0].describe_rank())
         draft.note(*draft.prior.warnings, spoils=problem.prior.ridge > 0)
-        draft.estimate, r = draft.prior.apart(found, stated=problem.stated), draft.prior.best
+        draft.estimate, r = draft.prior.apart(found, stated=stated), draft.prior.best
     if weak := _insensitive(problem, J, found):
         draft.note(f"the record hardly depends on {', '.join(weak)}")
     if path.converged:

@@ -183,6 +183,8 @@ def fit(
     deviations = None if weigh or options.sigma is None else sigmas(options.sigma, equations.outputs)
     data = _read(records, equations, deviations, allow_missing=options.allow_missing, weigh=weigh)
     if not data:
+        alone = ("sigma", "start", "design", "choose")
+        refuse(options, {*vars(options)} - {*alone}, "belongs to a record: nothing is fitted without one")
         plan = _plan(equations, options, deviations, begin or {}, None)
         return RecordFit(fit=None, design=plan, provenance=provenance(files, options))
     with phase("fit"):
@@ -220,6 +222,7 @@ def _plan(
     """Choose times for a model whose parameters are known roughly, driven as in the record."""
     if options.design is None:
         return None
+    from rotorid.regression.d_optimal import WITHOUT_PRIOR
     from rotorid.timedomain.sampling_times import design_times
 
     candidates = sorted(set(times(options.design, "--design")))
@@ -238,7 +241,8 @@ def _plan(
     number = options.choose or min(max(2, len(guess)), len(candidates))
     record = found.records[0] if found else None
     theta = [guess[name] for name in model.parameters]
-    return design_times(model, theta, candidates, number, sigma=sigma, driven_by=record)
+    plan = design_times(model, theta, candidates, number, sigma=sigma, driven_by=record)
+    return replace(plan, notes=WITHOUT_PRIOR) if model.prior else plan
 
 
 def _check(options: FitOptions) -> None:

@@ -207,6 +207,8 @@ def _check(options: IdentifyOptions, *, measured: bool) -> None:
     check_choices(options, choices())
     if not measured and options.design is None:
         raise ValueError(_NO_DATA)
+    if not measured:
+        refuse(options, ("method", "loss", "ridge"), "belongs to DATA: nothing is fitted without them")
     if options.method != "output-error":
         refuse(options, ("loss",), "belongs to --method output-error: linear regression has none")
     if options.design is None:
@@ -236,6 +238,7 @@ def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, 
     every input has the amplitude 1.
     """
     from rotorid.harmonic.experiment_design import design
+    from rotorid.regression.d_optimal import WITHOUT_PRIOR
 
     frequencies = speeds(candidates, what="--design")
     if len(frequencies) > MOST_CANDIDATES:
@@ -261,7 +264,8 @@ def _plan(file: HarmonicFile, found: Identification | None, candidates: Speeds, 
     number = usual if choose is None else choose
     read = [name for name in file.model.outputs if name not in file.unmeasured]
     inputs = _inputs(file, found)
-    return design(file.model, guess, frequencies, number, errors=file.errors, inputs=inputs, measured=read)
+    plan = design(file.model, guess, frequencies, number, errors=file.errors, inputs=inputs, measured=read)
+    return replace(plan, notes=WITHOUT_PRIOR) if file.prior else plan
 
 
 def _inputs(file: HarmonicFile, found: Identification | None) -> dict[str, complex]:

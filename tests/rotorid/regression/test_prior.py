@@ -9,13 +9,15 @@ from rotorid.harmonic import AmplitudeErrors, harmonic_model, identify
 from rotorid.harmonic.experiments import experiments
 from rotorid.regression.normal_matrix import normal_matrix
 from rotorid.regression.prior import prior_rows
+from rotorid.report.equations_of_results import equations_of
 from rotorid.samples import sample_data
 from rotorid.tables import read_harmonic_model, read_ode_model
 from rotorid.timedomain import Record, ode_model
 from rotorid.timedomain.fit import fit
 from rotorid.workflows.fit import FitOptions
 from rotorid.workflows.fit import fit as work
-from rotorid.workflows.identify import compare
+from rotorid.workflows.identify import IdentifyOptions, compare
+from rotorid.workflows.identify import identify as work_harmonic
 
 T = np.linspace(0.0, 3.0, 25)
 K = np.column_stack((np.ones(25), T, np.exp(-T)))
@@ -304,6 +306,109 @@ def test_leaving_out_an_experiment_keeps_the_prior():
     for i in range(3):
         others = found([j for j in range(3) if j != i])
         assert whole.influence[i] == pytest.approx(others.values - whole.values, rel=0.1, abs=0.05)
+
+
+def test_what_the_prior_does_not_determine_either_is_no_merit_of_it():
+    outputs = {"y": "(a + b) + (c + d)*t"}
+    model = ode_model({}, outputs=outputs, estimate={"a": 0.5, "b": 0.5, "c": 0.5, "d": 0.5})
+    y = 3 + 2 * T + 0.1 * np.random.default_rng(0).standard_normal(25)
+    found = fit(replace(model, prior={"b": (1.0, 0.2)}), record(y, 0.1))
+    lines = {line.split()[0]: line for line in found.summary().splitlines() if line.startswith("  ")}
+    assert lines["a"].endswith("through the prior")
+    assert found.summary().count("not determined") == 2
+    assert found.summary().count("through the prior") == 1
+    silent = ode_model({}, outputs={"y": "a + 0*c*t"}, estimate={"a": 0.5, "c": 0.5})
+    assert "by the ridge only" not in fit(silent, record(y, 0.1), ridge=0.1).summary()
+
+
+def test_what_the_data_alone_determine_is_said_of_the_nonlinear_model():
+    model = ode_model({"x": "-a*b*x"}, initial={"x": "x0"}, estimate={"a": 0.3, "b": 0.3, "x0": 1.0})
+    y = 2 * np.exp(-0.7 * T) + 0.02 * np.random.default_rng(3).standard_normal(25)
+    found = fit(replace(model, prior={"a": (2.0, 0.1)}), Record(T, {"x": y}, sigma={"x": 0.02}))
+    assert "Without it only x0 and a·b are determined" in found.summary()
+
+
+def test_a_bound_is_no_fault_of_the_prior_and_its_misfit_is_not_hidden():
+    model = ode_model({"x": "-k*x"}, initial={"x": "x0"}, estimate={"k": 1.0, "x0": 1.0})
+    x = 2 * np.exp(-0.7 * T) + 0.02 * np.random.default_rng(3).standard_normal(25)
+    data = Record(T, {"x": x}, sigma={"x": 0.02})
+    model = replace(model, bounds=np.array([[0.5, 0.6], [-np.inf, np.inf]]))
+    plain = fit(model, data)
+    found = fit(replace(model, prior={"k": (0.75, 0.02)}), data)  # as the data say: 0.7
+    assert plain.estimate.chi_square > 3 * 24
+    assert found.estimate.chi_square == pytest.approx(plain.estimate.chi_square, rel=1e-6)
+    assert found.estimate.dof == plain.estimate.dof == 24
+    assert found.warnings == plain.warnings
+    assert not found.reliable
+    assert np.isnan(found.prior.away).all()
+    assert found.to_dict()["prior"]["parameters"]["k"]["data_share"] is None
+    spring = harmonic_model(["(10*p**2 + b*p + c)*X = F"], estimate=["c", "b"])
+    w, errors = np.array([9.0, 11.0]), AmplitudeErrors(0.05, 0.05)
+    tests = experiments(spring, w, {"X": 10 / (1000 - 10 * w**2 + 20j * w), "F": 10.0}, errors=errors)
+    limits, known = {"c": (1100.0, 1200.0)}, {"c": (1000.0, 20.0)}
+    held = identify(spring, tests, method="output-error", bounds=limits, prior=known)
+    assert "prior" not in held.summary().split("parameter ")[1]
+    assert any("residuals are" in w for w in held.warnings)
+
+
+def test_a_prior_that_errors_are_estimated_with_chooses_among_all_minima():
+    model = ode_model({}, outputs={"y": "a**2 + 0.001*a*t"}, estimate={"a": 1.0})
+    rng, chosen = np.random.default_rng(0), []
+    for sign in (1, -1):  # the data prefer one of two minima by chance
+        y = 4 + 0.1 * rng.standard_normal(25)
+        known = replace(model, prior={"a": (2.0 * sign, 0.1)}, bounds=np.array([[-10.0, 10.0]]))
+        found = fit(known, record(y, None), weigh=True, starts=9)
+        chosen.append(sign * found.values[0])
+        assert found.minima[1].cost - found.minima[0].cost == pytest.approx(40**2 / 2, rel=0.1)
+        assert sum(m.starts for m in found.minima) == 9
+        assert not any("contradict" in w for w in found.warnings)
+    assert chosen == pytest.approx([2.0, 2.0], abs=0.05)
+
+
+def test_a_good_prior_is_not_accused_by_an_error_from_two_residuals():
+    """Student's t with one degree of freedom exceeds 3 in a tenth of all cases, and 235.8 in 0.27 %."""
+    model = ode_model({}, outputs={"y": "a + b*t"}, estimate={"a": 0.0, "b": 0.0})
+    rng, t, accused = np.random.default_rng(4), np.array([0.0, 1.5, 3.0]), 0
+    for _ in range(150):
+        b = rng.normal(1.0, 0.01)
+        data = Record(t, {"y": 1 + b * t + 0.3 * rng.standard_normal(3)})
+        found = fit(replace(model, prior={"b": (1.0, 0.01)}), data, weigh=True)
+        accused += any("contradict the prior" in w for w in found.warnings)
+    assert accused <= 3
+    many = fit(line({"b": (2.0, 0.1)}), record(readings(), None), weigh=True)
+    assert 3 < many.prior.limit[0] < 3.6  # t with 22 degrees of freedom: 3.36
+    assert any("contradict the prior b" in w for w in many.warnings)
+    assert fit(line(KNOWN), record(readings())).prior.limit == pytest.approx([3.0, 3.0], rel=1e-6)
+
+
+def test_the_other_outputs_tell_of_a_prior(tmp_path):
+    folder, path = sample_data() / "fit" / "quasilinearization", tmp_path / "prior.toml"
+    text = (folder / "model.toml").read_text(encoding="utf-8")
+    path.write_text(f"{text}\n[prior]\ntheta1 = [1.0, 0.004]\n", encoding="utf-8")
+    start = {"theta1": 1.0, "theta2": -1.0, "theta3": -1.0}
+    found = work(path, folder / "record_noisy.csv", FitOptions(sigma=0.02, start=start, design="0:10:1"))
+    sheet = found.sheet().decode()
+    assert "% from the data" in sheet.partition("<script")[0].partition("What was found")[2][:20_000]
+    words = "the expected deviations are those of the readings alone, without [prior]"
+    assert words in found.summary().replace("\n  ", " ")
+    assert found.design.notes
+    assert not work(
+        folder / "model.toml", options=FitOptions(sigma=1, start=start, design="0:9:1")
+    ).design.notes
+    assert any("rows of [prior]" in note for note in equations_of(found.fit).notes)
+    assert not equations_of(work(folder / "model.toml", folder / "record_noisy.csv").fit).notes
+
+
+@pytest.mark.parametrize(
+    "more", [{"ridge": 0.1}, {"method": "gauss-newton"}, {"starts": 3}, {"allow_missing": True}]
+)
+def test_a_design_without_a_record_refuses_what_it_would_not_look_at(more):
+    path, start = sample_data() / "fit" / "quasilinearization" / "model.toml", "theta1=1,theta2=-1,theta3=-1"
+    with pytest.raises(ValueError, match=r"--[a-z-]+ belongs to a record: nothing is fitted without one"):
+        work(path, options=FitOptions(sigma=0.02, start=start, design="0:10:1", **more))
+    harmonic = sample_data() / "identify" / "task_5_1" / "model.toml"
+    with pytest.raises(ValueError, match="--method belongs to DATA"):
+        work_harmonic(harmonic, None, IdentifyOptions(method="output-error", design="5:40:5"))
 
 
 def test_no_rows_change_nothing():
