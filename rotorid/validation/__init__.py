@@ -138,7 +138,7 @@ class Validation(Outcome):
             f"{said if self.holds else 'NOT every printed number is met.'}\n{self.last_line}.",
             "\n".join([*failed, *_chapter("Differ", differ, _difference)]),
             notes=(SELECTED.format(selected),) if selected else (),
-            tables=tuple("\n".join(lines) for lines in chapters if lines),
+            tables=(*("\n".join(lines) for lines in chapters if lines), f"{self.last_line}."),
             more="every source, misprints, wide tolerances",
         )
 

@@ -50,7 +50,7 @@ def rows() -> list[Row]:
     -------
     list of Row
         90 of table 2.1, 372 of table 2.2, 21 of table 2.3, 65 of the normal equations, 3 of differences and 3
-        of the parameters of the record of [Q]; 164 of the record of [F], 6 of its estimates.
+        of the parameters of the record of [Q]; 383 of the record of [F], 6 of its estimates.
     """
     model = _book_model()
     truth = simulate(model, TRUTH_Q, np.linspace(0.0, math.pi, 31), sensitivities=False)
