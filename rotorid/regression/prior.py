@@ -112,13 +112,13 @@ class PriorEffect:
 
     @property
     def why(self) -> dict[str, str]:
-        """Beside each parameter, how much of it is from the data, where the prior says anything."""
+        """Beside each parameter with a prior, how much of it is from the data."""
         if self.rows.ridge:
             return dict.fromkeys(self.lost, "by the ridge only")
         return dict.fromkeys(self.lost, "through the prior") | {
             name: f"{percent(share)} % from the data" if share >= 0.005 else "by its prior only"
             for name, share in zip(self.rows.own, self.share, strict=True)
-            if share < 0.995
+            if not np.isnan(share)
         }
 
     @property

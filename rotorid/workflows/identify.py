@@ -40,8 +40,8 @@ class IdentifyOptions:
     phase_error : DEGREES
         One standard deviation of a phase, in place of the one that the model states.
     ridge : LAMBDA
-        Regularise output-error: add λ times the diagonal of the normal matrix at the start, which pulls
-        towards it; no intervals.
+        Regularise (with output-error): add λ times the diagonal of the normal matrix at the start, which
+        pulls towards it; no intervals.
     design : FIRST:LAST:STEP
         Which of these frequencies to measure next: rad/s, or with Hz or rpm at the end, such as 10:30:1.
     choose : N
