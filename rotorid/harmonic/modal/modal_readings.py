@@ -48,6 +48,13 @@ class Readings:
         spread = np.einsum("iaib->iab", (inverse @ inverse.T).reshape(len(c), 2, -1, 2))
         return rest @ y, -rest @ real(slopes * np.tile(c[: len(c) - 2], 2)), c, spread
 
+    def without(self, omega: float, least: int) -> Readings:
+        """Those but for the frequency next to this one; all, where a point would have fewer than `least`."""
+        rest = self.omega != self.omega[np.abs(self.omega - omega).argmin()]
+        if min(np.count_nonzero(~np.isnan(self.Z[rest]), axis=0)) < least:
+            return self
+        return Readings(self.omega[rest], self.excitation[rest], self.Z[rest], self.root[rest])
+
     def each(self, what: int, q: FloatArray) -> list[AnyArray]:
         """One of these for every point."""
         return [self.point(p, q)[what] for p in range(self.Z.shape[1])]

@@ -70,19 +70,26 @@ class FittedModes(Answered):
     @cached_property
     def residues(self) -> tuple[ComplexArray, FloatArray]:
         """R_r, (k, P), and covariances of their parts at these ω_r and ζ_r, (k, P, 2, 2), but for `unit`."""
+        return self._residues(self.readings)
+
+    def _residues(self, readings: Readings) -> tuple[ComplexArray, FloatArray]:
         k, q = len(self.ends), self.fit.estimate.solution
-        return np.transpose(self.readings.each(2, q))[:k], np.swapaxes(self.readings.each(3, q), 0, 1)[:k]
+        return np.transpose(readings.each(2, q))[:k], np.swapaxes(readings.each(3, q), 0, 1)[:k]
+
+    def _by_chance(self, readings: Readings) -> FloatArray:
+        """Bound for the probability of each mode's residues in such readings, if there is no such mode."""
+        from scipy.special import chdtrc
+
+        residues, spread = self._residues(readings)
+        parts = np.stack((residues.real, residues.imag), axis=-1)
+        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
+        return np.asarray((self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size))
 
     @cached_property
     def undetermined(self) -> tuple[str, ...]:
         """Why there are no modes to go on with, in words."""
-        from scipy.special import chdtrc
-
         found = [] if self.fit.converged else [self.fit.message]
-        residues, spread = self.residues
-        parts = np.stack((residues.real, residues.imag), axis=-1)
-        size = np.einsum("kpi,kpij,kpj->k", parts, np.linalg.inv(spread), parts) / self.unit
-        chance = (self.fit.estimate.dof + 1) * chdtrc(2 * len(self.points) + 2, size)
+        chance = self._by_chance(self.readings)
         std = np.zeros_like(self.fit.values) if self.fit.std is None else self.fit.std
         told = np.vstack((self.fit.estimate.solution, std)).reshape(4, -1).T
         for mode, ((omega, zeta, error, other), (low, high)) in enumerate(
@@ -94,6 +101,11 @@ class FittedModes(Answered):
                 )
             elif not 2 * error < high - low:
                 found.append(f"these readings do not tell frequency and damping of mode {mode}")
+            elif self._by_chance(self.readings.without(omega, len(told) + 2))[mode - 1] > RARE:
+                found.append(
+                    f"mode {mode} ({omega:.5g} rad/s) stands on one frequency, perhaps a wild reading: "
+                    "measure closer by, or say in --bands where modes are"
+                )
             elif not low < omega < high:
                 found.append(f"mode {mode} ({omega:.5g} rad/s) is read on one side only")
             elif zeta + 2 * other < 0:

@@ -374,3 +374,19 @@ def test_the_sample_holds_what_the_command_writes(tmp_path, cli):
     new, stored = read_modes(output), read_modes(folder / "modes.csv")
     np.testing.assert_allclose(new.frequencies, stored.frequencies, rtol=1e-9)
     np.testing.assert_allclose(new.shapes, stored.shapes, rtol=1e-7)
+
+
+def test_one_wild_reading_of_a_sweep_is_no_mode():
+    """Between two resonances: a peak that stands on one frequency, however well it is fitted."""
+    omega = np.linspace(60, 330, 60)
+    stiffness = np.array([[4e4, -2e4], [-2e4, 4e4]])
+    Z = amplitudes(omega, np.eye(2), 8e-5 * stiffness, stiffness, [1.0, 0.3])
+    rng = np.random.default_rng(4)
+    errors = AmplitudeErrors(0.01, 0.01)
+    for k in range(22, 30):
+        noisy = measured(omega, Z, errors, (rng, 0.01)).table(("X1", "X2"))
+        assert fitted(omega, measured(omega, noisy, errors)).warnings == ()
+        noisy[k, k % 2] *= 10
+        (why,) = fitted(omega, measured(omega, noisy, errors)).undetermined
+        assert "mode 2 (" in why
+        assert "stands on one frequency" in why
