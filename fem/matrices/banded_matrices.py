@@ -17,6 +17,7 @@ import numpy as np
 
 from fem.matrices.elements import Layout, bending_terms, gyroscopic_terms, mass_terms
 from fem.matrices.strain import strains
+from fem.model.node_forces import kind_of
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import FloatArray, IndexArray
 
@@ -65,7 +66,20 @@ class Matrices:
 
 
 def assemble(rotor: Rotor) -> Matrices:
-    """Matrices of a rotor, assembled without a loop over elements."""
+    """Matrices of a rotor, assembled without a loop over elements.
+
+    Raises
+    ------
+    ValueError
+        For a rotor with forces that are not linear.
+    """
+    if rotor.forces:
+        kind = kind_of(rotor.forces[0]).replace("_", " ")
+        raise ValueError(
+            f"the {kind} at node {rotor.forces[0].node} is not linear, and this asks for linear equations: "
+            "write the coefficients of all such forces at rest first, `rotorid bearings ROTOR --speeds A:B "
+            "--output linear.toml`, or take rotor.linear, which leaves them out"
+        )
     layout, model = Layout(rotor), rotor.model
     bending = bending_terms(rotor)
     K, M = layout.band(bending), layout.band(mass_terms(rotor))

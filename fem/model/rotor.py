@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 
 from fem.model.disc import STEEL_DENSITY, Disc
+from fem.model.node_forces import NodeForce
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
@@ -75,6 +76,9 @@ class Rotor:
         the speed of the whirl.
     model
         What the elements take into account.
+    forces
+        At nodes, those that are not linear (`fem.model.node_forces`): for equilibrium and motion; what is
+        linear refuses them, see `linear`.
 
     Raises
     ------
@@ -93,12 +97,14 @@ class Rotor:
     poisson_ratio: FloatArray = field(default_factory=lambda: np.array(STEEL_POISSON))
     material_damping: FloatArray = field(default_factory=lambda: np.array(0.0))
     model: Model = Model()
+    forces: Sequence[NodeForce] = ()
 
     def __post_init__(self) -> None:
         for name, value in zip(PER_ELEMENT, _broadcast(self), strict=True):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "discs", _attached(self.discs, Disc, "disc", self.n_nodes))
         object.__setattr__(self, "supports", _attached(self.supports, Support, "support", self.n_nodes))
+        object.__setattr__(self, "forces", _attached(self.forces, NodeForce, "force", self.n_nodes))
         object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
         if not isinstance(self.model, Model):
             raise ValueError(f"model must be a Model, not {self.model!r}")
@@ -109,8 +115,8 @@ class Rotor:
         if not isinstance(other, Rotor):
             return NotImplemented
         return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in PER_ELEMENT) and (
-            (self.discs, self.supports, dict(self.stations), self.model)
-            == (other.discs, other.supports, dict(other.stations), other.model)
+            (self.discs, self.supports, dict(self.stations), self.model, self.forces)
+            == (other.discs, other.supports, dict(other.stations), other.model, other.forces)
         )
 
     def __repr__(self) -> str:
@@ -207,13 +213,18 @@ class Rotor:
         return np.unique([speed for support in self.supports for speed in support.speeds])
 
     @property
+    def linear(self) -> Rotor:
+        """The same without the forces that are not linear."""
+        return replace(self, forces=()) if self.forces else self
+
+    @property
     def total_mass(self) -> float:
         """Mass of shaft and discs, kg."""
         shaft = float(np.sum(self.density * self.area * self.length))
         return shaft + math.fsum(disc.mass for disc in self.discs)
 
 
-_T = TypeVar("_T", Disc, Support)
+_T = TypeVar("_T", Disc, Support, NodeForce)
 PER_ELEMENT = (
     "length",
     "outer_diameter",

@@ -1,0 +1,116 @@
+"""Film of a short journal bearing or squeeze-film damper (Ocvirk), with all derivatives, in closed form.
+
+With h = c − x cos θ − y sin θ and a = x' + Ω y / 2, b = y' − Ω x / 2, Reynolds' equation without flow around
+the journal gives the pressure, summed over the length,
+
+    P(θ) = η L³ (a cos θ + b sin θ) / h³,
+
+positive on the half circle around α = atan2(b, a). With R = D / 2 and θ = β + φ, the film being the half
+circle around β (there φ runs from −π/2 to π/2), X = x / c, Y = y / c and the components along β and across
+
+    p = X cos β + Y sin β,  q = −X sin β + Y cos β,  u = a cos β + b sin β,  w = −a sin β + b cos β,
+
+the force on the journal, F = −R ∫ P (cos θ, sin θ) dθ, is
+
+    F_β = −C (u I₁ + w I₂),  F_⊥ = −C (u I₂ + w I₃),  C = η L³ R / c³,
+    I₁, I₂, I₃ = ∫ (cos² φ, sin φ cos φ, sin² φ) / (1 − p cos φ − q sin φ)³ dφ
+               = ½ J_pp, ½ J_pq, ½ J_qq  of  J = ∫ dφ / (1 − p cos φ − q sin φ).
+
+With k² = 1 − p² − q²: J = (2 / k) atan2(k, −p), J_p = (2 + p J) / k², J_q = q (2 p / (1 − q²) + J) / k²,
+and so on by differentiation. Where the film is that of positive pressure, β = α, the force does not change
+with β alone, since the pressure is zero at both ends. Where it is bound to the line of centres, β = atan2(−x,
+y), the ends count: ∂F_⊥/∂β = −C w ((1 − q)⁻³ − (1 + q)⁻³).
+
+Sources: F. W. Ocvirk, NACA TN 2808 (1952); for the film of positive pressure G. Adiletta, A. R. Guido, C.
+Rossi, Nonlinear Dynamics 10 (1996) 251.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rotorid.base.arrays import FloatArray
+from rotorid.base.compiled import compiled
+
+
+@compiled
+def short_film(  # noqa: PLR0913  scalars: what is compiled takes no objects
+    C: float,
+    c: float,
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    omega: float,
+    line_of_centres: bool,
+    out: FloatArray,
+) -> None:
+    """Force on the journal and its derivatives.
+
+    Parameters
+    ----------
+    C, c
+        η L³ R / c³, N·s/m, and the radial clearance, m.
+    x, y, vx, vy
+        Of the journal, m and m/s, inside the clearance.
+    omega
+        Of the journal, rad/s; 0 for a damper.
+    line_of_centres
+        Which film; False: where the pressure is positive.
+    out
+        Written: (F_x, F_y) in N and their derivatives by x, y, x', y' and Ω, shape (2, 6); NaN on or beyond
+        the wall.
+    """
+    X, Y = x / c, y / c
+    k2 = 1.0 - X * X - Y * Y
+    if not k2 > 0.0:
+        out[:, :] = math.nan
+        return
+    a, b = vx + 0.5 * omega * y, vy - 0.5 * omega * x
+    beta = math.atan2(-x, y) if line_of_centres else math.atan2(b, a)
+    C_, S_ = math.cos(beta), math.sin(beta)
+    p, q = X * C_ + Y * S_, -X * S_ + Y * C_
+    u, w = a * C_ + b * S_, -a * S_ + b * C_
+
+    k = math.sqrt(k2)
+    r = 1.0 / k2
+    J = 2.0 / k * math.atan2(k, -p)
+    d = 1.0 / (1.0 - q * q)
+    Jp = (2.0 + p * J) * r
+    Jq = q * (2.0 * p * d + J) * r
+    Jpp = (J + 3.0 * p * Jp) * r
+    Jpq = (p * Jq + 2.0 * q * Jp) * r
+    Jqq = (2.0 * p * (1.0 + q * q) * d * d + J + 3.0 * q * Jq) * r
+    Jppp = (4.0 * Jp + 5.0 * p * Jpp) * r
+    Jppq = (Jq + 3.0 * p * Jpq + 2.0 * q * Jpp) * r
+    Jpqq = (p * Jqq + 2.0 * Jp + 4.0 * q * Jpq) * r
+    # d³J/dq³ of Jqq = (N + 3 q Jq) / k², N = 2 p (1 + q²) / (1 − q²)² + J
+    Jqqq = (4.0 * p * q * (3.0 + q * q) * d * d * d + 4.0 * Jq + 5.0 * q * Jqq) * r
+
+    h = -0.5 * C
+    Fb, Fc = h * (u * Jpp + w * Jpq), h * (u * Jpq + w * Jqq)
+    # by p and q (over c), and by u and w, along β and across
+    bp, bq = h / c * (u * Jppp + w * Jppq), h / c * (u * Jppq + w * Jpqq)
+    cp, cq = h / c * (u * Jppq + w * Jpqq), h / c * (u * Jpqq + w * Jqqq)
+    bu, bw, cw = h * Jpp, h * Jpq, h * Jqq
+
+    # turned back: columns by x and y of p, q and by a and b of u, w have the same directions
+    for i in range(2):
+        along, across = (C_, -S_) if i == 0 else (S_, C_)  # of e_β and e_⊥ in x or y
+        out[i, 0] = Fb * along + Fc * across
+        gp, gq = bp * along + cp * across, bq * along + cq * across
+        gu, gw = bu * along + bw * across, bw * along + cw * across
+        fa, fb = gu * C_ - gw * S_, gu * S_ + gw * C_  # by a and b
+        out[i, 1] = gp * C_ - gq * S_ - 0.5 * omega * fb
+        out[i, 2] = gp * S_ + gq * C_ + 0.5 * omega * fa
+        out[i, 3], out[i, 4] = fa, fb
+        out[i, 5] = 0.5 * (y * fa - x * fb)
+    if line_of_centres:
+        e2 = x * x + y * y
+        if e2 > 0.0:
+            ends = -C * w * ((1.0 - q) ** -3 - (1.0 + q) ** -3)
+            # β = atan2(−x, y): dβ = (−y dx + x dy) / e², and e_⊥ = (−sin β, cos β)
+            out[0, 1] += ends * -S_ * -y / e2
+            out[0, 2] += ends * -S_ * x / e2
+            out[1, 1] += ends * C_ * -y / e2
+            out[1, 2] += ends * C_ * x / e2
