@@ -92,14 +92,14 @@ def short_film(  # noqa: PLR0913  scalars: what is compiled takes no objects
     # by p and q (over c), and by u and w, along β and across
     bp, bq = h / c * (u * Jppp + w * Jppq), h / c * (u * Jppq + w * Jpqq)
     cp, cq = h / c * (u * Jppq + w * Jpqq), h / c * (u * Jpqq + w * Jqqq)
-    bu, bw, cw = h * Jpp, h * Jpq, h * Jqq
+    b_u, b_w, c_w = h * Jpp, h * Jpq, h * Jqq
 
     # turned back: columns by x and y of p, q and by a and b of u, w have the same directions
     for i in range(2):
         along, across = (C_, -S_) if i == 0 else (S_, C_)  # of e_β and e_⊥ in x or y
         out[i, 0] = Fb * along + Fc * across
         gp, gq = bp * along + cp * across, bq * along + cq * across
-        gu, gw = bu * along + bw * across, bw * along + cw * across
+        gu, gw = b_u * along + b_w * across, b_w * along + c_w * across
         fa, fb = gu * C_ - gw * S_, gu * S_ + gw * C_  # by a and b
         out[i, 1] = gp * C_ - gq * S_ - 0.5 * omega * fb
         out[i, 2] = gp * S_ + gq * C_ + 0.5 * omega * fa
