@@ -11,56 +11,20 @@ carry, and near to the rotor on supports from soft to stiff.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 import fem
 from fem.matrices.banded_matrices import assemble, multiply
 from fem.model.node_forces import JournalBearing, SqueezeFilm, kind_of
+from fem.static import GRAVITY
 from rotorid.base.arrays import FloatArray
 from rotorid.base.text import listing
-from rotorid.reduction.dynamics.small_rotor import small_rotor
-from rotorid.reduction.equivalent.plane_at_rest import plane_at_rest
+from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import small_rotor
 
 _RIGID = 1e7  # stiffness of a rigid support by that of a shaft on two of them
-
-
-@dataclass(frozen=True, eq=False)
-class KeptSupports:
-    """Masses, and the shaft between them and the supports that stay; made by `keep_supports`.
-
-    Attributes
-    ----------
-    nodes
-        Of masses, supports and forces, ascending, k of them.
-    masses
-        kg, shape (k,); 0 where only a force acts.
-    weights
-        kg that weigh there: 1ᵀ M T, so that static loads are those of the whole rotor, shape (k,).
-    stiffness
-        Of the shaft, one plane, N/m, shape (k, k).
-    material_damping
-        Of the shaft, N·s/m, which turns with it, shape (k, k).
-    gyroscopic
-        G, kg, with the signs of `small_rotor`, shape (k, k).
-    damping
-        Of the surroundings, N·s/m, shape (k, k).
-    held
-        Nodes that were held rigidly while the masses were found.
-    warnings
-        What the reader must know.
-    """
-
-    nodes: tuple[int, ...]
-    masses: FloatArray
-    weights: FloatArray
-    stiffness: FloatArray
-    material_damping: FloatArray
-    gyroscopic: FloatArray
-    damping: FloatArray
-    held: tuple[int, ...]
-    warnings: tuple[str, ...]
 
 
 def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
@@ -96,7 +60,7 @@ def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
 
 def keep_supports(
     rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray, *, modal_damping: Sequence[float] = ()
-) -> KeptSupports:
+) -> SmallModel:
     """Condense a shaft to its masses, supports and forces.
 
     Parameters
@@ -115,14 +79,12 @@ def keep_supports(
     """
     held = held_nodes(rotor)
     check_free(held, nodes)
-    acting = {force.node for force in rotor.forces}
-    small = small_rotor(rotor.linear, nodes, masses, also=sorted(acting))
+    small = small_rotor(rotor.linear, nodes, masses, also=[force.node for force in rotor.forces])
     n, k = len(nodes), len(small.kept)
-    A = assemble(replace(rotor, supports=(), forces=()))
+    A = assemble(rotor.linear)
     ones = np.zeros((A.size, 1))
     ones[A.deflections] = 1.0
-    momentum = multiply(A.mass, ones)[:, 0]
-    weights = small.quadratic.basis.T @ momentum
+    weights = small.quadratic.basis.T @ multiply(A.mass, ones)[:, 0]
     found = np.zeros(k)
     found[:n] = small.masses
     at = rotor.positions[np.array(small.kept) - 1]
@@ -131,20 +93,21 @@ def keep_supports(
     found[rest] = _shared(weights[rest], at[rest], *lacking)
     damping = np.zeros((k, k))
     if modal_damping:
-        plane, _ = plane_at_rest(held_rigidly(rotor), None)
-        damping[:n, :n] = small_rotor(plane, nodes, masses, modal_damping=modal_damping).external[:n, :n]
+        on_rigid = small_rotor(held_rigidly(rotor), nodes, masses, modal_damping=modal_damping)
+        damping[:n, :n] = on_rigid.external[:n, :n]
     order = np.argsort(small.kept)
     grid = np.ix_(order, order)
     along = tuple(int(small.kept[i]) for i in order)
-    return KeptSupports(
+    return SmallModel(
         nodes=along,
         masses=found[order],
-        weights=weights[order],
+        weight=GRAVITY * weights[order],
         stiffness=small.shaft_stiffness[grid],
         material_damping=small.quadratic.D0[:k, :k][grid],
         gyroscopic=small.quadratic.D1[:k, k : 2 * k][grid],
         damping=damping[grid],
-        held=held,
+        supports=[replace(support, tilting_stiffness=0.0) for support in rotor.supports],
+        forces=rotor.forces,
         warnings=(*small.warnings, *_of_masses(rotor, along, found[order])),
     )
 
