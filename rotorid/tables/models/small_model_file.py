@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -138,15 +138,14 @@ def read_small_model(path: str | Path) -> SmallModel:
         for section in said[kind.name]
     ]
     forces = [read_force(section, node, kind.name) for kind in FORCES for section in said[kind.name]]
-    arrays = {name: said[key] for name, key in _ATTRIBUTES.items()} | {"nodes": nodes}
-    if arrays["weight"] is None and arrays["masses"] is not None:
-        arrays["weight"] = GRAVITY * arrays["masses"]
-    at = {"unbalance": vectors("unbalance", UNBALANCE), "bow": vectors("bow", BOW)}
+    made: dict[str, Any] = {name: said[key] for name, key in _ATTRIBUTES.items()} | {"nodes": nodes}
+    if made["weight"] is None and made["masses"] is not None:
+        made["weight"] = GRAVITY * made["masses"]
+    made |= {"supports": [*filter(None, supports)], "forces": [*filter(None, forces)]}
+    made |= {"unbalance": vectors("unbalance", UNBALANCE), "bow": vectors("bow", BOW)}
     problems.stop()
     try:
-        return SmallModel(
-            **arrays, supports=list(filter(None, supports)), forces=list(filter(None, forces)), **at
-        )
+        return SmallModel(**made)
     except ValueError as error:
         name, _, expected = str(error).partition(": ")
         top.complain(_ATTRIBUTES.get(name, name), expected, value=False)
@@ -171,12 +170,12 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
             lines.append(f"{key} = {array.tolist()}")
         elif array.any() or name == "stiffness":
             lines += [f"{key} = [", *(f"  {row}," for row in array.tolist()), "]"]
-    tables: dict[str, list[Mapping[str, Any]]] = {}
+    tables: dict[str, list[dict[str, Any]]] = {}
     for support in model.supports:
         if support.speeds:
             raise ValueError(
-                f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it out, "
-                f"and write [[{support.kind}]] with node and table, its file, into the small model"
+                f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
+                f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
             )
         tables.setdefault(support.kind, []).append(support_table(support, None, mixed=False))
     tables |= force_tables(model.forces)
@@ -189,4 +188,6 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
                 {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
                 for node, value in vectors.items()
             ]
-    return ("\n".join(lines) + "\n\n" + tomli_w.dumps(tables)).encode("utf-8")
+    for name, sections in tables.items():
+        lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
+    return ("\n".join(lines) + "\n").encode("utf-8")
