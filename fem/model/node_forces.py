@@ -5,8 +5,9 @@ Their laws, F(x, y, x', y', Ω) with derivatives, are in `fem.forces`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from rotorid.base.suggestions import one_of
 Film = Literal["pressure", "line of centres"]
 """Where a journal's film carries: where its pressure is positive, or on the half circle that the line of
 centres bounds, on the side where a steady journal's pressure is positive (the textbook's π film)."""
-_FILMS = ("pressure", "line of centres")
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class JournalBearing(_ShortFilm):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        one_of(self.film, "film", _FILMS)
+        one_of(self.film, "film", get_args(Film))
 
 
 @dataclass(frozen=True)
@@ -213,5 +213,25 @@ FORCES: tuple[Method[Any], ...] = (
 
 
 def kind_of(force: NodeForce) -> str:
-    """Its name in `FORCES`."""
-    return names(FORCES)[[method.function for method in FORCES].index(type(force))]
+    """Its name in `FORCES`.
+
+    Raises
+    ------
+    ValueError
+        For what is none of them.
+    """
+    for method in FORCES:
+        if type(force) is method.function:
+            return method.name
+    raise ValueError(f"{attachment(force)} is no force: one of {', '.join(names(FORCES))} is")
+
+
+def in_order(forces: Iterable[NodeForce]) -> tuple[NodeForce, ...]:
+    """Sorted by their kinds, as files have them; of one kind as they are.
+
+    Raises
+    ------
+    ValueError
+        As `kind_of`.
+    """
+    return tuple(sorted(forces, key=lambda force: names(FORCES).index(kind_of(force))))

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fem.model.disc import STEEL_DENSITY, Disc
-from fem.model.node_forces import NodeForce
+from fem.model.node_forces import NodeForce, in_order
 from fem.model.supports import Pedestal, Support
 from rotorid.base.arrays import FloatArray, read_only
 from rotorid.base.checks import whole
@@ -77,8 +77,8 @@ class Rotor:
     model
         What the elements take into account.
     forces
-        At nodes, those that are not linear (`fem.model.node_forces`): for equilibrium and motion; what is
-        linear refuses them, see `linear`.
+        At nodes, those that are not linear (`fem.model.node_forces`), kept in the order of their kinds: for
+        equilibrium and motion; what is linear refuses them, see `linear`.
 
     Raises
     ------
@@ -104,7 +104,7 @@ class Rotor:
             object.__setattr__(self, name, value)
         object.__setattr__(self, "discs", _attached(self.discs, Disc, "disc", self.n_nodes))
         object.__setattr__(self, "supports", _attached(self.supports, Support, "support", self.n_nodes))
-        object.__setattr__(self, "forces", _attached(self.forces, NodeForce, "force", self.n_nodes))
+        object.__setattr__(self, "forces", in_order(_attached(self.forces, NodeForce, "force", self.n_nodes)))
         object.__setattr__(self, "stations", _stations(self.stations, self.n_nodes))
         if not isinstance(self.model, Model):
             raise ValueError(f"model must be a Model, not {self.model!r}")

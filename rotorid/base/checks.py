@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from typing import Protocol
 
 import numpy as np
@@ -75,7 +76,8 @@ class Attached(Protocol):
 
 def attachment(item: Attached) -> str:
     """Check the node of something attached to a rotor; returns "disc 'wheel' at node 3" for messages."""
-    what = type(item).__name__.lower() + (f" {item.name!r}" if item.name else "")
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", type(item).__name__).lower()
+    what = words + (f" {item.name!r}" if item.name else "")
     node = whole(item.node, f"the node of {what}")
     if node < 1:
         raise ValueError(f"{what}: node {node} does not exist, nodes are numbered from 1")

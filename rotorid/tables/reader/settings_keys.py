@@ -176,8 +176,11 @@ def object_schema(keys: Sequence[Key]) -> dict[str, Any]:
     schema: dict[str, Any] = {"type": "object", "properties": properties, "additionalProperties": False}
     if patterns:
         schema["patternProperties"] = patterns
-    if needed := [key.name for key in keys if key.required and not patterns.get(f"^{key.name}_")]:
-        schema["required"] = needed
+    needed = [key for key in keys if key.required and not patterns.get(f"^{key.name}_")]
+    if one := [key.name for key in needed if len(key.variants) == 1]:
+        schema["required"] = one
+    if several := [list(key.variants) for key in needed if len(key.variants) > 1]:
+        schema["allOf"] = [{"anyOf": [{"required": [name]} for name in names]} for names in several]
     return schema
 
 

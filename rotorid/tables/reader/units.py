@@ -82,10 +82,13 @@ MODULUS = _table("modulus", {"Pa": (1.0, 1.0), "MPa": (1e6, 1.0), "GPa": (1e9, 1
 DENSITY = _table("density", {"kg_per_m3": (1.0, 1.0), "g_per_cm3": (1e3, 1.0)})
 FORCE = _table("force", {"N": (1.0, 1.0), "kN": (1e3, 1.0), "lbf": (4.4482216152605, 1.0)})
 TIME = _table("time", {"s": (1.0, 1.0), "ms": (1.0, 1e3)})
+VELOCITY = _table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)})
+VISCOSITY = _table("viscosity", {"Pa_s": (1.0, 1.0), "mPa_s": (1.0, 1e3), "cP": (1.0, 1e3)})
+CUBIC_STIFFNESS = _table("cubic stiffness", {"N_per_m3": (1.0, 1.0), "N_per_mm3": (1e9, 1.0)})
 
 _PEAK = {
     **LENGTH,
-    **_table("velocity", {"m_s": (1.0, 1.0), "mm_s": (1.0, 1e3), "in_s": (254.0, 1e4)}),
+    **VELOCITY,
     **_table("acceleration", {"g": (STANDARD_GRAVITY, 1.0), "m_s2": (1.0, 1.0), "mm_s2": (1.0, 1e3)}),
 }
 VIBRATION = {

@@ -1,4 +1,4 @@
-"""Rotor files (.toml): a shaft table with material, model, discs, bearings, seals and stations."""
+"""Rotor files (.toml): a shaft table with material, model, discs, bearings, seals, forces and stations."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from fem.model.node_forces import FORCES
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor
 from fem.model.supports import KINDS
 from rotorid.base.suggestions import did_you_mean
@@ -15,6 +16,7 @@ from rotorid.tables.reader.settings_keys import Key, take
 from rotorid.tables.reader.toml_file import Section, read_toml
 from rotorid.tables.reader.value_kinds import ABOVE_ZERO, FLAG, TEXT, each, number, table
 from rotorid.tables.rotor.bearing import KEYS_OF, NAME, NODE, bearing_tables, read_support
+from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, read_force
 from rotorid.tables.rotor.rotor_plausibility import warn_of_value
 from rotorid.tables.rotor.rotor_table import Material, build, read_shaft
 
@@ -75,6 +77,10 @@ ROTOR = (
         Key(kind.name, each(KEYS_OF[kind.name], lambda section: section), kind.about, default=())
         for kind in KINDS
     ),
+    *(
+        Key(kind.name, each(KEYS_OF_FORCE[kind.name], lambda section: section), kind.about, default=())
+        for kind in FORCES
+    ),
 )
 """Of a rotor file; sections that name nodes are read when the shaft and the stations are known."""
 
@@ -128,12 +134,14 @@ def read_rotor_file(path: Path, problems: Problems) -> Rotor:
         for kind in KINDS
         for section in said[kind.name]
     ]
+    forces = [read_force(section, node, kind.name) for kind in FORCES for section in said[kind.name]]
     problems.stop()
     shaft = problems.need(shaft)
     whole = dataclasses.replace(
         shaft,
         discs=(*shaft.discs, *filter(None, discs)),
         supports=(*shaft.supports, *filter(None, supports)),
+        forces=tuple(filter(None, forces)),
         model=Model(**said["model"]),
     )
     return build(str(path), whole, names, problems)

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fem.model.node_forces import JournalBearing, NodeForce, SqueezeFilm
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import BoolArray
+from rotorid.base.checks import attachment
 from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import TableWarning
+from rotorid.tables.reader.settings_keys import Quantity
+from rotorid.tables.reader.units import LENGTH, VISCOSITY
 
 _GRAVITY = 9.81
 _SAG = 10.0  # m: of a rotor on its bearings, which then swings below 0.2 Hz
@@ -58,7 +63,13 @@ USUAL = {
         1e9, 1e12, "Pa", (1e10, 5e11), (("MPa", 1e6), ("GPa", 1e9), ("psi", 6894.757), ("kPa", 1e3))
     ),
     "density": Usual(100.0, 3e4, "kg/m³", (900.0, 2.3e4), (("g/cm³", 1e3), ("kg/mm³", 1e9), ("t/mm³", 1e12))),
+    "clearance": Usual(2e-6, 5e-3, "m", (1e-5, 1e-3), ()),
+    "gap": Usual(1e-7, 2e-2, "m", (1e-5, 2e-3), ()),
+    "viscosity": Usual(1e-5, 2.0, "Pa·s", (2e-4, 0.5), ()),
+    "swirl_ratio": Usual(0.0, 1.0, "of the shaft's speed", (0.05, 0.9), (("percent", 0.01),)),
+    "friction": Usual(0.0, 1.5, "of the normal force", (0.01, 0.9), (("percent", 0.01),)),
 }
+_CLEARANCE_BY_RADIUS = (2e-4, 1e-2)
 _STIFF = (("N/mm", 1e3), ("N/µm", 1e6))  # by their size in N/m
 
 
@@ -87,6 +98,33 @@ def warn_of_value(source: str, key: str, stem: str, value: float) -> None:
     question = USUAL[stem].question(value)
     if question:
         _warn(f"{source}, {key}: {value:.6g} {USUAL[stem].unit}; {question}")
+
+
+def warn_of_force(source: str, force: NodeForce, written: Mapping[str, Quantity | float]) -> None:
+    """A force at a node whose values are unlike those of any machine; `written` are its numbers by field."""
+    what = f"{source}, {attachment(force)}"
+    for stem, value in written.items():
+        if stem not in USUAL:
+            continue
+        usual = USUAL[stem]
+        if isinstance(value, Quantity):
+            alike = [unit for unit in (*LENGTH.values(), *VISCOSITY.values()) if unit.kind == value.unit.kind]
+            usual = replace(usual, others=tuple((u.name, value.unit.scale / u.scale) for u in alike))
+            question = usual.question(value.si)
+            shown = f"{value.key} = {value.value:.6g} means {value.si:.6g} {usual.unit}"
+        else:
+            question, shown = usual.question(value), f"{stem} = {value:.6g}"
+        if question:
+            _warn(f"{what}: {shown}; {question}")
+            return
+    if isinstance(force, (JournalBearing, SqueezeFilm)):
+        ratio = 2 * force.clearance / force.diameter
+        low, high = _CLEARANCE_BY_RADIUS
+        if not low <= ratio <= high:
+            _warn(
+                f"{what}: the radial clearance is {ratio:.3g} of the journal's radius, in machines {low:g} "
+                f"to {high:g}; is one of them in another unit, or a diameter taken for a radius?"
+            )
 
 
 def warn_of_rotor(source: str, rotor: Rotor) -> None:

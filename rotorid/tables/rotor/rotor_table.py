@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fem.model.node_forces import NodeForce
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Rotor, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.tables.reader import units
@@ -68,6 +69,7 @@ class Shaft:
     discs: tuple[Disc, ...]
     supports: tuple[Support, ...]
     model: Model = PLAIN
+    forces: tuple[NodeForce, ...] = ()
 
 
 def read_shaft(path: Path, material: Material, problems: Problems) -> Shaft | None:

@@ -16,6 +16,7 @@ from rotorid.tables.reader.decimal_numbers import LARGEST, SMALLEST
 from rotorid.tables.reader.problems import InputError, Problem
 from rotorid.tables.reader.table_writing import Value, csv_bytes, write_files
 from rotorid.tables.rotor.bearing import ENTRIES, PEDESTAL, SCALARS, TILTING
+from rotorid.tables.rotor.node_forces import force_tables
 from rotorid.tables.rotor.rotor_file import INERTIA, MODEL
 from rotorid.tables.rotor.rotor_table import ATTACHED, OF_ELEMENTS, Material
 
@@ -85,6 +86,7 @@ def _beyond_a_table(rotor: Rotor) -> list[str]:
             support.plain and not support.tilting_stiffness for support in supports
         ),
         "seals": any(support.kind != "bearing" for support in supports),
+        "forces that are not linear": bool(rotor.forces),
     }
     return [reason for reason, there in reasons.items() if there]
 
@@ -122,12 +124,14 @@ def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
             raise ValueError(
                 f"{path}: the station {name!r} would read as a node number or as none; rename it"
             )
+    forces = force_tables(rotor.forces)
+    document |= forces
     if rotor.stations:
         document["station"] = [{"name": name, "node": node} for name, node in rotor.stations.items()]
     for section in (
         material,
         *document.get("disc", ()),
-        *(section for kind in names(KINDS) for section in document.get(kind, ())),
+        *(section for kind in (*names(KINDS), *forces) for section in document.get(kind, ())),
     ):
         _check_sizes(section)
     try:
