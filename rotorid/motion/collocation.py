@@ -86,11 +86,11 @@ class Orbit:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Half of what each coordinate moves, or a hundredth of the largest deflection, and the same of its
-        velocity, shape (2n,)."""
+        """Half of what each coordinate moves, or a hundredth of the largest deflection (or all of it, where
+        nothing moves more), and the same of its velocity, shape (2n,)."""
         q = self.deflections.reshape(-1, self.start.size)
-        least = max(1e-2 * float(np.abs(q).max()), 1e-300)
-        size = np.maximum(np.ptp(q, axis=0) / 2, least)
+        moved, largest = np.ptp(q, axis=0) / 2, max(float(np.abs(q).max()), 1e-9)
+        size = np.maximum(moved, largest * (1e-2 if moved.max() > 1e-2 * largest else 1.0))
         return np.concatenate([size, size * 2 * np.pi / self.period])
 
     @cached_property

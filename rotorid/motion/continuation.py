@@ -12,7 +12,7 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
-_ROUGH = 1e-3  # more of `Orbit.roughness` halves the steps in time
+_ROUGH = 3e-4  # more of `Orbit.roughness` halves the steps in time
 _MOST_STEPS, _MOST_POINTS = 512, 1500
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
