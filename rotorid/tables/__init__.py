@@ -12,6 +12,7 @@ from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_mode
 from rotorid.tables.models.ode_file import read_ode_model
 from rotorid.tables.reader.problems import InputError, Problem, TableWarning
 from rotorid.tables.reader.table_writing import write_table
+from rotorid.tables.rotor.bow_table import read_bow
 from rotorid.tables.rotor.rotor_file import read_rotor, rotor_files
 from rotorid.tables.rotor.rotor_writing import write_rotor
 from rotorid.tables.rotor.unbalance_table import read_unbalance
@@ -30,6 +31,7 @@ __all__ = [
     "TableWarning",
     "influence_frame",
     "job_from_files",
+    "read_bow",
     "read_compliance",
     "read_harmonic_model",
     "read_influence",

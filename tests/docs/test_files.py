@@ -14,6 +14,7 @@ from rotorid.tables.job import job_from_excel as jobbook
 from rotorid.tables.job import job_keys as jobkeys
 from rotorid.tables.reader.toml_file import Section
 from rotorid.tables.rotor import bearing
+from rotorid.tables.rotor import bow_table as bow
 from rotorid.tables.rotor import rotor_table as rotor
 from rotorid.tables.rotor import unbalance_table as unbalance
 from rotorid.tables.runs import influence_table as influence
@@ -40,6 +41,7 @@ NAMED_BY_USERS = {
 TABLES = {
     "rotor": rotor.COLUMNS,
     "bearing": bearing.COLUMNS,
+    "bow": bow.COLUMNS,
     "runs": runs.COLUMNS,
     "weights": weights.COLUMNS,
     "influence": influence.COLUMNS,
