@@ -63,7 +63,7 @@ def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
             )
         files = {path: _shaft_table(rotor, _OF_ELEMENTS, attached=True)}
     else:
-        files = _rotor_file(path, rotor)
+        files = rotor_file_bytes(path, rotor)
     write_files(files)
     return tuple(reversed(files))
 
@@ -91,7 +91,7 @@ def _beyond_a_table(rotor: Rotor) -> list[str]:
     return [reason for reason, there in reasons.items() if there]
 
 
-def _rotor_file(path: Path, rotor: Rotor) -> dict[Path, bytes]:
+def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     """All files of a rotor, the rotor file last: it names the others."""
     import tomli_w
 

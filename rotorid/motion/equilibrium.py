@@ -1,0 +1,266 @@
+"""Static equilibrium of a rotor in its journal bearings, of any number: K(Ω) q = w + Σ F(q, 0, Ω).
+
+By Newton's method, its steps damped and kept inside the clearances; where it fails by continuation in the
+load, from the centred journals on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fem.forces.laws import law
+from fem.model.node_forces import CubicSpring, JournalBearing, NodeForce, SqueezeFilm, Stop, kind_of
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import number
+from rotorid.base.rpm import speed_text
+from rotorid.motion.system import MotionSystem
+
+_CLOSER = 0.8
+"""Share of the way to its wall that a journal goes in one step at most."""
+_ROUNDS = 60
+_SMALLEST_STEP = 1e-4
+"""Of the load, in its continuation; of Newton's way."""
+_CONVERGED = 1e-8
+"""Last step by the film's thickness: the error is its square."""
+_SINGULAR = 1e13
+_LOST = 1e-6
+"""Share of the load that may be left over."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """Where a rotor rests while its journals turn.
+
+    Attributes
+    ----------
+    system
+        What rests.
+    speed
+        rad/s.
+    q
+        Of all unknowns, shape (n,), m and rad.
+    bearings
+        The forces with a wall: journal bearings, squeeze films, seals; b of them.
+    load
+        On each of these, from the shaft, complex: x + iy, N, shape (b,).
+    residual
+        Largest force that is left over, by the weight.
+    """
+
+    system: MotionSystem
+    speed: float
+    q: FloatArray
+    bearings: tuple[NodeForce, ...]
+    load: ComplexArray
+    residual: float
+
+    @property
+    def position(self) -> ComplexArray:
+        """Of the shaft from the centre of each bearing, x + iy, m, shape (b,)."""
+        return np.array([complex(*self.q[[*self.system.index(one.node)]]) for one in self.bearings])
+
+    @property
+    def eccentricity(self) -> FloatArray:
+        """Of the shaft by the clearance, shape (b,)."""
+        return np.abs(self.position) / self._walls
+
+    @property
+    def attitude(self) -> FloatArray:
+        """Angle from the load's direction to the shaft's position, positive with the rotation, rad, (b,)."""
+        return np.asarray(np.angle(self.position * self.load.conj()))
+
+    @property
+    def film(self) -> FloatArray:
+        """Smallest thickness of the film, m, shape (b,)."""
+        return self._walls - np.abs(self.position)
+
+    @property
+    def sommerfeld(self) -> FloatArray:
+        """Of each bearing, S = η N L D / W (R / c)² with N in revolutions per second, shape (b,); else NaN."""
+        revolutions = self.speed / (2 * np.pi)
+        return np.array(
+            [
+                one.viscosity * revolutions * one.length * one.diameter / abs(W)
+                * (one.diameter / 2 / one.clearance) ** 2
+                if isinstance(one, JournalBearing) and W
+                else np.nan
+                for one, W in zip(self.bearings, self.load, strict=True)
+            ]
+        )  # fmt: skip
+
+    @property
+    def _walls(self) -> FloatArray:
+        return np.array([one.wall for one in self.bearings])
+
+
+def equilibria(system: MotionSystem, speeds: Sequence[float]) -> tuple[Equilibrium, ...]:
+    """The equilibrium at each of some speeds, rad/s; errors as of `equilibrium`."""
+    found: list[Equilibrium] = []
+    for speed in speeds:
+        found.append(equilibrium(system, speed, found[-1].q if found else None))
+    return tuple(found)
+
+
+def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = None) -> Equilibrium:
+    """Find where a rotor rests while its journals turn.
+
+    A squeeze film carries nothing at rest but what its centring spring carries.
+
+    Parameters
+    ----------
+    system
+        With its weight.
+    speed
+        rad/s, above 0 where there is a journal bearing.
+    start
+        Where the search begins, (n,), such as the equilibrium at a speed near by; None: at the centres.
+
+    Raises
+    ------
+    ValueError
+        With node and speed: a speed of 0 or outside the equations' range, a rotor that nothing holds, a shaft
+        that comes to a wall or rubs on a stop.
+    """
+    speed = number(speed, "speed")
+    journal = next((force for force in system.forces if isinstance(force, JournalBearing)), None)
+    if journal is not None and speed == 0:
+        raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
+    resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
+    K = system.linear(speed)[1]
+    _check_held(system, _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1], speed)
+    q = _solved(resting, K, speed, start)
+    residual = _left_over(resting, K, q, speed, 1.0)[0]
+    _check_walls(system, q, speed)
+    left = float(np.abs(residual).max() / (np.abs(system.weight).sum() or 1.0))
+    if not left <= _LOST:
+        raise ValueError(
+            f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
+        )
+    walled = [k for k, force in enumerate(system.forces) if np.isfinite(force.wall)]
+    load = -each_force(resting, q, speed)[walled, :, 0]
+    q.setflags(write=False)
+    bearings = tuple(system.forces[k] for k in walled)
+    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1], left)
+
+
+def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
+    """Each force at rest and its derivatives as `fem.forces.laws.law` writes them, shape (f, 2, 6)."""
+    out = np.zeros((len(system.forces), 2, 6))
+    for k, (code, values, place) in enumerate(zip(*system.law_tables, strict=True)):
+        law(code, values, *q[place], 0.0, 0.0, speed, out[k])
+    return out
+
+
+def _left_over(
+    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
+) -> tuple[FloatArray, FloatArray]:
+    """Forces that are left over under a share of the weight, and minus their derivative."""
+    F, F_q, *_ = system.acting(q, np.zeros(system.size), speed)
+    return share * system.weight + F - K @ q, K - F_q
+
+
+def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
+    """The equilibrium: from the start or the centres at once, else with a load that grows."""
+    q, share, step = np.zeros(system.size), 0.0, 1.0
+    if start is not None and (found := _newton(system, K, start, speed, 1.0)) is not None:
+        return found
+    while share < 1.0:
+        further = min(share + step, 1.0)
+        found = _newton(system, K, q, speed, further)
+        if found is not None:
+            q, share, step = found, further, 2 * step
+        elif step < _SMALLEST_STEP:
+            e = np.abs(_places(system, q)) / _walls(system)
+            k = int(np.argmax(e))
+            raise ValueError(
+                f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight the "
+                f"shaft uses {100 * e[k]:.4g} % of its clearance at {named(system.forces[k])}"
+            )
+        else:
+            step /= 4
+    return q
+
+
+def _newton(
+    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
+) -> FloatArray | None:
+    """Newton's method, or None where it does not come to an end."""
+    r, J = _left_over(system, K, q, speed, share)
+    for _ in range(_ROUNDS):
+        try:
+            d = np.linalg.solve(J, r)
+        except np.linalg.LinAlgError:
+            return None
+        z, dz, walls = _places(system, q), _places(system, d), _walls(system)
+        gap = min((walls - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
+        if np.abs(dz).max(initial=0.0) <= _CONVERGED * gap:
+            return np.asarray(q + d)
+        t, size = _inside(z, dz, walls), np.linalg.norm(r)
+        while True:
+            r, J = _left_over(system, K, q + t * d, speed, share)
+            if np.linalg.norm(r) < (1 - 0.1 * t) * size:
+                break
+            t /= 2
+            if t < _SMALLEST_STEP:
+                return None
+        q = q + t * d
+    return None
+
+
+def _inside(z: ComplexArray, dz: ComplexArray, walls: FloatArray) -> float:
+    """Share of a step, 1 at most, that leaves the shaft inside all walls."""
+    bounded = np.isfinite(walls) & (dz != 0)
+    z, dz, walls = z[bounded], dz[bounded], walls[bounded]
+    furthest = np.abs(z) + _CLOSER * (walls - np.abs(z))
+    half, square = (z.conj() * dz).real, np.abs(dz) ** 2
+    t = (np.sqrt(half**2 + square * (furthest**2 - np.abs(z) ** 2)) - half) / square
+    return float(min(t.min(initial=1.0), 1.0))
+
+
+def _places(system: MotionSystem, q: FloatArray) -> ComplexArray:
+    """Where the shaft is at each force, x + iy, m, shape (f,)."""
+    x, y = system.law_tables[2].T
+    return np.asarray(q[x] + 1j * q[y])
+
+
+def _walls(system: MotionSystem) -> FloatArray:
+    return np.array([force.wall for force in system.forces])
+
+
+def _at_rest(force: NodeForce) -> NodeForce:
+    """What acts while nothing moves: of a squeeze film its centring spring."""
+    if not isinstance(force, SqueezeFilm):
+        return force
+    return CubicSpring(force.node, force.name, force.centring_stiffness)
+
+
+def _check_held(system: MotionSystem, J: FloatArray, speed: float) -> None:
+    largest = np.abs(J).max(axis=1, keepdims=True)
+    if largest.all() and np.linalg.cond(J / largest) < _SINGULAR:
+        return
+    falls = [f for f in system.forces if isinstance(f, SqueezeFilm) and not f.centring_stiffness]
+    why = [f"{named(f)} has no centring spring, at rest its shaft falls to the wall" for f in falls]
+    raise ValueError(
+        f"at {speed_text(speed)} nothing holds the rotor, its position is not determined: "
+        + ("; ".join(why) or "give it stiffness or journal bearings at two nodes")
+    )
+
+
+def _check_walls(system: MotionSystem, q: FloatArray, speed: float) -> None:
+    """Refuse a shaft beyond a wall that the forces at rest do not know, or on a stop."""
+    for force, drop in zip(system.forces, np.abs(_places(system, q)), strict=True):
+        limit = force.gap if isinstance(force, Stop) else force.wall
+        if drop > limit or drop == force.wall:
+            raise ValueError(
+                f"at {speed_text(speed)} the shaft touches {named(force)} under its weight: it drops by "
+                f"{1e3 * drop:.4g} mm there, the clearance is {1e3 * limit:.4g} mm"
+            )
+
+
+def named(force: NodeForce) -> str:
+    """For messages: "the squeeze film 'left' at node 3"."""
+    name = f" {force.name!r}" if force.name else ""
+    return f"the {kind_of(force).replace('_', ' ')}{name} at node {force.node}"
