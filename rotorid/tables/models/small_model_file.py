@@ -135,6 +135,8 @@ def read_small_model(path: str | Path) -> SmallModel:
         for section in said[key]:
             _, size, angle = take(section, keys).values()
             where = node(section)
+            if where in total and key == "bow":
+                section.complain("node", "a node that no other [[bow]] has")
             if where is not None and size is not None and angle is not None:
                 value = complex(polar(size.si, angle.si))
                 total[where] = total.get(where, 0j) + value

@@ -5,14 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import eigh
+from scipy.optimize import brentq
 
 import fem
 from fem.model.node_forces import CubicSpring, JournalBearing, SqueezeFilm, Stop
 from fem.static import GRAVITY, static_deflection
+from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.kept_supports import held_rigidly, keep_supports
 from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.small_model import SmallModel
 from rotorid.reduction import reduce, small_rotor
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor, read_small_model
 from tests.helpers.cases import each_of
 from tests.helpers.fem_rotors import rotor23
 
@@ -108,6 +112,29 @@ def test_frequencies_from_soft_to_stiff_bearings():
         errors = planes(model, {2: k, 22: k})[:2] / fem.critical_speeds(rotor, 2).frequencies - 1
         assert abs(errors[0]) < 2e-3
         assert abs(errors[1]) < 1.4e-2
+
+
+def test_threshold_and_static_loads_in_journal_bearings_are_the_rotor_s():
+    """At each speed the equilibrium, then all eigenvalues of what is linear about it, of both."""
+    rotor = read_rotor(sample_data() / "motion" / "rotor.toml")
+    model = read_small_model(sample_data() / "motion" / "small.toml")
+    band = 600.0, 720.0
+    both = [rotor_system(rotor, *band), model.system(*band)]
+
+    def growth(speed, system):
+        q = equilibrium(system, speed).q
+        C, K = system.linear(speed)
+        _, F_q, F_v, _ = system.acting(q, np.zeros_like(q), speed)
+        eye, zero = np.eye(q.size), np.zeros((q.size, q.size))
+        A = np.block([[zero, eye], [np.linalg.solve(system.M, F_q - K), np.linalg.solve(system.M, F_v - C)]])
+        return np.linalg.eigvals(A).real.max()
+
+    full, small = (brentq(growth, *band, args=(system,), xtol=1e-4) for system in both)
+    assert full == pytest.approx(6407.0 * np.pi / 30, rel=1e-5)
+    assert small == pytest.approx(full, rel=2e-4)
+    loads = [equilibrium(system, 650.0) for system in both]
+    np.testing.assert_allclose(loads[1].load, loads[0].load, rtol=1e-9)
+    np.testing.assert_allclose(loads[1].eccentricity, loads[0].eccentricity, rtol=1e-8)
 
 
 def test_gyroscopic_effect_supports_and_pedestals_are_those_of_the_small_rotor():
