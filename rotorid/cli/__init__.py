@@ -15,6 +15,7 @@ from rotorid.base.answer import COLUMNS, kinds
 from rotorid.cli.choices import Command
 from rotorid.cli.commands import (
     balance,
+    bearings,
     campbell,
     critical,
     demo,
@@ -58,6 +59,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
+    "Move on films and seals": {"bearings": bearings.bearings},
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,

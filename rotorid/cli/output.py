@@ -64,7 +64,7 @@ class Destination:
         work: Callable[[], _R],
         *,
         draw: Callable[[_R], Figure] | None = None,
-        more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = (),
+        more: Sequence[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = (),
     ) -> _R:
         """Do the work of a command, print what it found, and write its files, all of them or none.
 
@@ -77,7 +77,7 @@ class Destination:
         draw
             Makes the picture; default: the result's main one.
         more
-            Further files, how their names may end, and what makes them.
+            Further files, how their names may end, and what makes them; or makes several, by their paths.
 
         Raises
         ------
@@ -91,7 +91,7 @@ class Destination:
         if self.latex and (self.show is None or self.json or self.table):
             raise ValueError("--latex belongs to --show equations, without --json or --table")
         plot, output = self.plot, self.output
-        files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes]]] = [
+        files: list[tuple[Path | None, Sequence[str], Callable[[_R], bytes | Mapping[Path, bytes]]]] = [
             (plot, PICTURES, lambda r: figure_bytes(draw(r) if draw else r.figure(), plot or Path())),
             (output, TABLES, lambda r: table_bytes(output or Path(), r.to_frame())),
             *more,
@@ -106,12 +106,16 @@ class Destination:
             document["equations"] = equations.to_dict()
         note(document)
         targets = {path: build for path, _, build in files if path is not None}
-        check_inputs(targets, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
-        write_files({path: build(found) for path, build in targets.items()})
+        built: dict[Path, bytes] = {}
+        for path, build in targets.items():
+            made = build(found)
+            built |= made if isinstance(made, Mapping) else {path: made}
+        check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
+        write_files(built)
         if self.json:
             typer.echo(json_text(document))
         else:
-            written = [f"written: {printable(str(path))}" for path in targets]
+            written = [f"written: {printable(str(path))}" for path in built]
             answer = equations.answer(found.answer) if equations else found.answer
             text = answer.whole() if self.table else answer.brief(LINES - len(written))
             typer.echo("\n".join([equations.latex() if equations and self.latex else text, *written]))

@@ -1,10 +1,6 @@
 """Static equilibrium of a rotor in its journal bearings, of any number: K(Ω) q = w + Σ F(q, 0, Ω).
 
-The deflections p at the nodes of forces are the unknowns; the others follow, being linear:
-
-    A p = b + F(p),  A = K_pp − K_po K_oo⁻¹ K_op,  b = w_p − K_po K_oo⁻¹ w_o,
-
-by Newton's method, its steps damped and kept inside the clearances, and where it fails by continuation in the
+By Newton's method, its steps damped and kept inside the clearances; where it fails by continuation in the
 load, from the centred journals on.
 """
 
@@ -17,7 +13,7 @@ import numpy as np
 
 from fem.forces.laws import law
 from fem.model.node_forces import CubicSpring, JournalBearing, NodeForce, SqueezeFilm, Stop, kind_of
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import speed_text
 from rotorid.motion.system import MotionSystem
@@ -131,26 +127,23 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
     speed = number(speed, "speed")
     journal = next((force for force in system.forces if isinstance(force, JournalBearing)), None)
     if journal is not None and speed == 0:
-        raise ValueError(
-            f"speed 0: no film carries a load at rest; {_named(journal)} has an equilibrium only above it"
-        )
-    resting = replace(system, forces=tuple(_at_rest(force) for force in system.forces))
+        raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
+    resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
-    held = _condensed(resting, K, speed)
-    q = held.all_of(_solved(held, None if start is None else start[held.p]))
+    _check_held(system, _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1], speed)
+    q = _solved(resting, K, speed, start)
+    residual = _left_over(resting, K, q, speed, 1.0)[0]
     _check_walls(system, q, speed)
-    F = resting.acting(q, np.zeros(system.size), speed)[0]
-    residual = float(np.abs(K @ q - system.weight - F).max() / (np.abs(system.weight).sum() or 1.0))
-    if not residual <= _LOST:
+    left = float(np.abs(residual).max() / (np.abs(system.weight).sum() or 1.0))
+    if not left <= _LOST:
         raise ValueError(
-            f"the equilibrium at {speed_text(speed)} is lost in float64: {residual:.2g} of the weight is left "
-            "over; join neighbouring elements (50 to 200 are ample for a rotor)"
+            f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
     walled = [k for k, force in enumerate(system.forces) if np.isfinite(force.wall)]
     load = -each_force(resting, q, speed)[walled, :, 0]
     q.setflags(write=False)
     bearings = tuple(system.forces[k] for k in walled)
-    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1], residual)
+    return Equilibrium(system, speed, q, bearings, load[:, 0] + 1j * load[:, 1], left)
 
 
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
@@ -161,97 +154,64 @@ def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Condensed:
-    """A p = b + F(p), and the other unknowns `follow[:, 0] − follow[:, 1:] p`."""
-
-    system: MotionSystem
-    speed: float
-    p: IndexArray
-    A: FloatArray
-    b: FloatArray
-    others: IndexArray
-    follow: FloatArray
-
-    def all_of(self, p: FloatArray) -> FloatArray:
-        q = np.zeros(self.system.size)
-        q[self.p], q[self.others] = p, self.follow[:, 0] - self.follow[:, 1:] @ p
-        return q
-
-    def left(self, p: FloatArray, share: float) -> tuple[FloatArray, FloatArray]:
-        """What is left over under a share of the load, and minus its derivative."""
-        F, F_q, *_ = self.system.acting(self.all_of(p), np.zeros(self.system.size), self.speed)
-        return share * self.b + F[self.p] - self.A @ p, self.A - F_q[np.ix_(self.p, self.p)]
-
-    def places(self, p: FloatArray) -> ComplexArray:
-        """Where the shaft is at each force, (f,)."""
-        x, y = self.system.law_tables[2].T
-        q = np.zeros(self.system.size)
-        q[self.p] = p
-        return np.asarray(q[x] + 1j * q[y])
-
-    @property
-    def walls(self) -> FloatArray:
-        return np.array([force.wall for force in self.system.forces])
+def _left_over(
+    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
+) -> tuple[FloatArray, FloatArray]:
+    """Forces that are left over under a share of the weight, and minus their derivative."""
+    F, F_q, *_ = system.acting(q, np.zeros(system.size), speed)
+    return share * system.weight + F - K @ q, K - F_q
 
 
-def _condensed(system: MotionSystem, K: FloatArray, speed: float) -> _Condensed:
-    p = np.unique(system.law_tables[2])
-    o = np.setdiff1d(np.arange(system.size), p)
-    _check_held(system, K[np.ix_(o, o)], speed)
-    follow = np.linalg.solve(K[np.ix_(o, o)], np.column_stack([system.weight[o], K[np.ix_(o, p)]]))
-    A = K[np.ix_(p, p)] - K[np.ix_(p, o)] @ follow[:, 1:]
-    found = _Condensed(system, speed, p, A, system.weight[p] - K[np.ix_(p, o)] @ follow[:, 0], o, follow)
-    _check_held(system, found.left(np.zeros(p.size), 0.0)[1], speed)
-    return found
-
-
-def _solved(held: _Condensed, start: FloatArray | None) -> FloatArray:
-    """The unknowns p: from the start or the centres at once, else with a load that grows."""
-    p, share, step = np.zeros(held.p.size), 0.0, 1.0
-    if start is not None and (found := _newton(held, start, 1.0)) is not None:
+def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
+    """The equilibrium: from the start or the centres at once, else with a load that grows."""
+    q, share, step = np.zeros(system.size), 0.0, 1.0
+    if start is not None and (found := _newton(system, K, start, speed, 1.0)) is not None:
         return found
     while share < 1.0:
         further = min(share + step, 1.0)
-        found = _newton(held, p, further)
+        found = _newton(system, K, q, speed, further)
         if found is not None:
-            p, share, step = found, further, 2 * step
+            q, share, step = found, further, 2 * step
         elif step < _SMALLEST_STEP:
-            raise _no_place(held, p)
+            e = np.abs(_places(system, q)) / _walls(system)
+            k = int(np.argmax(e))
+            raise ValueError(
+                f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight the "
+                f"shaft uses {100 * e[k]:.4g} % of its clearance at {named(system.forces[k])}"
+            )
         else:
             step /= 4
-    return p
+    return q
 
 
-def _newton(held: _Condensed, p: FloatArray, share: float) -> FloatArray | None:
+def _newton(
+    system: MotionSystem, K: FloatArray, q: FloatArray, speed: float, share: float
+) -> FloatArray | None:
     """Newton's method, or None where it does not come to an end."""
-    r, J = held.left(p, share)
+    r, J = _left_over(system, K, q, speed, share)
     for _ in range(_ROUNDS):
-        if not np.isfinite(r).all() or not np.isfinite(J).all():
-            return None
         try:
             d = np.linalg.solve(J, r)
         except np.linalg.LinAlgError:
             return None
-        gap = min((held.walls - np.abs(held.places(p))).min(initial=np.inf), np.abs(p + d).max(initial=0.0))
-        if np.abs(d).max(initial=0.0) <= _CONVERGED * gap:
-            return np.asarray(p + d)
-        t = _inside(held, p, d)
-        size = np.linalg.norm(r)
+        z, dz, walls = _places(system, q), _places(system, d), _walls(system)
+        gap = min((walls - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
+        if np.abs(dz).max(initial=0.0) <= _CONVERGED * gap:
+            return np.asarray(q + d)
+        t, size = _inside(z, dz, walls), np.linalg.norm(r)
         while True:
-            r, J = held.left(p + t * d, share)
+            r, J = _left_over(system, K, q + t * d, speed, share)
             if np.linalg.norm(r) < (1 - 0.1 * t) * size:
                 break
             t /= 2
             if t < _SMALLEST_STEP:
                 return None
-        p = p + t * d
+        q = q + t * d
     return None
 
 
-def _inside(held: _Condensed, p: FloatArray, d: FloatArray) -> float:
+def _inside(z: ComplexArray, dz: ComplexArray, walls: FloatArray) -> float:
     """Share of a step, 1 at most, that leaves the shaft inside all walls."""
-    z, dz, walls = held.places(p), held.places(d), held.walls
     bounded = np.isfinite(walls) & (dz != 0)
     z, dz, walls = z[bounded], dz[bounded], walls[bounded]
     furthest = np.abs(z) + _CLOSER * (walls - np.abs(z))
@@ -260,52 +220,47 @@ def _inside(held: _Condensed, p: FloatArray, d: FloatArray) -> float:
     return float(min(t.min(initial=1.0), 1.0))
 
 
+def _places(system: MotionSystem, q: FloatArray) -> ComplexArray:
+    """Where the shaft is at each force, x + iy, m, shape (f,)."""
+    x, y = system.law_tables[2].T
+    return np.asarray(q[x] + 1j * q[y])
+
+
+def _walls(system: MotionSystem) -> FloatArray:
+    return np.array([force.wall for force in system.forces])
+
+
 def _at_rest(force: NodeForce) -> NodeForce:
     """What acts while nothing moves: of a squeeze film its centring spring."""
-    return CubicSpring(force.node, force.name, force.centring_stiffness) if isinstance(force, SqueezeFilm) else force
+    if not isinstance(force, SqueezeFilm):
+        return force
+    return CubicSpring(force.node, force.name, force.centring_stiffness)
 
 
-def _check_held(system: MotionSystem, K: FloatArray, speed: float) -> None:
-    if K.size:
-        largest = np.abs(K).max(axis=1, keepdims=True)
-        if largest.all() and np.linalg.cond(K / largest) < _SINGULAR:
-            return
-        springless = [force for force in system.forces if force == CubicSpring(force.node, force.name)]
-        why = "; ".join(
-            f"the squeeze film at node {force.node} has no centring spring, and at rest its shaft falls to the wall"
-            for force in springless
-        )
-        raise ValueError(
-            f"the equilibrium at {speed_text(speed)} is not determined: nothing holds the rotor"
-            + (f" ({why})" if why else "; give it bearings at two nodes")
-        )
+def _check_held(system: MotionSystem, J: FloatArray, speed: float) -> None:
+    largest = np.abs(J).max(axis=1, keepdims=True)
+    if largest.all() and np.linalg.cond(J / largest) < _SINGULAR:
+        return
+    falls = [f for f in system.forces if isinstance(f, SqueezeFilm) and not f.centring_stiffness]
+    why = [f"{named(f)} has no centring spring, at rest its shaft falls to the wall" for f in falls]
+    raise ValueError(
+        f"at {speed_text(speed)} nothing holds the rotor, its position is not determined: "
+        + ("; ".join(why) or "give it stiffness or journal bearings at two nodes")
+    )
 
 
 def _check_walls(system: MotionSystem, q: FloatArray, speed: float) -> None:
     """Refuse a shaft beyond a wall that the forces at rest do not know, or on a stop."""
-    for force in system.forces:
-        drop = float(np.hypot(*q[[*system.index(force.node)]]))
-        if isinstance(force, Stop) and drop > force.gap:
+    for force, drop in zip(system.forces, np.abs(_places(system, q)), strict=True):
+        limit = force.gap if isinstance(force, Stop) else force.wall
+        if drop > limit or drop == force.wall:
             raise ValueError(
-                f"at {speed_text(speed)} the shaft rests on {_named(force)}: it drops by {1e3 * drop:.4g} mm "
-                f"there, the gap is {1e3 * force.gap:.4g} mm"
-            )
-        if drop >= force.wall:
-            raise ValueError(
-                f"at {speed_text(speed)} the shaft drops by {1e3 * drop:.4g} mm at {_named(force)}, more than "
-                f"its clearance, {1e3 * force.wall:.4g} mm"
+                f"at {speed_text(speed)} the shaft touches {named(force)} under its weight: it drops by "
+                f"{1e3 * drop:.4g} mm there, the clearance is {1e3 * limit:.4g} mm"
             )
 
 
-def _no_place(held: _Condensed, p: FloatArray) -> ValueError:
-    e = np.abs(held.places(p)) / held.walls
-    k = int(np.argmax(e))
-    return ValueError(
-        f"no equilibrium inside the clearances is found at {speed_text(held.speed)}; under a part of the load "
-        f"the shaft is nearest to the wall of {_named(held.system.forces[k])}, at {100 * e[k]:.4g} % of its clearance"
-    )
-
-
-def _named(force: NodeForce) -> str:
+def named(force: NodeForce) -> str:
+    """For messages: "the squeeze film 'left' at node 3"."""
     name = f" {force.name!r}" if force.name else ""
     return f"the {kind_of(force).replace('_', ' ')}{name} at node {force.node}"

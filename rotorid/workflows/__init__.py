@@ -11,6 +11,7 @@ from rotorid.workflows.fit import FitOptions, RecordFit, fit
 from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
 from rotorid.workflows.modes import ModesOfReadings, ModesOptions, modes
+from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
@@ -24,6 +25,8 @@ from rotorid.workflows.unbalance import UnbalanceAtStations, UnbalanceOptions, u
 __all__ = [
     "Balance",
     "BalanceOptions",
+    "BearingEquilibria",
+    "BearingsOptions",
     "CampbellDiagram",
     "CampbellOptions",
     "Coefficients",
@@ -54,6 +57,7 @@ __all__ = [
     "UnbalanceAtStations",
     "UnbalanceOptions",
     "balance",
+    "bearings",
     "campbell",
     "critical",
     "demo",

@@ -1,0 +1,252 @@
+"""Periodic motion of a rotor over speed: synchronous, of several revolutions, and self-excited."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.rpm import rpm_text
+from rotorid.base.text import listing
+from rotorid.motion.collocation import POINTS, Orbit, Periodic
+from rotorid.motion.continuation import (
+    DOUBLING,
+    HOPF,
+    Bifurcation,
+    Branch,
+    Start,
+    at_speed,
+    follow,
+    settled,
+)
+from rotorid.motion.system import MotionSystem
+
+_STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
+_FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicMotion:
+    """Branches of periodic motion, and what could not be found.
+
+    Attributes
+    ----------
+    system
+        What moves.
+    low, high
+        Range of speeds, rad/s.
+    branches
+        The first is synchronous, or, without unbalance and bow, at rest.
+    warnings
+        Clauses.
+    """
+
+    system: MotionSystem
+    low: float
+    high: float
+    branches: tuple[Branch, ...]
+    warnings: tuple[str, ...]
+
+
+def periodic_motion(
+    system: MotionSystem,
+    low: float,
+    high: float,
+    *,
+    subsynchronous: int | None = None,
+    limit_cycle: bool = False,
+    steps: int | None = None,
+) -> PeriodicMotion:
+    """Periodic motions over a range of speeds, their stability and bifurcations.
+
+    Parameters
+    ----------
+    system
+        What moves; without unbalance and bow its synchronous motion is rest.
+    low, high
+        rad/s.
+    subsynchronous
+        Also motions of so many revolutions: those that begin at a period doubling, where that number is 2, and
+        those that the motion in time comes to at a speed of the range.
+    limit_cycle
+        Self-excited motions from the Hopf points of the rotor at rest.
+    steps
+        In time, in a revolution or a cycle, kept; default: from 16 up, as the motion needs them.
+
+    Raises
+    ------
+    ValueError
+        For an impossible range, or if no motion is found to begin with.
+    """
+    if not 0 < low < high:
+        raise ValueError("periodic motion needs speeds above 0, the lower one first")
+    forced = bool(np.abs(system.unbalance).any() or np.abs(system.bow).any())
+    if limit_cycle and forced:
+        raise ValueError(
+            "a limit cycle has a period of its own, which unbalance and bow do not let it have: leave them out"
+        )
+    search = _Search(system, low, high, steps)
+    kind = "synchronous" if forced else "rest"
+    branches = search.main(kind)
+    warnings = [] if forced else ["there is no unbalance and no bow: what is synchronous is rest"]
+    if subsynchronous:
+        more = search.subsynchronous(subsynchronous, branches) if forced else []
+        warnings += [] if more else [f"no motion of {subsynchronous} revolutions was found"]
+        branches += more
+    if limit_cycle:
+        more = [search.cycle(b) for branch in branches for b in branch.bifurcations if b.kind == HOPF]
+        if not more:
+            warnings.append(
+                "no Hopf point in this range, so no limit cycle begins here; let the range begin where the "
+                "rotor is stable at rest and end where it is not"
+            )
+        branches += more
+    return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings + _doubts(branches)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What the branches have in common."""
+
+    system: MotionSystem
+    low: float
+    high: float
+    steps: int | None
+
+    @property
+    def count(self) -> int:
+        """Steps in one revolution or cycle to begin with."""
+        return self.steps or _STEPS
+
+    def follow(self, problem: Periodic, start: Start, kind: str) -> Branch:
+        return follow(problem, start, self.low, self.high, kind, fixed_steps=self.steps is not None)
+
+    def main(self, kind: str) -> list[Branch]:
+        """From the lowest speed upwards and, where that does not come to the same, from the highest downwards."""
+        problem, found = Periodic(self.system, 1), list[Branch]()
+        problems: list[str] = []
+        for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
+            try:
+                guess = settled(problem, speed, self.count, _at_rest(self.system, speed))
+                if not _known(guess, found):
+                    found.append(self.follow(problem, at_speed(problem, guess, sign), kind))
+            except np.linalg.LinAlgError as met:
+                problems.append(f"at {rpm_text(speed)}: {met}")
+        if not found:
+            raise ValueError(f"no periodic motion was found to begin with, {listing(problems, 'and')}")
+        return found
+
+    def subsynchronous(self, turns: int, branches: list[Branch]) -> list[Branch]:
+        """From period doublings, or else from what the motion in time comes to."""
+        problem, found = Periodic(self.system, turns), list[Branch]()
+        doublings = [b for branch in branches for b in branch.bifurcations if b.kind == DOUBLING]
+        starts = [self.doubled(b) for b in doublings] if turns == 2 else []
+        for start in starts:
+            found += self._try(problem, start, found)
+        for speed in np.linspace(self.low, self.high, 9)[1:-1] if not found else ():
+            try:
+                guess = settled(problem, float(speed), turns * self.count, _at_rest(self.system, speed), 0)
+                for _ in range(60):
+                    guess = problem.marched(guess)
+                begin = at_speed(problem, guess)
+                guess = problem.solve(guess, begin.rows, begin.values)[0].orbit
+            except np.linalg.LinAlgError:
+                continue
+            if _really(guess, turns) and not _known(guess, found):
+                for sign in (1.0, -1.0):
+                    found += self._try(problem, at_speed(problem, guess, sign), [])
+        return found
+
+    def _try(self, problem: Periodic, start: Start, known: list[Branch]) -> list[Branch]:
+        """The branch, if there is one that is not known."""
+        try:
+            at, _ = problem.solve(start.guess, start.rows, start.values)
+            if _known(at.orbit, known):
+                return []
+            return [self.follow(problem, start, f"period {problem.turns}")]
+        except np.linalg.LinAlgError:
+            return []
+
+    def doubled(self, point: Bifurcation) -> Start:
+        """Of the branch of twice the period that begins at a period doubling."""
+        orbit, direction = point.point.orbit, np.real(point.direction)
+        direction = direction / np.abs(direction / orbit.scale).max()
+        amplitude, n = 0.02, orbit.start.size
+        at = Periodic(self.system, 1).linearised(orbit)
+        change = np.append(direction, 0.0) * amplitude
+        halves = [at.moved(sign * change).velocities for sign in (1.0, -1.0)]
+        guess = Orbit(
+            orbit.speed, 2 * orbit.period, orbit.start + change[:n], np.concatenate(halves)
+        )
+        row = np.append(direction / orbit.scale**2, 0.0)
+        size = row[:-1] @ direction
+        return Start(guess, row[None], np.array([row[:-1] @ orbit.state + amplitude * size]))
+
+    def cycle(self, point: Bifurcation) -> Branch:
+        """The limit cycles that begin at a Hopf point."""
+        orbit = point.point.orbit
+        whirl, shape = whirl_at_rest(self.system, orbit.start, orbit.speed)
+        shape *= np.exp(-0.5j * np.angle(np.sum(shape * shape))) / np.abs(shape).max()
+        amplitude = _FIRST * _length(self.system, orbit.start)
+        t = 2 * np.pi * (np.arange(self.count)[:, None] + POINTS) / self.count
+        moved = amplitude * shape * np.exp(1j * t)[..., None]
+        guess = Orbit(
+            orbit.speed, 2 * np.pi / whirl, orbit.start + amplitude * shape.real, (1j * whirl * moved).real
+        )
+        n = shape.size
+        rows = np.zeros((2, 2 * n + 2))
+        rows[0, :n], rows[1, :n] = shape.imag, shape.real
+        values = rows[:, :n] @ orbit.start + [0.0, amplitude * shape.real @ shape.real]
+        return self.follow(Periodic(self.system, 0), Start(guess, rows, values), "limit cycle")
+
+
+def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
+    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,)."""
+    C, K = system.linear(speed)
+    _, F_q, F_v, _ = system.acting(q, np.zeros_like(q), speed)
+    n, eye = q.size, np.eye(q.size)
+    zero = np.zeros((n, n))
+    left = np.block([[zero, eye], [F_q - K, F_v - C]])
+    values, vectors = scipy.linalg.eig(left, np.block([[eye, zero], [zero, system.M]]))
+    whirls = np.isfinite(values) & (values.imag > 0)
+    k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
+    return float(values[k].imag), np.asarray(vectors[:n, k])
+
+
+def _length(system: MotionSystem, q: FloatArray) -> float:
+    """The smallest clearance, or the largest deflection."""
+    walls = [force.wall for force in system.forces if np.isfinite(force.wall)]
+    return min(walls) if walls else max(float(np.abs(q).max()), 1e-6)
+
+
+def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
+    """State to begin with: where the linear part is in balance, or else at zero."""
+    return np.full(system.size, 1e-4 * _length(system, np.zeros(system.size)))
+
+
+def _known(orbit: Orbit, branches: list[Branch]) -> bool:
+    """Whether a branch comes through this motion."""
+    for branch in branches:
+        for a, b in zip(branch.points, branch.points[1:], strict=False):
+            low, high = sorted((a.orbit.speed, b.orbit.speed))
+            if low * (1 - 1e-9) <= orbit.speed <= high * (1 + 1e-9):
+                share = (orbit.speed - a.orbit.speed) / (b.orbit.speed - a.orbit.speed or 1.0)
+                between = a.orbit.state + share * (b.orbit.state - a.orbit.state)
+                if (np.abs(between - orbit.state) < 0.02 * orbit.scale).all():
+                    return True
+    return False
+
+
+def _really(orbit: Orbit, turns: int) -> bool:
+    """Whether a motion of several revolutions is none of fewer."""
+    ends, N = orbit.ends[:-1], len(orbit.velocities)
+    shifts = [N // turns * k for k in range(1, turns) if turns % k == 0]
+    size = orbit.scale[: orbit.start.size]
+    return all((np.abs(ends - np.roll(ends, k, axis=0)) / size).max() > 1e-3 for k in shifts)
+
+
+def _doubts(branches: list[Branch]) -> list[str]:
+    """What may be wrong with the branches."""
+    return [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]

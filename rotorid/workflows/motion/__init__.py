@@ -1,0 +1,1 @@
+"""Workflows of rotors with forces that are not linear: equilibrium, motion in time, periodic motion."""
