@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from fem.model.node_forces import JournalBearing, NodeForce, kind_of
-from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from fem.model.node_forces import JournalBearing, NodeForce
+from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.checks import number
 from rotorid.base.rpm import rpm_text
+from rotorid.motion.equilibrium import named
 from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem
 
@@ -138,8 +140,8 @@ def run(
     count = int(np.ceil(number(rate, "rate") * time * (1 - 1e-12))) or 1
     if count * max(len(names), 1) > _MOST:
         raise ValueError(
-            f"{count:,} samples at {len(names)} nodes are more than memory should hold: fewer nodes, a shorter "
-            f"time or a lower rate than {rate:.6g} samples a second are needed"
+            f"{count:,} samples at {len(names)} nodes are more than memory should hold: give fewer nodes, a "
+            f"shorter time or a lower rate than {rate:.6g} samples a second"
         )
     times = np.linspace(0.0, time, count + 1)
     z = np.empty((count + 1, len(names)), dtype=complex)
@@ -202,8 +204,8 @@ def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turn
         if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
             where = system.coordinates[int(np.abs(free).max(axis=1).argmax())]
             raise ValueError(
-                f"{where} has neither mass nor damping, so that its velocity is not determined: give it a mass, "
-                "or a bearing with damping"
+                f"{where} has neither mass nor damping, so that its velocity is not determined: give it a "
+                "mass, or a bearing with damping"
             )
         change = free @ np.linalg.solve(J, free.T @ state[2])
         v = v - change
@@ -216,8 +218,7 @@ def _check_journals(system: MotionSystem, first: float, last: float) -> None:
     for force in system.forces:
         if isinstance(force, JournalBearing) and not min(first, last) > 0:
             raise ValueError(
-                f"speed 0: the film of the journal bearing at node {force.node} carries nothing at rest; begin "
-                "and end above it"
+                f"speed 0: the film of {named(force)} carries nothing at rest; begin and end above it"
             )
 
 
@@ -230,7 +231,7 @@ def _pieces(
     inner = system.knots[(system.knots > min(speeds)) & (system.knots < max(speeds))]
     blocks = np.linspace(0.0, time, count // _BLOCK + 2)
     ends = np.unique(np.concatenate([blocks, (inner - first) / alpha if alpha else []]))
-    for begin, end in zip(ends[:-1], ends[1:], strict=True):
+    for begin, end in itertools.pairwise(ends):
         speed = first + alpha * begin
         turned = (angle + (first + speed) / 2 * begin) % (2 * np.pi)
         yield (begin, end), _equations(system, speed, first + alpha * end, alpha), (turned, speed, alpha)
@@ -252,10 +253,6 @@ def _equations(system: MotionSystem, first: float, last: float, alpha: float) ->
 def _why(system: MotionSystem, how: int, force: int, time: float, speed: float) -> str:
     when = f"after {time:.6g} s, at {rpm_text(speed)}"
     if how == TOUCHES:
-        found = system.forces[force]
-        name = f" {found.name!r}" if found.name else ""
-        return (
-            f"the shaft touches the wall of the {kind_of(found).replace('_', ' ')}{name} at node {found.node} "
-            f"{when} (less than a thousandth of its clearance is left)"
-        )
+        where = named(system.forces[force])
+        return f"the shaft touches the wall of {where} {when}: under a thousandth of its clearance is left"
     return f"no step is short enough {when}: the forces change faster than any motion could follow"
