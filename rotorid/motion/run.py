@@ -17,7 +17,7 @@ from rotorid.motion.equilibrium import named
 from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
 from rotorid.motion.system import MotionSystem
 
-TOLERANCE = 1e-7
+TOLERANCE = 1e-6
 A_TURN = 64
 """Samples a turn at the highest speed, where no rate is given."""
 _BLOCK = 10_000
@@ -148,7 +148,7 @@ def run(
     q, v = (np.array(part, dtype=float) for part in start)
     v = consistent(system, q, v, (angle, first, (last - first) / time))
     z[0] = q[places[:, 0]] + 1j * q[places[:, 1]]
-    largest = np.abs([q, v])
+    largest = np.abs(q)
     groups = np.array([name[0] not in "xy" for name in system.coordinates], dtype=np.intp)
     walls = np.array([force.wall for force in system.forces])
     h, least = 1e-3 * min(time, 2 * np.pi / reference), 1e-10 * min(time, 2 * np.pi / reference)
@@ -158,7 +158,7 @@ def run(
         out = np.empty((at.size, system.size))
         how, force, now, h, good, bad, written = advance(
             *(equations, turning, walls, (0.0, end - begin), (max(h, least), least), tolerance, groups),
-            *(0.1 * reference, q, v, largest, np.minimum(at, end) - begin, out),
+            *(q, v, largest, np.minimum(at, end) - begin, out),
         )
         z[done : done + written] = out[:written, places[:, 0]] + 1j * out[:written, places[:, 1]]
         done, steps, vain = done + written, steps + good, vain + bad
