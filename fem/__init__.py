@@ -14,6 +14,15 @@ from fem.campbell import Campbell, campbell
 from fem.critical import critical_speeds
 from fem.matrices.equations_of_motion import Motion, equations_of_motion
 from fem.mesh import MeshCheck, mesh_check, refined
+from fem.model.node_forces import (
+    CubicSpring,
+    InternalDamping,
+    JournalBearing,
+    MuszynskaSeal,
+    NodeForce,
+    SqueezeFilm,
+    Stop,
+)
 from fem.model.rotor import STEEL_DENSITY, STEEL_MODULUS, STEEL_POISSON, Disc, Model, Pedestal, Rotor, Support
 from fem.model.sensors import Sensor
 from fem.modes_result import Modes
@@ -35,13 +44,18 @@ __all__ = [
     "STEEL_POISSON",
     "BearingForces",
     "Campbell",
+    "CubicSpring",
     "Disc",
     "InfluenceCoefficients",
+    "InternalDamping",
     "Intersection",
+    "JournalBearing",
     "MeshCheck",
     "Model",
     "Modes",
     "Motion",
+    "MuszynskaSeal",
+    "NodeForce",
     "Orbits",
     "Peak",
     "Peaks",
@@ -50,9 +64,11 @@ __all__ = [
     "Rotor",
     "Sensor",
     "SpeedMap",
+    "SqueezeFilm",
     "Stability",
     "StateSpace",
     "StaticDeflection",
+    "Stop",
     "Support",
     "WhirlModes",
     "Window",

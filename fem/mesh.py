@@ -112,6 +112,7 @@ def refined(rotor: Rotor, times: int) -> Rotor:
         **per_element,
         discs=[replace(disc, node=moved(disc.node)) for disc in rotor.discs],
         supports=[replace(support, node=moved(support.node)) for support in rotor.supports],
+        forces=[replace(force, node=moved(force.node)) for force in rotor.forces],
         stations={name: moved(node) for name, node in rotor.stations.items()},
     )
 

@@ -12,7 +12,7 @@ import fem
 import rotorid
 from rotorid.samples import sample_data
 
-HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize")
+HEAVY = ("pandas", "matplotlib", "sympy", "clarabel", "openpyxl", "scipy.optimize", "numba")
 
 
 def run_python(code):
@@ -30,6 +30,11 @@ def test_any_package_can_be_imported_first(first):
 def test_an_import_does_not_load_what_only_some_commands_need(package):
     loaded = set(json.loads(run_python(f"import json, sys, {package}; print(json.dumps(list(sys.modules)))")))
     assert not loaded & set(HEAVY)
+
+
+def test_only_what_moves_loads_the_compiler():
+    code = "import sys, fem, rotorid.workflows.critical, rotorid.tables.schema; print('numba' in sys.modules)"
+    assert run_python(code) == "False\n"
 
 
 @pytest.mark.parametrize("package", [fem, balancing, rotorid])

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fem.forces.short_film import short_film
+from fem.forces.stop import stop
 from fem.model.node_forces import (
     CubicSpring,
     InternalDamping,
@@ -74,7 +75,7 @@ def law(
             out[i, 1 + i] -= v[4]
         return
     if code == _STOP:
-        _stop(v, x, y, vx, vy, omega, out)
+        stop(v, x, y, vx, vy, omega, out)
         return
     # F = −A z − B z' with complex functions of |z| and Ω, and their derivatives by |z|² and Ω
     z, dz, e2 = complex(x, y), complex(vx, vy), x * x + y * y
@@ -108,35 +109,3 @@ def law(
     out[0, 3], out[1, 3] = -B.real, -B.imag
     out[0, 4], out[1, 4] = B.imag, -B.real
     out[0, 5], out[1, 5] = F_o.real, F_o.imag
-
-
-@compiled
-def _stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray) -> None:
-    """Of `Stop`: with n = z / |z| and t = i n, F = −N n − µ N tanh(s / v₀) t, s = v · t + Ω R."""
-    out[:, :] = 0.0
-    gap, k, c, mu, R, v0 = v[0], v[1], v[2], v[3], v[4] / 2, v[5]
-    r = math.hypot(x, y)
-    if not r > gap:
-        return
-    nx, ny = x / r, y / r
-    vr, vt = vx * nx + vy * ny, vy * nx - vx * ny
-    N = k * (r - gap) + c * vr
-    if not N > 0.0:
-        return
-    f = math.tanh((vt + omega * R) / v0)
-    slope = mu * N * (1.0 - f * f) / v0
-    g = mu * f
-    Fn, Ft = -N, -g * N
-    # derivatives of F_n and F_t by radial and tangential displacement and velocity, then of the directions
-    n_r, n_t, n_vr = -k, -c * vt / r, -c
-    t_r, t_t, t_vr, t_vt = -g * k + slope * vt / r, -g * c * vt / r + slope * vr / r, -g * c, -slope
-    n_t -= Ft / r
-    t_t += Fn / r
-    for i in range(2):
-        n, t = (nx, -ny) if i == 0 else (ny, nx)
-        out[i, 0] = Fn * n + Ft * t
-        d_r, d_t = n_r * n + t_r * t, n_t * n + t_t * t
-        d_vr, d_vt = n_vr * n + t_vr * t, t_vt * t
-        out[i, 1], out[i, 2] = d_r * nx - d_t * ny, d_r * ny + d_t * nx
-        out[i, 3], out[i, 4] = d_vr * nx - d_vt * ny, d_vr * ny + d_vt * nx
-        out[i, 5] = -slope * R * t

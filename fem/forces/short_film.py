@@ -32,9 +32,11 @@ import math
 from rotorid.base.arrays import FloatArray
 from rotorid.base.compiled import compiled
 
+_WALL = 1e-14  # of 1 − ε², below which it is rounding
+
 
 @compiled
-def short_film(  # noqa: PLR0913  scalars: what is compiled takes no objects
+def short_film(  # noqa: PLR0913  what is compiled takes no objects
     C: float,
     c: float,
     x: float,
@@ -63,7 +65,7 @@ def short_film(  # noqa: PLR0913  scalars: what is compiled takes no objects
     """
     X, Y = x / c, y / c
     k2 = 1.0 - X * X - Y * Y
-    if not k2 > 0.0:
+    if not k2 > _WALL:
         out[:, :] = math.nan
         return
     a, b = vx + 0.5 * omega * y, vy - 0.5 * omega * x

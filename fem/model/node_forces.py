@@ -88,6 +88,9 @@ class _ShortFilm(NodeForce):
 class JournalBearing(_ShortFilm):
     """A short plain journal bearing (Ocvirk): length and diameter m, radial clearance m, viscosity Pa·s.
 
+    It has no orientation: its film lies where the rotor's weight and motion put it. Lengths up to half the
+    diameter are short; a longer one carries less than this says.
+
     Attributes
     ----------
     film
@@ -121,6 +124,9 @@ class MuszynskaSeal(NodeForce):
     K = K₀ (1 − e²)⁻ⁿ, D = D₀ (1 − e²)⁻ⁿ, τ = τ₀ (1 − e)ᵇ with e = |z| / clearance, and, z = x + iy,
 
         F = −(K − m τ² Ω² − i τ Ω D) z − (D − 2 i τ Ω m) z' − m z''.
+
+    With both exponents 0 its coefficients are constant. Sources: A. Muszynska, J. Sound Vib. 110 (1986) 443;
+    A. Muszynska, D. E. Bently, J. Sound Vib. 143 (1990) 103.
 
     Attributes
     ----------
@@ -196,7 +202,10 @@ class Stop(NodeForce):
 
 @dataclass(frozen=True)
 class InternalDamping(NodeForce):
-    """Damping that turns with the shaft, as of a shrink fit: F = −c (z' − i Ω z), c = damping in N·s/m."""
+    """Damping that turns with the shaft, as of a shrink fit: F = −c (z' − i Ω z), c = damping in N·s/m.
+
+    Source: A. L. Kimball, Gen. Electr. Rev. 27 (1924) 244.
+    """
 
     damping: float = 0.0
 

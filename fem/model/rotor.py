@@ -120,10 +120,11 @@ class Rotor:
         )
 
     def __repr__(self) -> str:
+        forces = f", {counted(len(self.forces), 'force')}" if self.forces else ""
         return (
             f"Rotor({counted(self.n_elements, 'element')}, {self.positions[-1]:.4g} m, "
             f"{self.total_mass:.4g} kg, {counted(len(self.discs), 'disc')}, "
-            f"{counted(len(self.supports), 'support')})"
+            f"{counted(len(self.supports), 'support')}{forces})"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -107,6 +107,9 @@ class ReduceOptions:
         Planes x and y in the model file, also where nothing couples them.
     force : LIST
         Nodes of measured forces, inputs f_x12 of the model file, 12 or 7,12.
+    keep_supports
+        For motion: masses of the shaft alone, found with rigid bearings in place of bearings and films; all
+        supports and forces stay in the model, at nodes of their own.
     """
 
     nodes: Nodes | None = None
@@ -132,6 +135,7 @@ class ReduceOptions:
     damping: str | Sequence[float] | None = None
     both_planes: bool = False
     force: Nodes | None = None
+    keep_supports: bool = False
 
 
 @workflow
@@ -177,11 +181,18 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
 def _check_used(options: ReduceOptions, has_rotor: bool) -> None:
     """Refuse options that would have no effect."""
     computed = ("rank", "place", "methods", "trade_off", "response", "stability")
-    of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed")
+    of_rotor = (*computed, "candidates", "damping", "both_planes", "supports_apart", "speed", "keep_supports")
     asked = {name: getattr(options, name) for name in of_rotor}
     given = [name for name, value in asked.items() if value is not None and value is not False]
     if not has_rotor and given:
         raise ValueError(f"{option_name(given[0])} needs a rotor: give ROTOR instead of --compliance")
+    on_supports = ("measured", "supports_apart", "speed", "response", "stability", "both_planes", "force")
+    for name in on_supports if options.keep_supports else ():
+        if getattr(options, name) not in (None, False):
+            raise ValueError(
+                f"{option_name(name)} asks for the rotor on its supports; with --keep-supports the "
+                "masses are found on rigid ones: leave out one of them"
+            )
     if has_rotor and (options.compliance is not None or options.seals is not None):
         raise ValueError("--compliance and --seals take the place of a rotor: give them, or ROTOR, not both")
     for name in ("masses", "candidates"):
@@ -200,18 +211,29 @@ def _forces(options: ReduceOptions) -> list[str | int]:
 
 def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[str, Any]) -> ReducedRotor:
     """The masses of a rotor, and what is asked for beside them."""
+    from rotorid.motion.kept_supports import check_free, held_nodes, held_rigidly, keep_supports
     from rotorid.reduction import rank_nodes
     from rotorid.reduction import reduce as reduce_rotor
     from rotorid.tables.data.modes_table import read_modes
     from rotorid.workflows.reduce_result import ReducedRotor
 
     machine, files = rotor_source(rotor)
+    whole, held = machine, held_nodes(machine) if options.keep_supports else ()
+    if options.keep_supports:
+        machine = held_rigidly(whole)
+    elif whole.forces:
+        raise ValueError(
+            "forces that are not linear act on this rotor: reduce it with --keep-supports, which finds the "
+            "masses on rigid supports, or reduce the linear rotor that `rotorid bearings --output` writes"
+        )
     at = None if options.speed is None else one_speed(options.speed, "--speed")
     data = None if options.measured is None else read_modes(options.measured, machine)
     placement = None
     if options.rank or options.place is not None:
         masses = 3 if options.masses is None else options.masses
         candidates = None if options.candidates is None else nodes(options.candidates, "--candidates")
+        if held and candidates is None:
+            candidates = [node for node in range(1, machine.n_nodes + 1) if node not in held]
         placement = rank_nodes(
             machine,
             masses,
@@ -222,6 +244,7 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
             rows=options.rows,
         )
     places = _places(machine, options, placement, data, at)
+    check_free(held, places)
     used = min(2, len(places)) if options.modes is None else options.modes
     if data is not None and options.measured is not None:
         files = (*files, Path(options.measured))
@@ -246,7 +269,11 @@ def _of_rotor(rotor: Rotor | Path | str, options: ReduceOptions, how: Mapping[st
         forces=[machine.node(node) for node in _forces(options)],
         provenance=provenance(files, options),
     )
-    return _beside(found, machine, options, at)
+    found = _beside(found, machine, options, at)
+    if not options.keep_supports:
+        return found
+    model = keep_supports(whole, places, found.result.masses.solution, modal_damping=found.damping)
+    return dataclasses.replace(found, motion_model=model)
 
 
 def _places(
@@ -333,7 +360,8 @@ def _beside(found: ReducedRotor, rotor: Rotor, options: ReduceOptions, at: float
     if options.methods:
         beside["methods"] = compare_methods(rotor, places, modes=found.result.modes, rows=options.rows, **how)
     stable = band(options.stability, "--stability")
-    if found.damping or options.response is not None or stable is not None:
+    damped = found.damping and not options.keep_supports
+    if damped or options.response is not None or stable is not None:
         beside["small"] = small = found.result.small(found.damping)
         if options.response is not None:
             automatic = str(options.response) == "auto"

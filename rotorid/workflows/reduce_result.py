@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.answer import Answer, together
-from rotorid.base.text import counted
+from rotorid.base.text import counted, listing
 from rotorid.workflows.option_values import one_of
 from rotorid.workflows.result_provenance import Parts
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     import fem
+    from rotorid.motion.small_model import SmallModel
     from rotorid.reduction import (
         Methods,
         Placement,
@@ -46,6 +47,8 @@ class ReducedRotor(Parts):
         What was asked for beside them.
     small
         The model in both planes, with what turns, couples and damps; `damping`: its modal damping ratios.
+    motion_model
+        The model for motion, with supports and forces, where the supports are kept.
     speed, both_planes, forces
         Of the files of the small model: rad/s, whether both planes are written, nodes of forces.
     """
@@ -58,6 +61,7 @@ class ReducedRotor(Parts):
     stability: StabilityCost | None = None
     shift: Shift | None = None
     small: SmallRotor | None = None
+    motion_model: SmallModel | None = None
     damping: Sequence[float] = ()
     speed: float = 0.0
     both_planes: bool = False
@@ -75,12 +79,26 @@ class ReducedRotor(Parts):
             "response": self.response,
             "stability": self.stability,
             "small_model": self.small,
+            "motion_model": self.motion_model,
         }
+
+    @property
+    def held(self) -> list[int]:
+        """Nodes that were held rigidly while the masses were found."""
+        rotor = self.result.rotor
+        return [] if rotor is None or self.motion_model is None else [s.node for s in rotor.supports]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return super().to_dict() | ({"held_nodes": self.held} if self.held else {})
 
     @property
     def answer(self) -> Answer:
         """The ranking where it was asked for, before the masses at its compromise."""
         first = [] if self.placement is None else [self.placement.answer]
+        if self.held:
+            at = listing(map(str, self.held), "and")
+            first.append(Answer(f"The shaft held rigidly at nodes {at}, without its supports and forces:"))
         rest = (part for part in self.parts.values() if part not in (None, self.placement))
         return together([*first, *(part.answer for part in rest)])
 
@@ -195,6 +213,16 @@ class ReducedRotor(Parts):
             # numpy before 2.1 would store allow_pickle= as an array
             np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
+
+    def motion_model_bytes(self, name: str = "") -> bytes:
+        """The model for motion as a file; `name` of the rotor for its comment."""
+        from rotorid.tables.models.small_model_file import small_model_bytes
+
+        if self.motion_model is None:
+            raise ValueError("a model for motion keeps its supports: give --keep-supports, too")
+        nodes = ", ".join(map(str, self.result.nodes))
+        said = f"{name} reduced to masses at nodes {nodes} (formula 50), its supports kept; in SI"
+        return small_model_bytes(self.motion_model, [said])
 
     def _motion(self) -> fem.Motion:
         """One plane where nothing couples them; without massless unknowns where no damping acts on them."""

@@ -259,6 +259,7 @@ def small_rotor(
     masses: ArrayLike,
     *,
     modal_damping: Sequence[float] = (),
+    also: Sequence[int] = (),
 ) -> SmallRotor:
     """Put masses in place of a rotor's distributed mass; everything else stays where it is.
 
@@ -273,6 +274,8 @@ def small_rotor(
     modal_damping
         Damping ratios ζ of the first modes of each plane at rest without other damping (supports as at their
         lowest tabulated speed, without cross-coupling): C = Σ 2 ζ ω (M φ)(M φ)ᵀ / (φᵀ M φ).
+    also
+        Further nodes that are kept, without mass.
 
     Raises
     ------
@@ -302,7 +305,7 @@ def small_rotor(
                 "masses, use other nodes or more modes, or non-negative least squares, and leave out nodes "
                 "without mass"
             )
-    kept = (*places, *sorted({s.node for s in rotor.supports} - set(places)))
+    kept = (*places, *sorted({*also, *(s.node for s in rotor.supports)} - set(places)))
     T = static_shapes(rotor, kept)
     quadratic = project(both_planes(rotor, complex_coordinate=False), T)
     n, d = len(places), len(kept)

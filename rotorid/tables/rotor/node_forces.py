@@ -17,6 +17,7 @@ from rotorid.tables.rotor.bearing import NAME, NODE
 from rotorid.tables.rotor.rotor_plausibility import warn_of_force
 
 _SIZE = number(0.0)
+_EXPONENT = number(0.0, 10.0)
 
 
 def _needed(name: str, kind: Kind, about: str, of: dict[str, Unit] | None = None) -> Key:
@@ -57,8 +58,8 @@ KEYS_OF_FORCE: dict[str, tuple[Key, ...]] = {
         Key("fluid_mass_kg", _SIZE, "inertia of the fluid that turns in it", units.MASS, 0.0),
         _needed("swirl_ratio", _SIZE, "mean speed τ₀ of the fluid by the shaft's, about 0.5 or less"),
         _needed("clearance_um", ABOVE_ZERO, "radial clearance", units.LENGTH),
-        Key("stiffness_exponent", _SIZE, "n, default 2", default=MuszynskaSeal.stiffness_exponent),
-        Key("swirl_exponent", _SIZE, "b, default 0.5", default=MuszynskaSeal.swirl_exponent),
+        Key("stiffness_exponent", _EXPONENT, "n, default 2", default=MuszynskaSeal.stiffness_exponent),
+        Key("swirl_exponent", _EXPONENT, "b, default 0.5", default=MuszynskaSeal.swirl_exponent),
     ),
     "cubic_spring": (
         *_PLACE,

@@ -118,7 +118,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         if table is not None:
             files[table] = _bearing_table(support)
         section = "bearing" if mixed else support.kind
-        document.setdefault(section, []).append(_support(support, table, mixed=mixed))
+        document.setdefault(section, []).append(support_table(support, table, mixed=mixed))
     for name in rotor.stations:
         if not name.strip() or name.strip().isdecimal():
             raise ValueError(
@@ -197,7 +197,8 @@ def _disc(disc: Disc) -> dict[str, Any]:
     return section | dict([mass, *((key, value) for key, value in inertias if value)])
 
 
-def _support(support: Support, table: Path | None, *, mixed: bool) -> dict[str, Any]:
+def support_table(support: Support, table: Path | None, *, mixed: bool) -> dict[str, Any]:
+    """A support as a table of a rotor file; `mixed` says its kind, too; its table over speed is a file."""
     section: dict[str, Any] = {"name": support.name} if support.name else {}
     section["node"] = support.node
     if mixed and support.kind != "bearing":

@@ -1,0 +1,157 @@
+"""A reduction whose model keeps the supports: masses of a shaft on rigid bearings, the bearings apart.
+
+Bearings and films are held rigidly while formula (50) finds the masses, as if they were simple supports: then
+the masses are those of the shaft, whatever it runs on, and what the formula cannot see, the mass that these
+supports hold at rest, stands at them. It is shared so that mass and centre of mass of the model are the
+rotor's: with two supports that is one way only, with more the nearest to the shares of static condensation,
+1ᵀ M T. The model is then that of Craig and Bampton with masses instead of modes: exact for what the supports
+carry, and near to the rotor on supports from soft to stiff.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+import fem
+from fem.matrices.banded_matrices import assemble, multiply
+from fem.model.node_forces import JournalBearing, SqueezeFilm, kind_of
+from fem.static import GRAVITY
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
+from rotorid.motion.small_model import SmallModel
+from rotorid.reduction import small_rotor
+
+_RIGID = 1e7  # stiffness of a rigid support by that of a shaft on two of them
+
+
+def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
+    """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
+
+    Raises
+    ------
+    ValueError
+        If these are fewer than two.
+    """
+    nodes = held_nodes(rotor)
+    if len(nodes) < 2:
+        raise ValueError(
+            "to keep the supports, the masses are found with the shaft held rigidly at its bearings, journal "
+            f"bearings and squeeze films: two nodes at least are needed, this rotor has {len(nodes)}"
+        )
+    bending = float((rotor.youngs_modulus * rotor.second_moment).max())
+    stiffness = _RIGID * 48 * bending / float(np.sum(rotor.length)) ** 3
+    tilting = {node: sum(s.tilting_stiffness for s in rotor.supports if s.node == node) for node in nodes}
+    return replace(
+        rotor,
+        supports=[fem.Support(node, stiffness, tilting_stiffness=tilting[node]) for node in nodes],
+        forces=(),
+    )
+
+
+def held_nodes(rotor: fem.Rotor) -> tuple[int, ...]:
+    """Nodes of its bearings that have a stiffness, journal bearings and squeeze films, ascending."""
+    films = {force.node for force in rotor.forces if isinstance(force, (JournalBearing, SqueezeFilm))}
+    springs = {s.node for s in rotor.supports if s.kind == "bearing" and s.at(s.speeds or 0.0)[0].any()}
+    return tuple(sorted(films | springs))
+
+
+def keep_supports(
+    rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray, *, modal_damping: Sequence[float] = ()
+) -> SmallModel:
+    """Condense a shaft to its masses, supports and forces.
+
+    Parameters
+    ----------
+    rotor
+        With its supports and forces.
+    nodes, masses
+        As found on `held_rigidly`, n of them.
+    modal_damping
+        Damping ratios of the first modes on rigid supports; it is of the surroundings, in both planes alike.
+
+    Raises
+    ------
+    ValueError
+        As `small_rotor`, and for a mass at a node that was held.
+    """
+    held = held_nodes(rotor)
+    check_free(held, nodes)
+    small = small_rotor(rotor.linear, nodes, masses, also=[force.node for force in rotor.forces])
+    n, k = len(nodes), len(small.kept)
+    A = assemble(rotor.linear)
+    ones = np.zeros((A.size, 1))
+    ones[A.deflections] = 1.0
+    weights = small.quadratic.basis.T @ multiply(A.mass, ones)[:, 0]
+    found = np.zeros(k)
+    found[:n] = small.masses
+    at = rotor.positions[np.array(small.kept) - 1]
+    rest = [i for i, node in enumerate(small.kept) if node in held]
+    lacking = rotor.total_mass - found.sum(), _moment(rotor) - float(found @ at)
+    found[rest] = _shared(weights[rest], at[rest], *lacking)
+    damping = np.zeros((k, k))
+    if modal_damping:
+        on_rigid = small_rotor(held_rigidly(rotor), nodes, masses, modal_damping=modal_damping)
+        damping[:n, :n] = on_rigid.external[:n, :n]
+    order = np.argsort(small.kept)
+    grid = np.ix_(order, order)
+    along = tuple(int(small.kept[i]) for i in order)
+    return SmallModel(
+        nodes=along,
+        masses=found[order],
+        weight=GRAVITY * weights[order],
+        stiffness=small.shaft_stiffness[grid],
+        material_damping=small.quadratic.D0[:k, :k][grid],
+        gyroscopic=small.quadratic.D1[:k, k : 2 * k][grid],
+        damping=damping[grid],
+        supports=[replace(support, tilting_stiffness=0.0) for support in rotor.supports],
+        forces=rotor.forces,
+        warnings=(*small.warnings, *_of_masses(rotor, along, found[order])),
+    )
+
+
+def check_free(held: Sequence[int], nodes: Sequence[int]) -> None:
+    """Refuse masses where the shaft is held."""
+    if both := [node for node in nodes if node in held]:
+        raise ValueError(
+            f"node {both[0]} is held rigidly while the masses are found, so none can be found there: leave "
+            "it out of --nodes; it is kept with its bearing, and with its share of the rotor's mass"
+        )
+
+
+def _moment(rotor: fem.Rotor) -> float:
+    """First moment of its mass about the left end, kg·m."""
+    z = rotor.positions
+    shaft = rotor.density * rotor.area * rotor.length * (z[:-1] + z[1:]) / 2
+    return float(shaft.sum() + sum(disc.mass * z[disc.node - 1] for disc in rotor.discs))
+
+
+def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> FloatArray:
+    """Masses of this sum and this first moment about 0, the nearest to `shares`; none is negative."""
+    scale = np.sqrt(np.maximum(shares, 1e-3 * shares.max()))
+    length = max(float(np.ptp(at)), 1.0e-3 * float(np.abs(at).max()))
+    rows = np.stack((np.ones_like(at), (at - at.mean()) / length))
+    lacking = np.array([mass, (moment - mass * at.mean()) / length]) - rows @ shares
+    change = scale * np.linalg.lstsq(rows * scale, lacking, rcond=None)[0]
+    return np.asarray(np.maximum(shares + change, 0.0))
+
+
+def _of_masses(rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray) -> list[str]:
+    said = []
+    total = rotor.total_mass
+    if abs(masses.sum() / total - 1) > 1e-9:
+        said.append(
+            f"the masses found are too large to leave some for the supports: together {masses.sum():.1f} kg "
+            f"of the rotor's {total:.1f} kg; use other nodes or more modes"
+        )
+    bare = [node for node, mass in zip(nodes, masses, strict=True) if mass == 0]
+    for node in bare:
+        kinds = [kind_of(force).replace("_", " ") for force in rotor.forces if force.node == node]
+        kinds += [support.kind for support in rotor.supports if support.node == node]
+        said.append(
+            f"no mass stands at node {node} ({listing(kinds, 'and')}): the shaft follows there without "
+            "inertia; better let a mass stand there, with --nodes"
+        )
+    return said

@@ -1,0 +1,351 @@
+"""Steps of a rotor's motion by a Rosenbrock method, compiled: Rodas5P, of order 5, with dense output.
+
+With v = q' the equations are q' = v, M v' = f(q, v, t). M may be singular: what has no mass must be bound by
+its damping (a journal by its film). A step h from (q, v) solves for i = 1 … 8, with J_q and J_v the
+derivatives of f and γ, a, c, α, d the method's coefficients,
+
+    (1 / γh) p_i − w_i = v + Σ a_ij w_j + Σ (c_ij / h) p_j,
+    (M / γh − J_v) w_i − J_q p_i = f(q + Σ a_ij p_j, v + Σ a_ij w_j, t + α_i h)
+                                   + M Σ (c_ij / h) w_j + h d_i ∂f/∂t;
+
+without p_i that is one matrix of n × n for all eight: M / γh − J_v − γh J_q. (p_8, w_8) estimates the error.
+
+Source: G. Steinebach, Construction of Rosenbrock–Wanner method Rodas5P and numerical benchmarks within the
+Julia Differential Equations package, BIT Numer. Math. 63 (2023) 27; stiffly accurate, L-stable, for index 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
+from rotorid.base.compiled import compiled
+from rotorid.motion.system import add_forces
+
+Equations = tuple[
+    IndexArray,
+    FloatArray,
+    IndexArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    FloatArray,
+    ComplexArray,
+    ComplexArray,
+]
+Turning = tuple[float, float, float]
+DONE, TOUCHES, STUCK = range(3)
+"""How `advance` ends: at the end; at a wall; because no step is small enough."""
+TOUCH = 0.999
+"""Part of its clearance at which a journal touches: a thousandth is left for the film."""
+GAMMA = 0.21193756319429014
+_ROW_6 = (
+    -7.502846399306121,
+    2.561846144803919,
+    -11.627539656261098,
+    -0.18268767659942256,
+    0.030198172008377946,
+)
+
+
+def _lower(*rows: tuple[float, ...]) -> FloatArray:
+    return np.array([[*row, *[0.0] * (8 - len(row))] for row in rows])
+
+
+A = _lower(
+    (),
+    (3.0,),
+    (2.849394379747939, 0.45842242204463923),
+    (-6.954028509809101, 2.489845061869568, -10.358996098473584),
+    (2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641),
+    _ROW_6,
+    (*_ROW_6, 1.0),
+    (*_ROW_6, 1.0, 1.0),
+)
+C = _lower(
+    (),
+    (-14.155112264123755,),
+    (-17.97296035885952, -2.859693295451294),
+    (147.12150275711716, -1.41221402718213, 71.68940251302358),
+    (165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306),
+    (24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471),
+    (
+        *(30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783),
+        *(-19.097331116725623, -28.087943162872662),
+    ),
+    (
+        *(37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047),
+        *(-40.06618937091002, -54.66780262877968, -9.48861652309627),
+    ),
+)
+ALPHA = np.array([0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1, 1, 1])
+D = np.array(
+    [GAMMA, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0, 0, 0]
+)
+DENSE = np.array(
+    [
+        *(25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204),
+        *(0.524948541321073, 1.1241088310450404, 0.4272876194431874, -0.17202221070155493),
+        *(-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796),
+        *(20.176138334709044, 15.98066361424651, -6.789040303419874, -6.710236069923372),
+        *(11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643),
+        *(-52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722),
+    ]
+).reshape(3, 8)
+
+
+@compiled
+def evaluate(equations: Equations, turning: Turning, t: float, state: FloatArray) -> None:
+    """Write f and its derivatives at the q and v of a state.
+
+    Parameters
+    ----------
+    equations, turning
+        As `advance` takes them.
+    t
+        s.
+    state
+        q, v, f, ∂f/∂t, and the rows of J_q and of J_v, shape (4 + 2 n, n).
+    """
+    codes, values, places, _, damping, stiffness, damping_slope, stiffness_slope, weight, u, b = equations
+    angle, first, alpha = turning
+    n = state.shape[1]
+    q, v, f, f_t, J_q, J_v = state[0], state[1], state[2], state[3], state[4 : 4 + n], state[4 + n :]
+    gain = alpha * t
+    speed = first + gain
+    phi = angle + (first + 0.5 * gain) * t
+    cos, sin = math.cos(phi), math.sin(phi)
+    state[2:] = 0.0
+    add_forces(codes, values, places, q, v, speed, f, J_q, J_v, f_t)
+    for i in range(n):
+        linear, slope = 0.0, 0.0
+        for j in range(n):
+            linear -= damping[i, j] * v[j] + stiffness[i, j] * q[j]
+            slope -= damping_slope[i, j] * v[j] + stiffness_slope[i, j] * q[j]
+            J_q[i, j] -= stiffness[i, j] + gain * stiffness_slope[i, j]
+            J_v[i, j] -= damping[i, j] + gain * damping_slope[i, j]
+        force = u[i] * (speed * speed - 1j * alpha) + b[i]
+        rate = 2.0 * u[i] * speed * alpha + 1j * speed * force
+        f[i] += weight[i] + linear + gain * slope + force.real * cos - force.imag * sin
+        f_t[i] = alpha * (f_t[i] + slope) + rate.real * cos - rate.imag * sin
+
+
+@compiled
+def factorise(matrix: FloatArray, pivots: IndexArray) -> bool:
+    """Replace a matrix by its triangular factors with row pivots; False where it has no inverse."""
+    n = len(matrix)
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[p, k]):
+                p = i
+        pivots[k] = p
+        if not abs(matrix[p, k]) > 0.0:
+            return False
+        for j in range(n):
+            matrix[k, j], matrix[p, j] = matrix[p, j], matrix[k, j]
+        for i in range(k + 1, n):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+    return True
+
+
+@compiled
+def solve(factors: FloatArray, pivots: IndexArray, x: FloatArray) -> None:
+    """Solve in place with what `factorise` made."""
+    n = len(x)
+    for k in range(n):
+        x[k], x[pivots[k]] = x[pivots[k]], x[k]
+    for i in range(n):
+        for j in range(i):
+            x[i] -= factors[i, j] * x[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            x[i] -= factors[i, j] * x[j]
+        x[i] /= factors[i, i]
+
+
+@compiled
+def attempt(
+    equations: Equations,
+    turning: Turning,
+    t: float,
+    h: float,
+    state: FloatArray,
+    now: FloatArray,
+    stages: FloatArray,
+    scratch: tuple[FloatArray, IndexArray, FloatArray, FloatArray],
+) -> bool:
+    """Try a step h: write the p and w of all stages, and the new q and v; False where that is impossible.
+
+    `state` is that of `evaluate` at t, `now` that at the end of the step; `stages` (p, w).
+    """
+    n = state.shape[1]
+    q, v, f, f_t, J_q, J_v = state[0], state[1], state[2], state[3], state[4 : 4 + n], state[4 + n :]
+    q_now, v_now, f_now = now[0], now[1], now[2]
+    p, w = stages[0], stages[1]
+    W, pivots, slip, pull = scratch
+    M = equations[3]
+    for i in range(n):
+        for j in range(n):
+            W[i, j] = M[i, j] / (GAMMA * h) - J_v[i, j] - GAMMA * h * J_q[i, j]
+    if not factorise(W, pivots):
+        return False
+    for stage in range(8):
+        for i in range(n):
+            q_now[i], v_now[i], slip[i], pull[i] = q[i], v[i], 0.0, 0.0
+            for k in range(stage):
+                q_now[i] += A[stage, k] * p[k, i]
+                v_now[i] += A[stage, k] * w[k, i]
+                slip[i] += C[stage, k] / h * p[k, i]
+                pull[i] += C[stage, k] / h * w[k, i]
+        if stage:
+            evaluate(equations, turning, t + ALPHA[stage] * h, now)
+        for i in range(n):
+            slip[i] += v_now[i]
+        for i in range(n):
+            w[stage, i] = (f_now[i] if stage else f[i]) + h * D[stage] * f_t[i]
+            for j in range(n):
+                w[stage, i] += M[i, j] * pull[j] + GAMMA * h * J_q[i, j] * slip[j]
+        solve(W, pivots, w[stage])
+        for i in range(n):
+            p[stage, i] = GAMMA * h * (slip[i] + w[stage, i])
+    now[:2] += stages[:, 7]
+    evaluate(equations, turning, t + h, now)
+    return bool(np.isfinite(f_now).all())
+
+
+@compiled
+def error_of(
+    error: FloatArray,
+    new: FloatArray,
+    largest: FloatArray,
+    groups: IndexArray,
+    floor: FloatArray,
+    sizes: FloatArray,
+) -> float:
+    """Largest error by the size of its unknown, `sizes` (n,), written: what `advance` says of `tolerance`."""
+    top = np.zeros(2)
+    for i in range(len(error)):
+        sizes[i] = max(largest[i], abs(new[i]))
+        top[groups[i]] = max(top[groups[i]], sizes[i])
+    worst = 0.0
+    for i in range(len(error)):
+        size = max(sizes[i], 0.01 * top[groups[i]], floor[i], 1e-300)
+        worst = max(worst, abs(error[i]) / size)
+    return worst
+
+
+@compiled
+def touched(walls: FloatArray, places: IndexArray, q: FloatArray) -> int:
+    """Which force's journal is at its wall, see `TOUCH`; −1 for none."""
+    for force in range(len(walls)):
+        if math.hypot(q[places[force, 0]], q[places[force, 1]]) >= TOUCH * walls[force]:
+            return force
+    return -1
+
+
+@compiled
+def advance(  # noqa: PLR0913  what is compiled takes no objects
+    equations: Equations,
+    turning: Turning,
+    walls: FloatArray,
+    span: tuple[float, float],
+    steps: tuple[float, float],
+    tolerance: float,
+    groups: IndexArray,
+    frequency: float,
+    q: FloatArray,
+    v: FloatArray,
+    largest: FloatArray,
+    times: FloatArray,
+    out: FloatArray,
+) -> tuple[int, int, float, float, int, int, int]:
+    """Advance q and v, in place, through a time in which C and K are linear in speed.
+
+    Parameters
+    ----------
+    equations
+        Codes, parameters and places of the laws (`MotionSystem.law_tables`); M; C and K at the first speed
+        and their slopes over speed, (n, n); weight, unbalance and bow, (n,).
+    turning
+        Angle rad, speed rad/s and acceleration rad/s² at time 0: φ, Ω, α.
+    walls
+        Of each force, m, (f,).
+    span
+        Time when it begins and ends, s.
+    steps
+        First and least step, s.
+    tolerance
+        Of the error of one step, by the largest size that the unknown or the velocity has had, or by a
+        hundredth of the largest of its group.
+    groups
+        0 for deflections, 1 for other unknowns, (n,).
+    frequency
+        rad/s; a velocity counts at least this times what its unknown counts.
+    q, v
+        Where it begins and then where it ends, (n,).
+    largest
+        Largest sizes of q and v so far, (2, n); changed.
+    times, out
+        When the motion is wanted, s, ascending, above the beginning, (k,); and q then, (k, n), written.
+
+    Returns
+    -------
+    How it ends, see `DONE`; the force that it concerns, or −1; the time; the next step; how many steps; how
+    many were tried in vain; how many of `times` are written.
+    """
+    n = len(q)
+    t, end = span
+    h, least = steps
+    state, now = np.empty((4 + 2 * n, n)), np.empty((4 + 2 * n, n))
+    state[0], state[1] = q, v
+    stages = np.empty((2, 8, n))
+    scratch = (np.empty((n, n)), np.empty(n, np.intp), np.empty(n), np.empty(n))
+    sizes, none = np.empty((2, n)), np.zeros(n)
+    done, vain, written = 0, 0, 0
+    evaluate(equations, turning, t, state)
+    while t < end:
+        force = touched(walls, equations[2], q)
+        if force >= 0:
+            return TOUCHES, force, t, h, done, vain, written
+        if h < least:
+            return STUCK, -1, t, h, done, vain, written
+        step = end - t if t + 1.0001 * h >= end else h
+        error = math.inf
+        if attempt(equations, turning, t, step, state, now, stages, scratch):
+            error = error_of(stages[0][7], now[0], largest[0], groups, none, sizes[0])
+            slow = error_of(stages[1][7], now[1], largest[1], groups, frequency * sizes[0], sizes[1])
+            error = max(error, slow) / tolerance
+        if not error <= 1.0:
+            vain += 1
+            h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
+            continue
+        while written < len(times) and times[written] <= t + step:
+            between(state[0], now[0], stages[0], (times[written] - t) / step, out[written])
+            written += 1
+        state[:] = now
+        q[:], v[:] = now[0], now[1]
+        largest[:, :] = sizes
+        t = end if step == end - t else t + step
+        done += 1
+        h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)
+    return DONE, -1, t, h, done, vain, written
+
+
+@compiled
+def between(q: FloatArray, q_new: FloatArray, p: FloatArray, part: float, out: FloatArray) -> None:
+    """Write q at a part of a step, by the method's polynomial of degree 4."""
+    rest = 1.0 - part
+    for i in range(len(q)):
+        a, b, c = 0.0, 0.0, 0.0
+        for k in range(8):
+            a += DENSE[0, k] * p[k, i]
+            b += DENSE[1, k] * p[k, i]
+            c += DENSE[2, k] * p[k, i]
+        out[i] = rest * q[i] + part * (q_new[i] + rest * (a + part * (b + part * c)))

@@ -1,0 +1,239 @@
+"""A few masses on a massless shaft with its supports and what is not linear: a small model for motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+import fem
+from fem.model.node_forces import NodeForce, kind_of
+from fem.static import GRAVITY
+from rotorid.base.answer import Answer, Answered
+from rotorid.base.arrays import FloatArray, read_only
+from rotorid.base.checks import number
+from rotorid.base.text import counted, listing
+from rotorid.motion.rotor_system import bow_forces, weight_along
+from rotorid.motion.system import MotionSystem, system
+
+_NOT_SYMMETRIC = 1e-9  # share of the largest entry
+_zero = np.array(0.0).copy  # a new one each time
+_MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
+
+
+@dataclass(frozen=True, eq=False)
+class SmallModel(Answered):
+    """Masses at nodes of a shaft that is given by its matrices, the same in both planes.
+
+    With rotation from x to y and the matrices of one plane, without supports and forces,
+
+        x:  M x'' + (B + C) x' + Ω G y' + K x + Ω B y = f_x
+        y:  M y'' + (B + C) y' − Ω G x' + K y − Ω B x = f_y.
+
+    Attributes
+    ----------
+    nodes
+        Different numbers of the k nodes.
+    masses
+        kg, shape (k,); 0 where only a support or a force acts.
+    weight
+        N at 9.80665 m/s², shape (k,).
+    stiffness
+        K of the shaft, N/m, symmetric, shape (k, k).
+    material_damping, gyroscopic, damping
+        B, N·s/m, which turns with the shaft, G, kg, and C, N·s/m, of the surroundings; symmetric, shape
+        (k, k), or the number 0.
+    supports, forces
+        At these nodes.
+    unbalance
+        m e e^{iβ} by node, kg·m, β with the rotation.
+    bow
+        As `rotorid.motion.rotor_system` has it, m.
+    warnings
+        What the reader must know.
+
+    Raises
+    ------
+    ValueError
+        For what no shaft has; the message begins with the attribute.
+    """
+
+    nodes: tuple[int, ...]
+    masses: FloatArray
+    weight: FloatArray
+    stiffness: FloatArray
+    material_damping: FloatArray = field(default_factory=_zero)
+    gyroscopic: FloatArray = field(default_factory=_zero)
+    damping: FloatArray = field(default_factory=_zero)
+    supports: Sequence[fem.Support] = ()
+    forces: Sequence[NodeForce] = ()
+    unbalance: Mapping[int, complex] = field(default_factory=dict)
+    bow: Mapping[int, complex] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        k = len(self.nodes)
+        if not k or len(set(self.nodes)) != k:
+            raise ValueError(f"nodes: different nodes, one at least, not {list(self.nodes)}")
+        for name in ("masses", "weight", *_MATRICES):
+            object.__setattr__(self, name, _array(name, getattr(self, name), k))
+        if (self.masses < 0).any() or not self.masses.any():
+            raise ValueError("masses: 0 or more, and not all of them 0")
+        for support in self.supports:
+            self._known(support.node, support.name or support.kind)
+        for force in self.forces:
+            self._known(force.node, force.name or kind_of(force).replace("_", " "))
+        for support in self.supports:
+            if support.tilting_stiffness:
+                raise ValueError(
+                    f"supports: a small model has no slopes, so the tilting stiffness of the support at node "
+                    f"{support.node} belongs into its shaft stiffness"
+                )
+        for node in (*self.unbalance, *self.bow):
+            self._known(node, "unbalance or bow")
+
+    def motion(self, speed: float = 0.0) -> fem.Motion:
+        """The linear equations in both planes, without forces that are not linear.
+
+        Coordinates are x and y of the nodes, `x7` and `y7`, then pedestals, `foot_x1` and `foot_y1` of the
+        first support.
+
+        Raises
+        ------
+        ValueError
+            For an impossible speed or one outside the table of a support.
+        """
+        speed = number(speed, "speed")
+        k = len(self.nodes)
+        stands = [i for i, support in enumerate(self.supports) if support.pedestal is not None]
+        names = [f"{axis}{node}" for axis in "xy" for node in self.nodes]
+        names += [f"foot_{axis}{i + 1}" for axis in "xy" for i in stands]
+        M, C, K = (np.zeros((len(names), len(names))) for _ in range(3))
+        x, y = slice(k), slice(k, 2 * k)
+        for own, other, sign in ((x, y, 1.0), (y, x, -1.0)):
+            M[own, own] = np.diag(self.masses)
+            C[own, own] = self.material_damping + self.damping
+            C[own, other] = sign * speed * self.gyroscopic
+            K[own, own] = self.stiffness
+            K[own, other] = sign * speed * self.material_damping
+        for i, support in enumerate(self.supports):
+            felt = np.zeros((2, len(names)))
+            for plane, axis in enumerate("xy"):
+                felt[plane, names.index(f"{axis}{support.node}")] = 1.0
+                if support.pedestal is not None:
+                    foot = names.index(f"foot_{axis}{i + 1}")
+                    felt[plane, foot] = -1.0
+                    M[foot, foot] = support.pedestal.mass
+                    K[foot, foot] += support.pedestal.xy("stiffness")[plane]
+                    C[foot, foot] += support.pedestal.xy("damping")[plane]
+            stiffness, damping = support.at(speed)
+            K += felt.T @ stiffness @ felt
+            C += felt.T @ damping @ felt
+        return fem.Motion(M, C, K, tuple(names), speed)
+
+    def system(
+        self,
+        lowest: float,
+        highest: float,
+        *,
+        unbalance: Mapping[int, complex] | None = None,
+        bow: Mapping[int, complex] | None = None,
+        gravity: float = GRAVITY,
+        direction: float = -90.0,
+    ) -> MotionSystem:
+        """What moves at speeds from `lowest` to `highest`, as `rotorid.motion.rotor_system` of a rotor.
+
+        Parameters
+        ----------
+        lowest, highest
+            rad/s.
+        unbalance, bow
+            Instead of the model's own.
+        gravity, direction
+            m/s², and where it points, degrees from x with the rotation; −y by default.
+
+        Raises
+        ------
+        ValueError
+            Speeds that are no range or outside the table of a support; nodes that do not exist; a bow at
+            fewer than three nodes.
+        """
+        lowest, highest = number(lowest, "lowest speed"), number(highest, "highest speed")
+        if not lowest < highest:
+            raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
+        inside = {s for support in self.supports for s in support.speeds if lowest < s < highest}
+        bent = self.bow if bow is None else bow
+        for node in bent:
+            self._known(node, "bow")
+        at = np.array([self.nodes.index(node) for node in bent], dtype=np.intp)
+        pull = bow_forces(self.stiffness, at, np.array(list(bent.values()), dtype=complex))
+        along = zip("xy", weight_along(gravity, direction), strict=True)
+        return system(
+            self.motion,
+            np.array([lowest, *sorted(inside), highest]),
+            forces=self.forces,
+            weight={
+                f"{axis}{node}": float(part * newtons / GRAVITY)
+                for axis, part in along
+                for node, newtons in zip(self.nodes, self.weight, strict=True)
+            },
+            unbalance=self.unbalance if unbalance is None else unbalance,
+            bow={
+                f"{axis}{node}": turned * force
+                for node, force in zip(bent, pull, strict=True)
+                for axis, turned in (("x", 1), ("y", -1j))
+            },
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: nodes, masses, weight, matrices, and what acts where."""
+        return {
+            "nodes": list(self.nodes),
+            "masses_kg": self.masses.tolist(),
+            "weight_N": self.weight.tolist(),
+            "shaft_stiffness_N_per_m": self.stiffness.tolist(),
+            "forces": [{"kind": kind_of(force), "node": force.node} for force in self.forces],
+            "supports": [{"kind": support.kind, "node": support.node} for support in self.supports],
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def answer(self) -> Answer:
+        """Where its masses stand, and what acts on it."""
+        acting = [(kind_of(force).replace("_", " "), force.node) for force in self.forces]
+        acting += [(support.kind, support.node) for support in self.supports]
+        kinds = {kind: [str(node) for what, node in acting if what == kind] for kind, _ in acting}
+        where = [
+            f"{kind} at {'nodes' if len(at) > 1 else 'node'} {listing(at, 'and')}"
+            for kind, at in kinds.items()
+        ]
+        masses = ", ".join(f"{m:.2f} at {n}" for n, m in zip(self.nodes, self.masses, strict=True))
+        return Answer(
+            f"For motion: {counted(len(self.nodes), 'node')} in both planes, masses in kg {masses}, together "
+            f"{self.masses.sum():.2f}, weight {self.weight.sum():.1f} N; {listing(where, 'and') or 'free'}.",
+            warnings=self.warnings,
+        )
+
+    def _known(self, node: int, what: str) -> None:
+        if node not in self.nodes:
+            raise ValueError(
+                f"{what}: node {node} does not exist; the model's are {listing(map(str, self.nodes), 'and')}"
+            )
+
+
+def _array(name: str, value: FloatArray, k: int) -> FloatArray:
+    """Checked and read-only; the number 0 is a matrix of zeros."""
+    shape = (k, k) if name in _MATRICES else (k,)
+    array = np.array(value, dtype=float)
+    if not array.ndim and array == 0:
+        array = np.zeros(shape)
+    if array.shape != shape:
+        raise ValueError(f"{name}: {' × '.join(map(str, shape))} numbers for {counted(k, 'node')}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: finite numbers")
+    if name in _MATRICES and np.abs(array - array.T).max() > _NOT_SYMMETRIC * np.abs(array).max():
+        raise ValueError(f"{name}: a symmetric matrix")
+    read_only(array)
+    return array

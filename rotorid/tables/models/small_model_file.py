@@ -1,0 +1,193 @@
+"""Small models for motion (.toml): masses, the shaft between them as a matrix, supports and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from balancing.data.conventions import polar
+from fem.model.node_forces import FORCES
+from fem.model.supports import KINDS
+from fem.static import GRAVITY
+from rotorid.base.arrays import FloatArray
+from rotorid.base.text import listing
+from rotorid.motion.small_model import SmallModel
+from rotorid.tables.reader import units
+from rotorid.tables.reader.problems import Problems
+from rotorid.tables.reader.settings_keys import Key, Kind, take
+from rotorid.tables.reader.toml_file import Section, read_toml
+from rotorid.tables.reader.value_kinds import TURN, each, number, plain_number
+from rotorid.tables.rotor.bearing import KEYS_OF, NODE, read_support
+from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE, force_tables, read_force
+from rotorid.tables.rotor.rotor_writing import support_table
+
+
+def _list(section: Section, key: str) -> FloatArray | None:
+    return _array(section, key, 1, "a list of finite numbers, one for each node")
+
+
+def _matrix(section: Section, key: str) -> FloatArray | None:
+    return _array(section, key, 2, "a square matrix of finite numbers, a row for each node")
+
+
+def _array(section: Section, key: str, depth: int, expected: str) -> FloatArray | None:
+    value = section.take(key)
+    rows = value if depth == 2 else [value]
+    good = isinstance(rows, list) and all(isinstance(row, list) and len(row) == len(rows[0]) for row in rows)
+    if not good or not all(_is_number(entry) for row in rows for entry in row):
+        section.complain(key, expected, value=False)
+        return None
+    return np.array(value, dtype=float)
+
+
+def _is_number(value: object) -> bool:
+    return not isinstance(value, str) and plain_number(value) is not None
+
+
+def _apart(section: Section) -> Section:
+    return section
+
+
+_ROW = {"type": "array", "items": {"type": "number"}, "minItems": 1}
+_LIST, _MATRIX = Kind(_list, _ROW), Kind(_matrix, {"type": "array", "items": _ROW, "minItems": 1})
+_ANGLE = Key("angle_deg", TURN, "its angle with the rotation", units.ANGLE, required="the angle")
+UNBALANCE = (
+    Key("node", NODE, "the node"),
+    Key("unbalance_g_mm", number(0.0), "mass times radius", units.UNBALANCE, required="the unbalance"),
+    _ANGLE,
+)
+BOW = (
+    Key("node", NODE, "the node"),
+    Key("bow_um", number(0.0), "off the straight line at rest", units.LENGTH, required="the deflection"),
+    _ANGLE,
+)
+ARRAYS = (
+    Key("nodes", _LIST, "numbers of the nodes", required="a list of the nodes' numbers, nodes = [2, 7, 12]"),
+    Key("masses_kg", _LIST, "mass at each node; 0 where only a force acts", required="a mass for each node"),
+    Key("weight_N", _LIST, "what weighs at each node; default: the masses"),
+    Key(
+        "shaft_stiffness_N_per_m",
+        _MATRIX,
+        "of the shaft without supports, one plane, symmetric",
+        required="the shaft's stiffness between the nodes, a matrix",
+    ),
+    Key("material_damping_N_s_per_m", _MATRIX, "of the shaft, which turns with it", default=0.0),
+    Key("gyroscopic_kg", _MATRIX, "G of the gyroscopic effect: Ω G y' in x, −Ω G x' in y", default=0.0),
+    Key("damping_N_s_per_m", _MATRIX, "of the surroundings", default=0.0),
+)
+"""In the order of `SmallModel`."""
+SMALL_MODEL = (
+    *ARRAYS,
+    *(Key(kind.name, each(KEYS_OF[kind.name], _apart), kind.about, default=()) for kind in KINDS),
+    *(Key(kind.name, each(KEYS_OF_FORCE[kind.name], _apart), kind.about, default=()) for kind in FORCES),
+    Key("unbalance", each(UNBALANCE, _apart), "unbalance at a node; several are added", default=()),
+    Key("bow", each(BOW, _apart), "bow of the shaft, at three nodes or more", default=()),
+)
+_ATTRIBUTES = dict(
+    zip(
+        ("nodes", "masses", "weight", "stiffness", "material_damping", "gyroscopic", "damping"),
+        (key.name for key in ARRAYS),
+        strict=True,
+    )
+)
+
+
+def read_small_model(path: str | Path) -> SmallModel:
+    """Read a small model for motion.
+
+    Parameters
+    ----------
+    path
+        As `small_model_bytes` writes it; tables of bearings are relative to it.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    path, problems = Path(path), Problems()
+    top = Section(str(path), problems.need(read_toml(path, problems)), problems)
+    said = take(top, SMALL_MODEL)
+    found = said["nodes"]
+    nodes = () if found is None else tuple(int(node) for node in found)
+    if found is not None and (found % 1).any():
+        top.complain("nodes", "whole numbers", value=False)
+
+    def node(section: Section) -> int | None:
+        value = section.take("node")
+        if found is not None and (isinstance(value, bool) or value not in nodes):
+            section.complain("node", f"one of the nodes {listing(map(str, nodes))}")
+        return value if value in nodes else None
+
+    def vectors(key: str, keys: Sequence[Key]) -> dict[int, complex]:
+        total: dict[int, complex] = {}
+        for section in said[key]:
+            _, size, angle = take(section, keys).values()
+            where = node(section)
+            if where is not None and size is not None and angle is not None:
+                value = complex(polar(size.si, angle.si))
+                total[where] = total.get(where, 0j) + value
+        return total
+
+    supports = [
+        read_support(section, node, path.parent, kind.name, problems)
+        for kind in KINDS
+        for section in said[kind.name]
+    ]
+    forces = [read_force(section, node, kind.name) for kind in FORCES for section in said[kind.name]]
+    made: dict[str, Any] = {name: said[key] for name, key in _ATTRIBUTES.items()} | {"nodes": nodes}
+    if made["weight"] is None and made["masses"] is not None:
+        made["weight"] = GRAVITY * made["masses"]
+    made |= {"supports": [*filter(None, supports)], "forces": [*filter(None, forces)]}
+    made |= {"unbalance": vectors("unbalance", UNBALANCE), "bow": vectors("bow", BOW)}
+    problems.stop()
+    try:
+        return SmallModel(**made)
+    except ValueError as error:
+        name, _, expected = str(error).partition(": ")
+        top.complain(_ATTRIBUTES.get(name, name), expected, value=False)
+        problems.stop()
+        raise
+
+
+def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
+    """The file that `read_small_model` reads; numbers keep all their digits.
+
+    Raises
+    ------
+    ValueError
+        For a support whose coefficients depend on speed: they stand in tables of their own.
+    """
+    import tomli_w
+
+    lines = [f"# {comment}" for comment in comments]
+    for name, key in _ATTRIBUTES.items():
+        array = np.array(getattr(model, name))
+        if array.ndim == 1:
+            lines.append(f"{key} = {array.tolist()}")
+        elif array.any() or name == "stiffness":
+            lines += [f"{key} = [", *(f"  {row}," for row in array.tolist()), "]"]
+    tables: dict[str, list[dict[str, Any]]] = {}
+    for support in model.supports:
+        if support.speeds:
+            raise ValueError(
+                f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
+                f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
+            )
+        tables.setdefault(support.kind, []).append(support_table(support, None, mixed=False))
+    tables |= force_tables(model.forces)
+    for name, size, vectors in (
+        ("unbalance", "unbalance_kg_m", model.unbalance),
+        ("bow", "bow_m", model.bow),
+    ):
+        if vectors:
+            tables[name] = [
+                {"node": node, size: abs(value), "angle_rad": float(np.angle(value))}
+                for node, value in vectors.items()
+            ]
+    for name, sections in tables.items():
+        lines += [f"\n[[{name}]]\n{tomli_w.dumps(section).strip()}" for section in sections]
+    return ("\n".join(lines) + "\n").encode("utf-8")

@@ -1,0 +1,152 @@
+"""The film of short bearings and dampers, against quadrature of Reynolds' pressure and closed forms."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, root
+
+import fem
+from fem.forces.laws import law, tables
+from fem.forces.short_film import short_film
+
+BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
+SPEED = 50 * math.pi  # 1500 rpm
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(80)
+
+
+def film(x, y, vx, vy, omega, line_of_centres, C=3.0, c=1.0):
+    out = np.empty((2, 6))
+    short_film(C, c, x, y, vx, vy, omega, line_of_centres, out)
+    return out
+
+
+def act(force, q, v=(0.0, 0.0), omega=SPEED):
+    (code,), (values,) = tables([force])
+    out = np.empty((2, 6))
+    law(code, values, *map(float, q), *map(float, v), omega, out)
+    return out
+
+
+def by_quadrature(x, y, vx, vy, omega, line_of_centres):
+    """The pressure that Reynolds' equation gives, 6 η ∂(h² ...)/..., integrated where the film is.
+
+    ∂/∂s (h³ / (6 η) ∂p/∂s) = Ω ∂h/∂θ + 2 ∂h/∂t, zero at both ends of the length L = 1; here η R = 3.
+    """
+
+    def pressure(theta):
+        h = 1 - x * np.cos(theta) - y * np.sin(theta)
+        squeeze = omega * (x * np.sin(theta) - y * np.cos(theta)) - 2 * (
+            vx * np.cos(theta) + vy * np.sin(theta)
+        )
+        return -squeeze / (2 * h**3)  # ∫ s (1 − s) ds = 1/6 of the length, 6 η / 2 of the equation
+
+    def there(theta):
+        return y * np.cos(theta) - x * np.sin(theta) if line_of_centres else pressure(theta)
+
+    scan = np.linspace(0, 2 * np.pi, 1001)
+    ends = [brentq(there, a, b) for a, b in pairwise(scan) if there(a) * there(b) < 0]
+    assert len(ends) == 2
+    left, right = ends if there(sum(ends) / 2) > 0 else (ends[1], ends[0] + 2 * math.pi)
+    theta = (left + right) / 2 + (right - left) / 2 * NODES
+    P = 3.0 * pressure(theta) * WEIGHTS * (right - left) / 2
+    return -(P * np.cos(theta)).sum(), -(P * np.sin(theta)).sum()
+
+
+def states(n, seed=0):
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        z = rng.uniform(0.02, 0.8) * np.exp(2j * np.pi * rng.random())
+        vx, vy, omega = rng.normal(size=3)
+        yield z.real, z.imag, vx, vy, omega
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_the_force_is_the_pressure_integrated(line_of_centres):
+    for state in states(20):
+        expected = by_quadrature(*state, line_of_centres)
+        np.testing.assert_allclose(
+            film(*state, line_of_centres)[:, 0], expected, rtol=1e-9, atol=1e-9 * np.hypot(*expected)
+        )
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_derivatives(line_of_centres):
+    step = 1e-4
+    for state in states(20, seed=1):
+        found = film(*state, line_of_centres)
+        size = np.abs(found).max()
+        for k in range(5):
+            d = step * np.eye(5)[k]
+            at = [film(*np.add(state, m * d), line_of_centres)[:, 0] for m in (-2, -1, 1, 2)]
+            expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * step)
+            np.testing.assert_allclose(found[:, 1 + k], expected, rtol=1e-6, atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("where", ["pressure", "line of centres"])
+def test_coefficients_of_the_bearing_of_the_issue(where):
+    """D 100, L 30, c 0.1 mm, η 0.1 Pa·s, 525 N, 1500 rpm; both films agree, to their derivatives."""
+    bearing = fem.JournalBearing(1, **BEARING, film=where)
+    rest = root(lambda q: act(bearing, 1e-4 * q)[:, 0] / 525 + (0, -1), (0.1, -0.1), tol=1e-13).x
+    assert math.hypot(*rest) == pytest.approx(0.2663, abs=5e-5)
+    found = act(bearing, 1e-4 * rest)
+    stiffness, damping = [[12.808, 16.394], [-25.060, 8.815]], [[232.90, -81.92], [-81.92, 294.91]]
+    np.testing.assert_allclose(-found[:, 1:3] / 1e6, stiffness, atol=5.1e-4)
+    np.testing.assert_allclose(-found[:, 3:5] / 1e3, damping, atol=5.1e-3)
+
+
+def test_a_journal_at_rest_is_held_by_ocvirk_s_force():
+    """Against the eccentricity 4 ε² / (1 − ε²)², across it π ε / (1 − ε²)^1.5, in η Ω L³ R / (4 c²)."""
+    unit = 0.1 * SPEED * 0.03**3 * 0.05 / (4 * 1e-8)
+    for eps in (0.1, 0.5, 0.9):
+        F = act(fem.JournalBearing(1, **BEARING), (1e-4 * eps, 0.0))[:, 0]
+        expected = unit * np.array([-4 * eps**2 / (1 - eps**2) ** 2, math.pi * eps / (1 - eps**2) ** 1.5])
+        np.testing.assert_allclose(F, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0, 4.0])
+def test_a_damper_on_a_circle(angle):
+    """The π film of a centred circular orbit, at ω: −2 ε² / (1 − ε²)² and −π ε / (2 (1 − ε²)^1.5)."""
+    damper = fem.SqueezeFilm(1, **BEARING, centring_stiffness=2e6)
+    unit, omega, turn = 0.1 * 0.03**3 * 0.05 / 1e-8, 300.0, np.exp(1j * angle)
+    for eps in (0.05, 0.4, 0.85):
+        z = 1e-4 * eps * turn
+        v = 1j * omega * z
+        out = act(damper, (z.real, z.imag), (v.real, v.imag))
+        F = complex(*out[:, 0]) / turn + 2e6 * 1e-4 * eps
+        radial = -unit * omega * 2 * eps**2 / (1 - eps**2) ** 2
+        across = -unit * omega * math.pi * eps / (2 * (1 - eps**2) ** 1.5)
+        np.testing.assert_allclose([F.real, F.imag], [radial, across], rtol=1e-10)
+        np.testing.assert_array_equal(out[:, 5], 0)  # its ring does not turn
+
+
+def test_a_centred_journal_that_does_not_move_carries_nothing():
+    for line_of_centres in (False, True):
+        out = film(0.0, 0.0, 0.0, 0.0, 2.0, line_of_centres)
+        assert np.isfinite(out).all()
+        np.testing.assert_array_equal(out[:, 0], 0)
+
+
+def test_at_the_wall_there_is_no_number():
+    for r in (1 - 1e-17, 1.0, 1.5, np.inf):
+        for line_of_centres in (False, True):
+            assert np.isnan(film(0.0, r, 0.1, 0.0, 2.0, line_of_centres)).all()
+    rng = np.random.default_rng(2)
+    interpreted = getattr(short_film, "py_func", short_film)
+    for gap in (1e-13, 1e-15, 1e-16):
+        angle = rng.uniform(0, 7, 200).tolist()
+        for a in angle:
+            out = np.empty((2, 6))
+            r = 1 - gap
+            interpreted(1.0, 1.0, r * math.cos(a), r * math.sin(a), 0.3, 0.2, 1.0, a > 3, out)
+            assert np.isfinite(out).all() or np.isnan(out).all()
+
+
+@pytest.mark.parametrize("line_of_centres", [False, True])
+def test_interpreted_and_compiled_agree(line_of_centres):
+    interpreted = getattr(short_film, "py_func", short_film)
+    for state in states(5, seed=3):
+        out = np.empty((2, 6))
+        interpreted(3.0, 1.0, *map(float, state), line_of_centres, out)
+        np.testing.assert_allclose(out, film(*state, line_of_centres), rtol=1e-12, atol=1e-14)
