@@ -206,7 +206,7 @@ class _Search:
         rest = _at_rest(self.system, self.high)
         whirl, shape = whirl_at_rest(self.system, rest, self.high)
         start = rest + _FIRST * _length(self.system, rest) * shape.real / np.abs(shape).max()
-        steps, n = 2 * self.count, rest.size
+        steps, n = max(32, self.count), rest.size
         orbit = Orbit(self.high, 2 * np.pi / whirl, start, np.zeros((steps, 4, n)))
         for _ in range(_CYCLES):
             orbit = problem.marched(orbit)
@@ -279,7 +279,8 @@ def _same_cycle(cycle: Orbit, branch: Branch) -> bool:
     """Whether a limit cycle at one end of the range of speeds is that of a branch."""
     last = branch.points[-1].orbit
     sizes = [np.ptp(orbit.ends, axis=0) for orbit in (cycle, last)]
-    return bool(last.speed == cycle.speed and (np.abs(sizes[0] - sizes[1]) <= 1e-3 * sizes[0].max()).all())
+    same = np.abs(sizes[0] - sizes[1]) <= 0.02 * sizes[0].max()
+    return bool(abs(last.speed / cycle.speed - 1) < 1e-6 and same.all())
 
 
 def _really(orbit: Orbit, turns: int) -> bool:
