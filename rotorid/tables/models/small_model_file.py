@@ -95,6 +95,13 @@ _ATTRIBUTES = dict(
 )
 
 
+def is_small_model(path: Path) -> bool:
+    """Whether a file has masses or a stiffness, which no rotor file has."""
+    if path.suffix.lower() != ".toml":
+        return False
+    return not {"masses_kg", "shaft_stiffness_N_per_m"}.isdisjoint(read_toml(path, Problems()) or ())
+
+
 def read_small_model(path: str | Path) -> SmallModel:
     """Read a small model for motion.
 
