@@ -182,8 +182,8 @@ GALLERY = (
         "bearings",
         "rotors",
         "bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm",
-        "The journals rise with the speed, aside with the rotation; a rigid rotor would be stable nearly up to "
-        "9000 rpm, this one, which bends, up to 6407 rpm.",
+        "The journals rise with the speed, aside with the rotation; a rigid rotor would be stable nearly up "
+        "to 9000 rpm, this one, which bends, up to 6407 rpm.",
     ),
     Picture(
         "reduction",

@@ -45,28 +45,25 @@ def test_the_threshold_does_not_depend_on_the_steps(cli):
         cli("bearings", ROTOR, "--speeds", f"1000:9000:{step}rpm", "--json").json["stability"]
         for step in (4000, 250)
     )
-    assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=2e-6)
+    assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
 
 
 def test_the_linear_rotor_is_read_by_the_other_commands(cli, tmp_path):
     linear = tmp_path / "linear.toml"
-    outcome = cli("bearings", ROTOR, "--speeds", "600:9000:200rpm", "--output", linear)
+    outcome = cli("bearings", ROTOR, "--speeds", "600:9000:400rpm", "--output", linear)
     assert outcome.code == 0
     assert outcome.out.count("written: ") == 4
     rotor = read_rotor(linear)
     assert [s.name for s in rotor.supports] == ["left", "right"]
-    made = bearings(ROTOR, BearingsOptions(speeds="600:9000:200rpm"))
+    made = bearings(ROTOR, BearingsOptions(speeds="600:9000:400rpm"))
     assert made.linear == rotor
     assert cli("critical", linear, "-n", 1, "--json").code == 0
-    whirl = cli("campbell", linear, "--speeds", "600:9000:200rpm", "--json").json
-    grows = whirl["unstable_speeds"] if "unstable_speeds" in whirl else []
-    found = fem.campbell(rotor, np.arange(600, 9001, 200) * np.pi / 30, 6)
-    # of the table's own step: coefficients are linear between its speeds
-    assert found.growing[0].speed * 30 / np.pi == pytest.approx(6407.0, abs=1.0)
-    assert isinstance(grows, list)
+    whirl = cli("campbell", linear, "--speeds", "600:9000:400rpm", "--json").json
+    # coefficients are linear between the speeds of the table
+    assert whirl["unstable"][0]["speed_rpm"] == pytest.approx(6407.02, abs=0.2)
     weights = tmp_path / "unbalance.csv"
     weights.write_text("plane,unbalance_g_mm,angle_deg\n12,1000,0\n")
-    response = cli("response", linear, "--unbalance", weights, "--speeds", "800:6000:50rpm", "--json")
+    response = cli("response", linear, "--unbalance", weights, "--speeds", "800:6000:100rpm", "--json")
     assert 1150 < response.json["largest"][0]["speed_rad_s"] * 30 / np.pi < 1400
     table = tmp_path / "bearings.csv"
     cli("bearings", ROTOR, *SPEEDS, "--output", table)
