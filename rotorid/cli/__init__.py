@@ -59,7 +59,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Move on films and seals": {"bearings": bearings.bearings},
+    "Bearings and motion": {"bearings": bearings.bearings},
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,
