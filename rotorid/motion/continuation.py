@@ -149,6 +149,8 @@ def follow(
             ended = "closed"
         elif not problem.turns and (at.orbit.scale < smallest / 2).all():
             ended = "the cycle dies out"
+        elif _at_wall(problem, at.orbit):
+            ended = "stopped: a node is at its wall"
         elif len(points) >= _MOST_POINTS:
             ended = f"stopped: {_MOST_POINTS} points"
         length = min(_LONGEST, length * (1.5 if iterations < 5 else 1.0 if iterations < 8 else 0.6))
@@ -266,6 +268,14 @@ class _Walk:
         if self.kind == "rest" and not (alone and value.real > 0):
             return HOPF, direction
         return (BRANCH if value.real > 0 else DOUBLING) if alone else TORUS, direction
+
+
+def _at_wall(problem: Periodic, orbit: Orbit) -> bool:
+    """Whether a node comes nearer to its wall than a thousandth of the clearance."""
+    places = problem.system.law_tables[2]
+    walls = [force.wall for force in problem.system.forces]
+    q = orbit.deflections[..., places]
+    return bool((np.hypot(q[..., 0], q[..., 1]).max(axis=(0, 1)) > 0.999 * np.array(walls)).any())
 
 
 def _root(test: Callable[[float], float], length: float) -> float:

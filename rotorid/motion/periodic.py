@@ -21,9 +21,11 @@ from rotorid.motion.continuation import (
     follow,
     settled,
 )
+from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.system import MotionSystem
 
 _STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
+_CYCLES = 100  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
 
@@ -96,12 +98,8 @@ def periodic_motion(
         warnings += [] if more else [f"no motion of {subsynchronous} revolutions was found"]
         branches += more
     if limit_cycle:
-        more = [search.cycle(b) for branch in branches for b in branch.bifurcations if b.kind == HOPF]
-        if not more:
-            warnings.append(
-                "no Hopf point in this range, so no limit cycle begins here; let the range begin where the "
-                "rotor is stable at rest and end where it is not"
-            )
+        more = search.cycles(branches)
+        warnings += [] if more else ["no limit cycle was found: no Hopf point, and motion in time comes to none"]
         branches += more
     return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings + _doubts(branches)))
 
@@ -184,6 +182,40 @@ class _Search:
         size = row[:-1] @ direction
         return Start(guess, row[None], np.array([row[:-1] @ orbit.state + amplitude * size]))
 
+    def cycles(self, branches: list[Branch]) -> list[Branch]:
+        """Those that begin at Hopf points, and the one that the motion in time comes to at the highest speed."""
+        hopf = [b for branch in branches for b in branch.bifurcations if b.kind == HOPF]
+        found = [self.cycle(b) for b in hopf]
+        problem = Periodic(self.system, 0)
+        try:
+            guess = self.whirling(problem)
+            row = at_speed(problem, guess, -1.0)
+            phase = np.append(guess.state[self.system.size :], np.zeros(self.system.size + 2))
+            rows = np.array([phase, row.rows[0]])
+            start = Start(guess, rows, rows @ problem.unknowns(guess))
+            cycle = problem.solve(guess, rows, start.values)[0].orbit
+        except np.linalg.LinAlgError:
+            return found
+        rest = np.abs(cycle.ends - cycle.start).max() < 0.1 * _FIRST * _length(self.system, cycle.start)
+        if not rest and not any(_same_cycle(cycle, branch) for branch in found):
+            found.append(self.follow(problem, start, "limit cycle"))
+        return found
+
+    def whirling(self, problem: Periodic) -> Orbit:
+        """What a small disturbance at rest comes to at the highest speed, cut where it is nearest to periodic."""
+        rest = _at_rest(self.system, self.high)
+        whirl, shape = whirl_at_rest(self.system, rest, self.high)
+        start = rest + _FIRST * _length(self.system, rest) * shape.real / np.abs(shape).max()
+        steps, n = max(32, self.count), rest.size
+        orbit = Orbit(self.high, 2 * np.pi / whirl, start, np.zeros((steps, 4, n)))
+        for _ in range(_CYCLES):
+            orbit = problem.marched(orbit)
+        after = problem.marched(orbit).ends
+        ends = np.concatenate([orbit.ends[:-1], after])
+        away = np.abs((ends - ends[0]) / orbit.scale[:n]).max(axis=1)
+        near = steps // 2 + int(away[steps // 2 : 3 * steps // 2 + 1].argmin())
+        return problem.marched(replace(orbit, period=orbit.period * near / steps))
+
     def cycle(self, point: Bifurcation) -> Branch:
         """The limit cycles that begin at a Hopf point."""
         orbit = point.point.orbit
@@ -222,8 +254,12 @@ def _length(system: MotionSystem, q: FloatArray) -> float:
 
 
 def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
-    """State to begin with: where the linear part is in balance, or else at zero."""
-    return np.full(system.size, 1e-4 * _length(system, np.zeros(system.size)))
+    """Where the rotor rests at a speed, (n,); at the centres, where it cannot."""
+    try:
+        q = equilibrium(system, speed).q
+    except ValueError:
+        q = np.zeros(system.size)
+    return q if q.any() else np.full(system.size, 1e-4 * _length(system, q))
 
 
 def _known(orbit: Orbit, branches: list[Branch]) -> bool:
@@ -237,6 +273,14 @@ def _known(orbit: Orbit, branches: list[Branch]) -> bool:
                 if (np.abs(between - orbit.state) < 0.02 * orbit.scale).all():
                     return True
     return False
+
+
+def _same_cycle(cycle: Orbit, branch: Branch) -> bool:
+    """Whether a limit cycle at one end of the range of speeds is that of a branch."""
+    last = branch.points[-1].orbit
+    sizes = [np.ptp(orbit.ends, axis=0) for orbit in (cycle, last)]
+    same = np.abs(sizes[0] - sizes[1]) <= 0.02 * sizes[0].max()
+    return bool(abs(last.speed / cycle.speed - 1) < 1e-6 and same.all())
 
 
 def _really(orbit: Orbit, turns: int) -> bool:
