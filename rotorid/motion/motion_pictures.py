@@ -1,4 +1,4 @@
-"""Pictures of a motion in time: time and spectrum, orbits with phase marks, run-up beside the steady response."""
+"""Pictures of a motion: over time with spectrum, orbits with phase marks, run-up beside steady response."""
 
 from __future__ import annotations
 
