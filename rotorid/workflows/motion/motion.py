@@ -207,7 +207,10 @@ class Motion(Outcome):
         if end.at_rest:
             return f"{where} it comes to rest."
         if not end.steady:
-            return f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: give it more --time."
+            return (
+                f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: amplitude or mean still "
+                f"change by {percent(end.change)} % within its last tenths; give it more --time."
+            )
         whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
         if end.speed:
             way = ", against the rotation" if end.frequency < 0 else ""
@@ -252,15 +255,15 @@ class Motion(Outcome):
     def _notes(self) -> tuple[str, ...]:
         motion, reduced = self.motion, self.reduced
         found = (
-            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; positions "
-            f"differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
+            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; "
+            f"positions differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
         )
         if reduced is None:
             return found
         return (
             *found,
             f"of the rotor {counted(reduced.system.size, 'unknown')} move, {counted(reduced.modes, 'mode')} "
-            f"among them; its natural frequencies without films are high by {percent(reduced.error)} % at most",
+            f"among them; natural frequencies without films are high by {percent(reduced.error)} % at most",
         )
 
     def figure(self, view: View = "motion") -> Figure:
@@ -321,7 +324,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
         reduced=reduced,
         end=steady_end(found) if constant else None,
         error=error,
-        warnings=(*start.warnings, *_warnings(found, error)),
+        warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
         provenance=provenance(source.files, options),
     )
 
@@ -415,14 +418,13 @@ def _ranges(found: MotionRun) -> FloatArray:
     return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
 
 
-def _warnings(found: MotionRun, error: float) -> tuple[str, ...]:
+def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
     if error > _UNSURE:
         said.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of the largest "
             "deflection: where a rotor whips, amplitude and frequency of the whirl count, not its phase"
         )
-    system = found.system
-    if not system.unbalance.any() and not system.bow.any():
+    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
         said.append("nothing excites it: no unbalance, no bow (--unbalance)")
     return tuple(said)
