@@ -23,6 +23,7 @@ from rotorid.cli.commands import (
     identify,
     influence,
     modes,
+    motion,
     reduce,
     response,
     schema,
@@ -59,7 +60,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "influence": influence.influence,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Bearings and motion": {"bearings": bearings.bearings},
+    "Bearings and motion": {"bearings": bearings.bearings, "motion": motion.motion},
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,
