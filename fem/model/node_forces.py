@@ -86,13 +86,21 @@ class _ShortFilm(NodeForce):
 
 @dataclass(frozen=True)
 class JournalBearing(_ShortFilm):
-    """A short plain journal bearing (Ocvirk): length and diameter m, radial clearance m, viscosity Pa·s.
+    """A short plain journal bearing (Ocvirk).
 
     It has no orientation: its film lies where the rotor's weight and motion put it. Lengths up to half the
     diameter are short; a longer one carries less than this says.
 
     Attributes
     ----------
+    node, name
+        As of `NodeForce`.
+    length, diameter
+        Along the shaft, and of the journal, m.
+    clearance
+        Radial, m.
+    viscosity
+        Pa·s.
     film
         Where its film carries, see `Film`.
     """
@@ -110,6 +118,14 @@ class SqueezeFilm(_ShortFilm):
 
     Attributes
     ----------
+    node, name
+        As of `NodeForce`.
+    length, diameter
+        Along the shaft, and of the journal, m.
+    clearance
+        Radial, m.
+    viscosity
+        Pa·s.
     centring_stiffness
         N/m, of the spring that centres it; 0 for none.
     """
@@ -130,6 +146,8 @@ class MuszynskaSeal(NodeForce):
 
     Attributes
     ----------
+    node, name
+        As of `NodeForce`.
     stiffness, damping, fluid_mass
         K₀ N/m, D₀ N·s/m, m kg.
     swirl_ratio
@@ -163,7 +181,15 @@ class MuszynskaSeal(NodeForce):
 
 @dataclass(frozen=True)
 class CubicSpring(NodeForce):
-    """F = −(k + k₃ |z|²) z: stiffness N/m, cubic_stiffness N/m³."""
+    """A spring with a cubic part: F = −(k + k₃ |z|²) z.
+
+    Attributes
+    ----------
+    node, name
+        As of `NodeForce`.
+    stiffness, cubic_stiffness
+        k, N/m, and k₃, N/m³.
+    """
 
     stiffness: float = 0.0
     cubic_stiffness: float = 0.0
@@ -178,6 +204,8 @@ class Stop(NodeForce):
 
     Attributes
     ----------
+    node, name
+        As of `NodeForce`.
     gap
         m.
     stiffness, damping
@@ -202,9 +230,16 @@ class Stop(NodeForce):
 
 @dataclass(frozen=True)
 class InternalDamping(NodeForce):
-    """Damping that turns with the shaft, as of a shrink fit: F = −c (z' − i Ω z), c = damping in N·s/m.
+    """Damping that turns with the shaft, as of a shrink fit: F = −c (z' − i Ω z).
 
     Source: A. L. Kimball, Gen. Electr. Rev. 27 (1924) 244.
+
+    Attributes
+    ----------
+    node, name
+        As of `NodeForce`.
+    damping
+        c, N·s/m.
     """
 
     damping: float = 0.0

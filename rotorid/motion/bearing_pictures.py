@@ -10,7 +10,6 @@ import numpy as np
 from fem.static import GRAVITY
 from rotorid.base.plot_style import (
     DARK,
-    TEXT,
     VERMILION,
     legend_above,
     look,

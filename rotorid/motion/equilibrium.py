@@ -79,7 +79,7 @@ class Equilibrium:
 
     @property
     def sommerfeld(self) -> FloatArray:
-        """Of each bearing, S = η N L D / W (R / c)² with N in revolutions per second, shape (b,); else NaN."""
+        """Of each journal bearing, S = η N L D / W (R / c)² with N in 1/s, shape (b,); NaN of others."""
         revolutions = self.speed / (2 * np.pi)
         return np.array(
             [
@@ -149,8 +149,8 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
 def each_force(system: MotionSystem, q: FloatArray, speed: float) -> FloatArray:
     """Each force at rest and its derivatives as `fem.forces.laws.law` writes them, shape (f, 2, 6)."""
     out = np.zeros((len(system.forces), 2, 6))
-    for k, (code, values, place) in enumerate(zip(*system.law_tables, strict=True)):
-        law(code, values, *q[place], 0.0, 0.0, speed, out[k])
+    for k, (code, values, (x, y)) in enumerate(zip(*system.law_tables, strict=True)):
+        law(code, values, q[x], q[y], 0.0, 0.0, speed, out[k])
     return out
 
 
@@ -176,8 +176,8 @@ def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray
             e = np.abs(_places(system, q)) / _walls(system)
             k = int(np.argmax(e))
             raise ValueError(
-                f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight the "
-                f"shaft uses {100 * e[k]:.4g} % of its clearance at {named(system.forces[k])}"
+                f"at {speed_text(speed)} no equilibrium is found: under {100 * share:.3g} % of the weight "
+                f"the shaft uses {100 * e[k]:.4g} % of its clearance at {named(system.forces[k])}"
             )
         else:
             step /= 4
@@ -191,7 +191,7 @@ def _newton(
     r, J = _left_over(system, K, q, speed, share)
     for _ in range(_ROUNDS):
         try:
-            d = np.linalg.solve(J, r)
+            d = np.asarray(np.linalg.solve(J, r), dtype=float)
         except np.linalg.LinAlgError:
             return None
         z, dz, walls = _places(system, q), _places(system, d), _walls(system)

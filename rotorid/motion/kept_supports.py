@@ -26,6 +26,8 @@ from rotorid.reduction import small_rotor
 
 _RIGID = 1e7  # stiffness of a rigid support by that of a shaft on two of them
 
+_FIRST = 1e7  # weight of mass and moment by that of the shares
+
 
 def held_rigidly(rotor: fem.Rotor) -> fem.Rotor:
     """The rotor on rigid supports at its bearings, journal bearings and squeeze films, without all else.
@@ -129,13 +131,25 @@ def _moment(rotor: fem.Rotor) -> float:
 
 
 def _shared(shares: FloatArray, at: FloatArray, mass: float, moment: float) -> FloatArray:
-    """Masses of this sum and this first moment about 0, the nearest to `shares`; none is negative."""
+    """Masses of this sum and this first moment about 0, the nearest to `shares`, each a tenth of it at least.
+
+    Where that cannot be, sum and moment are the nearest.
+    """
+    from scipy.optimize import lsq_linear
+
     scale = np.sqrt(np.maximum(shares, 1e-3 * shares.max()))
-    length = max(float(np.ptp(at)), 1.0e-3 * float(np.abs(at).max()))
-    rows = np.stack((np.ones_like(at), (at - at.mean()) / length))
-    lacking = np.array([mass, (moment - mass * at.mean()) / length]) - rows @ shares
-    change = scale * np.linalg.lstsq(rows * scale, lacking, rcond=None)[0]
-    return np.asarray(np.maximum(shares + change, 0.0))
+    length = float(np.ptp(at))
+    rows = _FIRST * np.stack((np.ones_like(at), (at - at.mean()) / length)) * scale
+    wanted = _FIRST * np.array([mass, (moment - mass * at.mean()) / length])
+    least = np.maximum(0.1 * shares, 0.01 * shares.max()) / scale
+    found = lsq_linear(
+        np.vstack((rows, np.eye(len(at)))),
+        np.concatenate((wanted, shares / scale)),
+        bounds=(least, np.inf),
+        method="bvls",
+        tol=1e-14,
+    )
+    return np.asarray(scale * found.x)
 
 
 def _of_masses(rotor: fem.Rotor, nodes: Sequence[int], masses: FloatArray) -> list[str]:

@@ -54,10 +54,10 @@ def linear_rotor(rotor: fem.Rotor, found: Sequence[Equilibrium]) -> fem.Rotor:
         K, C = (each[:, k] for each in coefficients(found))
         name = force.name or kind_of(force).replace("_", " ")
         outwards = min(np.einsum("sii->si", K).min(), np.einsum("sii->si", C).min()) < 0
-        tables = [(each if speeds else each[0]).tolist() for each in (K, C)]
+        stiffness, damping = ((each if speeds else each[0]).tolist() for each in (K, C))
         kind = "seal" if outwards else "bearing"
         if not isinstance(force, Stop):
-            supports.append(fem.Support(force.node, *tables, name, speeds=speeds, kind=kind))
+            supports.append(fem.Support(force.node, stiffness, damping, name, speeds=speeds, kind=kind))
         if force.mass:
             fluids.append(fem.Disc(force.node, force.mass, name=f"fluid of {name}"))
     return replace(rotor.linear, supports=(*rotor.supports, *supports), discs=(*rotor.discs, *fluids))

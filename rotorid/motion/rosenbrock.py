@@ -222,21 +222,16 @@ def attempt(
 
 @compiled
 def error_of(
-    error: FloatArray,
-    new: FloatArray,
-    largest: FloatArray,
-    groups: IndexArray,
-    floor: FloatArray,
-    sizes: FloatArray,
+    error: FloatArray, new: FloatArray, largest: FloatArray, groups: IndexArray, sizes: FloatArray
 ) -> float:
-    """Largest error by the size of its unknown, `sizes` (n,), written: what `advance` says of `tolerance`."""
-    top = np.zeros(2)
+    """Largest error by the size of its unknown; `sizes`, written: see `tolerance` of `advance`."""
+    top = np.full(2, 1e-300)
     for i in range(len(error)):
         sizes[i] = max(largest[i], abs(new[i]))
         top[groups[i]] = max(top[groups[i]], sizes[i])
     worst = 0.0
     for i in range(len(error)):
-        size = max(sizes[i], 0.01 * top[groups[i]], floor[i], 1e-300)
+        size = top[1] if groups[i] else max(sizes[i], 0.01 * top[0])
         worst = max(worst, abs(error[i]) / size)
     return worst
 
@@ -259,7 +254,6 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     steps: tuple[float, float],
     tolerance: float,
     groups: IndexArray,
-    frequency: float,
     q: FloatArray,
     v: FloatArray,
     largest: FloatArray,
@@ -282,16 +276,14 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     steps
         First and least step, s.
     tolerance
-        Of the error of one step, by the largest size that the unknown or the velocity has had, or by a
-        hundredth of the largest of its group.
+        Of the error of q in one step: of a deflection by the largest size that it has had, or by a hundredth
+        of the largest deflection; of other unknowns by the largest of them.
     groups
         0 for deflections, 1 for other unknowns, (n,).
-    frequency
-        rad/s; a velocity counts at least this times what its unknown counts.
     q, v
         Where it begins and then where it ends, (n,).
     largest
-        Largest sizes of q and v so far, (2, n); changed.
+        Largest sizes of q so far, (n,); changed.
     times, out
         When the motion is wanted, s, ascending, above the beginning, (k,); and q then, (k, n), written.
 
@@ -307,7 +299,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     state[0], state[1] = q, v
     stages = np.empty((2, 8, n))
     scratch = (np.empty((n, n)), np.empty(n, np.intp), np.empty(n), np.empty(n))
-    sizes, none = np.empty((2, n)), np.zeros(n)
+    sizes = np.empty(n)
     done, vain, written = 0, 0, 0
     evaluate(equations, turning, t, state)
     while t < end:
@@ -319,9 +311,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
         step = end - t if t + 1.0001 * h >= end else h
         error = math.inf
         if attempt(equations, turning, t, step, state, now, stages, scratch):
-            error = error_of(stages[0][7], now[0], largest[0], groups, none, sizes[0])
-            slow = error_of(stages[1][7], now[1], largest[1], groups, frequency * sizes[0], sizes[1])
-            error = max(error, slow) / tolerance
+            error = error_of(stages[0, 7], now[0], largest, groups, sizes) / tolerance
         if not error <= 1.0:
             vain += 1
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
@@ -331,7 +321,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
             written += 1
         state[:] = now
         q[:], v[:] = now[0], now[1]
-        largest[:, :] = sizes
+        largest[:] = sizes
         t = end if step == end - t else t + step
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)

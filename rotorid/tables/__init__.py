@@ -10,6 +10,7 @@ from rotorid.tables.data.records import read_record
 from rotorid.tables.job.job_file import Job, job_from_files, read_job
 from rotorid.tables.models.harmonic_file import HarmonicFile, read_harmonic_model
 from rotorid.tables.models.ode_file import read_ode_model
+from rotorid.tables.models.small_model_file import read_small_model
 from rotorid.tables.reader.problems import InputError, Problem, TableWarning
 from rotorid.tables.reader.table_writing import write_table
 from rotorid.tables.rotor.bow_table import read_bow
@@ -41,6 +42,7 @@ __all__ = [
     "read_ode_model",
     "read_record",
     "read_rotor",
+    "read_small_model",
     "read_trials",
     "read_unbalance",
     "rotor_files",

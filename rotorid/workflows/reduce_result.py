@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rotorid.base.answer import Answer, together
 from rotorid.base.text import counted, listing
-from rotorid.workflows.option_values import one_of
+from rotorid.workflows.option_values import one_of, option_name
 from rotorid.workflows.result_provenance import Parts
 
 if TYPE_CHECKING:
@@ -214,15 +214,18 @@ class ReducedRotor(Parts):
             np.savez(stream, **arrays)  # type: ignore[arg-type]
         return stream.getvalue()
 
-    def motion_model_bytes(self, name: str = "") -> bytes:
-        """The model for motion as a file; `name` of the rotor for its comment."""
+    def motion_model_bytes(self) -> bytes:
+        """The model for motion as a file, with the command that makes it as a comment."""
         from rotorid.tables.models.small_model_file import small_model_bytes
 
         if self.motion_model is None:
             raise ValueError("a model for motion keeps its supports: give --keep-supports, too")
-        nodes = ", ".join(map(str, self.result.nodes))
-        said = f"{name} reduced to masses at nodes {nodes} (formula 50), its supports kept; in SI"
-        return small_model_bytes(self.motion_model, [said])
+        given = [entry["file"] for entry in self.provenance["inputs"][:1]]
+        for name, value in self.provenance["options"].items():
+            text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+            given.append(option_name(name) if value is True else f"{option_name(name)} {text}")
+        command = f"rotorid reduce {' '.join(given)} --motion-model FILE.toml"
+        return small_model_bytes(self.motion_model, [command, "Masses by formula (50); SI."])
 
     def _motion(self) -> fem.Motion:
         """One plane where nothing couples them; without massless unknowns where no damping acts on them."""

@@ -88,6 +88,7 @@ def asked_for(monkeypatch, read, *files):
         (rotorid.read_rotor, "compressor", "rotor.toml", 45),
         (rotorid.read_harmonic_model, "identify", "*/model.toml", 6),
         (rotorid.read_ode_model, "fit", "*/model.toml", 15),
+        (rotorid.tables.read_small_model, "motion", "small.toml", 15),
     ],
 )
 def test_every_key_that_a_reader_asks_for_is_described(read, folder, pattern, least, monkeypatch):

@@ -115,10 +115,6 @@ def reduce(
                 STATE_SPACES,
                 lambda found: found.state_space_bytes((state_space or Path()).suffix.lower()),
             ),
-            (
-                motion_model,
-                (".toml",),
-                lambda found: found.motion_model_bytes("" if rotor is None else rotor.name),
-            ),
+            (motion_model, (".toml",), lambda found: found.motion_model_bytes()),
         ),
     )

@@ -1,4 +1,4 @@
-"""`rotorid schema`: the keys of a job or rotor file as a JSON schema, for editors."""
+"""`rotorid schema`: the keys of a job, a rotor file or a small model as a JSON schema, for editors."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from rotorid.cli.output import Destination, json_text
 
 @command(to=("json",))
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job or rotor.")],
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor or small (model).")],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a job or rotor file: an editor then completes and checks its keys.
+    """JSON schema of a job, a rotor file or a small model: an editor then completes and checks its keys.
 
     Example: rotorid schema job
     """

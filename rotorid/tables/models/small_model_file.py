@@ -120,8 +120,9 @@ def read_small_model(path: str | Path) -> SmallModel:
     said = take(top, SMALL_MODEL)
     found = said["nodes"]
     nodes = () if found is None else tuple(int(node) for node in found)
-    if found is not None and (found % 1).any():
-        top.complain("nodes", "whole numbers", value=False)
+    if found is not None and ((found % 1).any() or (found < 1).any() or len(set(nodes)) != len(nodes)):
+        top.complain("nodes", "different whole numbers from 1 up", value=False)
+        found = None
 
     def node(section: Section) -> int | None:
         value = section.take("node")
@@ -134,6 +135,8 @@ def read_small_model(path: str | Path) -> SmallModel:
         for section in said[key]:
             _, size, angle = take(section, keys).values()
             where = node(section)
+            if where in total and key == "bow":
+                section.complain("node", "a node that no other [[bow]] has")
             if where is not None and size is not None and angle is not None:
                 value = complex(polar(size.si, angle.si))
                 total[where] = total.get(where, 0j) + value

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, rows, text
-from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.rpm import RPM
 from rotorid.base.text import capital, counted, figures
 from rotorid.workflows.input_checks import rotor_source
 from rotorid.workflows.option_values import Speeds, degrees, rising_speeds
@@ -129,7 +129,8 @@ class BearingEquilibria(Outcome):
         """Loci, stability map, coefficients over speed."""
         from rotorid.motion.bearing_pictures import bearings_figure
 
-        return bearings_figure(self.found, self.labels, self.stability and self.stability.threshold)
+        threshold = None if self.stability is None else self.stability.threshold
+        return bearings_figure(self.found, self.labels, threshold)
 
     def files(self, path: Path) -> Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.
@@ -205,7 +206,7 @@ def _warnings(rotor: Rotor) -> tuple[str, ...]:
         if isinstance(force, SqueezeFilm)
     ]
     said += [
-        f"{named(force)}: its fluid is a disc of {force.mass:.4g} kg in the linear rotor, without its weight here"
+        f"{named(force)}: its fluid is a disc of {force.mass:.4g} kg in the linear rotor, which it loads"
         for force in rotor.forces
         if force.mass
     ]

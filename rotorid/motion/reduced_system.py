@@ -1,0 +1,109 @@
+"""A rotor's equations of motion with fewer unknowns (Craig and Bampton): some nodes, and modes between them.
+
+The deflections of the kept nodes stay as they are, the others follow as they do at rest, and with the kept
+nodes held still the others have natural modes, of which the lowest stay. Static deflections of the kept nodes
+are exact. Source: R. R. Craig, M. C. C. Bampton, AIAA Journal 6 (1968) 1313.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rotorid.base.arrays import FloatArray
+from rotorid.motion.system import MotionSystem
+
+BEYOND = 4.0
+"""Modes between the kept nodes stay up to this many times the highest speed."""
+_RIGID = 1e-6
+_COMPARED = 2.0
+"""Frequencies are compared up to this many times the highest speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedSystem:
+    """The system with fewer unknowns, how many modes it has in both planes, and what that costs.
+
+    Attributes
+    ----------
+    system
+        Its unknowns are `x7`, `y7` … of the kept nodes, feet of pedestals, and `mode_1` …
+    modes
+        How many modes stay.
+    first_left_out
+        rad/s, of the lowest mode that does not stay; infinite where all do.
+    error
+        Largest relative error of the natural frequencies without damping, those below twice the highest speed
+        or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
+    """
+
+    system: MotionSystem
+    modes: int
+    first_left_out: float
+    error: float
+
+
+def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None = None) -> ReducedSystem:
+    """Keep some nodes, those of forces and so many modes between them.
+
+    Parameters
+    ----------
+    system
+        All unknowns.
+    nodes
+        To be kept, besides those of forces.
+    modes
+        In both planes together; None: those up to four times the highest speed, two at least.
+
+    Raises
+    ------
+    ValueError
+        For nodes that do not move, and more modes than there are.
+    """
+    from scipy.linalg import eigh
+
+    kept_nodes = sorted({*nodes, *(force.node for force in system.forces)})
+    kept = [i for node in kept_nodes for i in system.index(node)]
+    kept += [i for i, name in enumerate(system.coordinates) if name.startswith("foot")]
+    others = np.setdiff1d(np.arange(system.size), kept)
+    if modes is not None and not 0 <= modes <= others.size:
+        raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
+    K, M = (system.K[0] + system.K[0].T) / 2, system.M
+    inner = np.ix_(others, others)
+    size, shape = eigh(K[inner], M[inner])
+    frequency = np.sqrt(np.maximum(size, 0.0))
+    if modes is None:
+        modes = max(2, int((frequency <= BEYOND * system.knots[-1]).sum()))
+        modes = min(modes + modes % 2, others.size)  # pairs of both planes
+    T = np.zeros((system.size, len(kept) + modes))
+    T[kept, np.arange(len(kept))] = 1.0
+    T[others, : len(kept)] = -np.linalg.solve(K[inner], K[np.ix_(others, kept)])
+    T[others, len(kept) :] = shape[:, :modes]
+    found = replace(
+        system,
+        coordinates=(*(system.coordinates[i] for i in kept), *(f"mode_{k + 1}" for k in range(modes))),
+        M=T.T @ M @ T,
+        C=T.T @ system.C @ T,
+        K=T.T @ system.K @ T,
+        weight=T.T @ system.weight,
+        unbalance=T.T @ system.unbalance,
+        bow=T.T @ system.bow,
+    )
+    left_out = float(frequency[modes]) if modes < others.size else np.inf
+    return ReducedSystem(found, modes, left_out, _error(K, M, T, system.knots[-1]))
+
+
+def _error(K: FloatArray, M: FloatArray, T: FloatArray, highest: float) -> float:
+    """Of natural frequencies, see `ReducedSystem.error`."""
+    from scipy.linalg import eigh
+
+    def frequencies(K: FloatArray, M: FloatArray) -> FloatArray:
+        return np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0))
+
+    full, few = frequencies(K, M), frequencies(T.T @ K @ T, T.T @ M @ T)
+    bends = int((full <= _RIGID * full[-1]).sum())
+    end = min(max(int((full <= _COMPARED * highest).sum()), bends + 2), few.size)
+    compared = slice(bends, end)
+    return float(np.max(few[compared] / full[compared] - 1.0, initial=0.0))

@@ -1,0 +1,258 @@
+"""Motion in time at a constant speed or through a range of speeds, sampled evenly."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fem.model.node_forces import JournalBearing, NodeForce
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.base.checks import number
+from rotorid.base.rpm import rpm_text
+from rotorid.motion.equilibrium import named
+from rotorid.motion.rosenbrock import DONE, TOUCHES, Equations, Turning, advance, evaluate
+from rotorid.motion.system import MotionSystem
+
+TOLERANCE = 1e-6
+A_TURN = 64
+"""Samples a turn at the highest speed, where no rate is given."""
+_BLOCK = 10_000
+"""Samples that are computed at once: the memory that all unknowns take."""
+_MOST = 50_000_000
+"""Positions that are kept, x and y of one node counted as one: 800 MB."""
+_MASSLESS = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRun:
+    """A rotor's motion in time.
+
+    Attributes
+    ----------
+    system
+        What moved.
+    nodes
+        Where it is known, m of them.
+    time
+        Of the samples, evenly spaced, s, shape (k,).
+    speeds
+        First and last one, rad/s; between them the speed changes evenly.
+    z
+        x + iy at these nodes, m, shape (k, m).
+    q, v
+        All unknowns and their velocities at the last sample, shape (n,).
+    angle
+        Of rotation at time 0, rad.
+    steps, vain
+        Of the method, and how many more were tried and were too long.
+    tolerance
+        Error of one step, see `rotorid.motion.rosenbrock.advance`.
+    stopped
+        Why it ends before its time; empty where it does not.
+    """
+
+    system: MotionSystem
+    nodes: tuple[int, ...]
+    time: FloatArray
+    speeds: tuple[float, float]
+    z: ComplexArray
+    q: FloatArray
+    v: FloatArray
+    angle: float
+    steps: int
+    vain: int
+    tolerance: float
+    stopped: str
+
+    @cached_property
+    def speed(self) -> FloatArray:
+        """rad/s at the samples, shape (k,)."""
+        return np.linspace(*self.speeds, self.time.size)
+
+    @cached_property
+    def turned(self) -> FloatArray:
+        """Angle of rotation at the samples, rad, shape (k,)."""
+        return np.asarray(self.angle + (self.speeds[0] + self.speed) / 2 * self.time)
+
+    @property
+    def bearings(self) -> tuple[tuple[NodeForce, int], ...]:
+        """Forces with a wall, each with the column of its node in `z`; those whose node is known here."""
+        return tuple(
+            (force, self.nodes.index(force.node))
+            for force in self.system.forces
+            if np.isfinite(force.wall) and force.node in self.nodes
+        )
+
+
+def run(
+    system: MotionSystem,
+    speeds: tuple[float, float],
+    time: float,
+    start: tuple[FloatArray, FloatArray],
+    *,
+    nodes: Sequence[int] | None = None,
+    rate: float | None = None,
+    tolerance: float = TOLERANCE,
+    angle: float = 0.0,
+) -> MotionRun:
+    """Follow a rotor's motion.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speeds
+        At the beginning and at the end, rad/s; the speed changes evenly.
+    time
+        s.
+    start
+        All unknowns and their velocities at the beginning, (n,) each; velocities of what has no mass follow
+        from the others.
+    nodes
+        Where the motion is kept; None: at all nodes.
+    rate
+        Samples a second; None: 64 a turn at the highest speed, and 10,000 in all where nothing turns.
+    tolerance
+        Of the error of one step, by the largest size so far of what is in error.
+    angle
+        Of rotation at the beginning, rad.
+
+    Raises
+    ------
+    ValueError
+        For numbers that are impossible, speeds outside the range of the equations, journal bearings at speed
+        0, an unknown with neither mass nor damping, more samples than memory holds.
+    """
+    first, last = (number(speed, "speed") for speed in speeds)
+    if not number(time, "time") > 0:
+        raise ValueError("time must be above 0 s")
+    if not 1e-13 <= tolerance <= 1e-2:
+        raise ValueError(f"tolerance must be from 1e-13 to 1e-2, not {tolerance:g}")
+    _check_journals(system, first, last)
+    reference = max(first, last) or 2 * np.pi / time
+    rate = A_TURN * reference / (2 * np.pi) if rate is None and max(first, last) else rate or 10_000 / time
+    names = system.nodes if nodes is None else tuple(nodes)
+    places = np.array([system.index(node) for node in names], dtype=np.intp).reshape(-1, 2)
+    count = int(np.ceil(number(rate, "rate") * time * (1 - 1e-12))) or 1
+    if count * max(len(names), 1) > _MOST:
+        raise ValueError(
+            f"{count:,} samples at {len(names)} nodes are more than memory should hold: give fewer nodes, a "
+            f"shorter time or a lower rate than {rate:.6g} samples a second"
+        )
+    times = np.linspace(0.0, time, count + 1)
+    z = np.empty((count + 1, len(names)), dtype=complex)
+    q, v = (np.array(part, dtype=float) for part in start)
+    v = consistent(system, q, v, (angle, first, (last - first) / time))
+    z[0] = q[places[:, 0]] + 1j * q[places[:, 1]]
+    largest = np.abs(q)
+    groups = np.array([name[0] not in "xy" for name in system.coordinates], dtype=np.intp)
+    walls = np.array([force.wall for force in system.forces])
+    h, least = 1e-3 * min(time, 2 * np.pi / reference), 1e-10 * min(time, 2 * np.pi / reference)
+    done, steps, vain, stopped = 1, 0, 0, ""
+    for (begin, end), equations, turning in _pieces(system, (first, last), time, angle, count):
+        at = times[done:][times[done:] <= end]
+        out = np.empty((at.size, system.size))
+        how, force, now, h, good, bad, written = advance(
+            *(equations, turning, walls, (0.0, end - begin), (max(h, least), least), tolerance, groups),
+            *(q, v, largest, np.minimum(at, end) - begin, out),
+        )
+        z[done : done + written] = out[:written, places[:, 0]] + 1j * out[:written, places[:, 1]]
+        done, steps, vain = done + written, steps + good, vain + bad
+        if how != DONE:
+            stopped = _why(system, how, force, begin + now, first + (last - first) * (begin + now) / time)
+            last = first + (last - first) * times[done - 1] / time
+            break
+    return MotionRun(
+        system=system,
+        nodes=names,
+        time=times[:done],
+        speeds=(first, last),
+        z=z[:done],
+        q=q,
+        v=v,
+        angle=angle,
+        steps=steps,
+        vain=vain,
+        tolerance=tolerance,
+        stopped=stopped,
+    )
+
+
+def consistent(system: MotionSystem, q: FloatArray, v: FloatArray, turning: Turning) -> FloatArray:
+    """Velocities with which the forces on what has no mass are in equilibrium, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        For motion without mass that nothing damps.
+    """
+    unit = np.sqrt(np.where(system.M.diagonal() > 0, system.M.diagonal(), 1.0))
+    size, shape = np.linalg.eigh(system.M / np.outer(unit, unit))
+    free = shape[:, size <= _MASSLESS] / unit[:, None]
+    if not free.size:
+        return v
+    n, equations = system.size, _equations(system, turning[1], turning[1], 0.0)
+    state = np.zeros((4 + 2 * n, n))
+    for _ in range(20):
+        state[0], state[1] = q, v
+        evaluate(equations, turning, 0.0, state)
+        J = free.T @ state[4 + n :] @ free
+        if not np.isfinite(state).all() or np.linalg.cond(J) > 1 / _MASSLESS:
+            where = system.coordinates[int(np.abs(free).max(axis=1).argmax())]
+            raise ValueError(
+                f"{where} has neither mass nor damping, so that its velocity is not determined: give it a "
+                "mass, or a bearing with damping"
+            )
+        change = free @ np.linalg.solve(J, free.T @ state[2])
+        v = v - change
+        if np.abs(change).max() <= 1e-13 * np.abs(v).max():
+            break
+    return v
+
+
+def _check_journals(system: MotionSystem, first: float, last: float) -> None:
+    for force in system.forces:
+        if isinstance(force, JournalBearing) and not min(first, last) > 0:
+            raise ValueError(
+                f"speed 0: the film of {named(force)} carries nothing at rest; begin and end above it"
+            )
+
+
+def _pieces(
+    system: MotionSystem, speeds: tuple[float, float], time: float, angle: float, count: int
+) -> Iterator[tuple[tuple[float, float], Equations, Turning]]:
+    """Times within which C and K are linear in speed, with the equations and φ, Ω, α at their beginning."""
+    first, last = speeds
+    alpha = (last - first) / time
+    inner = system.knots[(system.knots > min(speeds)) & (system.knots < max(speeds))]
+    blocks = np.linspace(0.0, time, count // _BLOCK + 2)
+    ends = np.unique(np.concatenate([blocks, (inner - first) / alpha if alpha else []]))
+    for begin, end in itertools.pairwise(ends):
+        speed = first + alpha * begin
+        turned = (angle + (first + speed) / 2 * begin) % (2 * np.pi)
+        yield (begin, end), _equations(system, speed, first + alpha * end, alpha), (turned, speed, alpha)
+
+
+def _equations(system: MotionSystem, first: float, last: float, alpha: float) -> Equations:
+    """As `advance` takes them, for speeds between two neighbouring knots."""
+    low, high = system.knots[0], system.knots[-1]
+    linear = [system.linear(min(max(speed, low), high) if alpha else speed) for speed in (first, last)]
+    over = last - first if alpha else 1.0
+    (C, K), (C_end, K_end) = linear
+    return (
+        *system.law_tables,
+        *(system.M, C, K, (C_end - C) / over, (K_end - K) / over),
+        *(system.weight, system.unbalance, system.bow),
+    )
+
+
+def _why(system: MotionSystem, how: int, force: int, time: float, speed: float) -> str:
+    when = f"after {time:.6g} s, at {rpm_text(speed)}"
+    if how == TOUCHES:
+        where = named(system.forces[force])
+        return f"the shaft touches the wall of {where} {when}: under a thousandth of its clearance is left"
+    return f"no step is short enough {when}: the forces change faster than any motion could follow"

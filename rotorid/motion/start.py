@@ -1,0 +1,103 @@
+"""How a motion begins: at rest in equilibrium, in steady motion, or displaced from there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.motion.equilibrium import equilibrium
+from rotorid.motion.run import run
+from rotorid.motion.system import MotionSystem
+
+_BLOCK = 32  # turns
+_BLOCKS = 64
+_SETTLED = 1e-6
+_NEAR = 0.9
+
+
+def at_rest(system: MotionSystem, speed: float) -> FloatArray:
+    """Where the rotor rests while it turns, shape (n,); errors as of `equilibrium`."""
+    here = np.zeros(system.size)
+    if not system.weight.any() and not system.acting(here, here, speed)[0].any():
+        return here  # also of a rotor that nothing holds
+    return np.array(equilibrium(system, speed).q)
+
+
+def steady_linear(
+    system: MotionSystem, speeds: Sequence[float]
+) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speeds
+        rad/s.
+
+    Returns
+    -------
+    The speeds at which there is an equilibrium, shape (s,), the equilibria, (s, n), and the response, (s, n):
+    the motion is Re(response e^{iφ}) about the equilibrium.
+    """
+    found = []
+    for speed in speeds:
+        try:
+            rest = at_rest(system, speed)
+        except ValueError:
+            continue
+        C, K = system.linear(speed)
+        _, F_q, F_v, _ = system.acting(rest, np.zeros(system.size), speed)
+        dynamic = K - F_q + 1j * speed * (C - F_v) - speed**2 * system.M
+        found.append((speed, rest, np.linalg.solve(dynamic, speed**2 * system.unbalance + system.bow)))
+    if not found:
+        return np.empty(0), np.empty((0, system.size)), np.empty((0, system.size), dtype=complex)
+    at, rests, responses = zip(*found, strict=True)
+    return np.array(at), np.array(rests), np.array(responses)
+
+
+def in_steady_motion(
+    system: MotionSystem, speed: float, tolerance: float
+) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
+    """Unknowns, velocities, (n,) each, and warnings: steady motion at a speed, where the angle is 0.
+
+    Where forces are not linear it begins near the steady motion of the linear rotor and settles for so many
+    turns as it takes, 2048 at most.
+
+    Raises
+    ------
+    ValueError
+        As `equilibrium` and `run`, and if it touches a wall.
+    """
+    rest = at_rest(system, speed)
+    *_, response = steady_linear(system, [speed])
+    q, v = rest + response[0].real, (1j * speed * response[0]).real
+    if not system.forces or not speed:
+        return q, v, ()
+    walls = np.array([force.wall for force in system.forces])
+    x, y = system.law_tables[2].T
+    if (np.hypot(q[x], q[y]) > _NEAR * walls).any():
+        q, v = rest, np.zeros(system.size)
+    before: ComplexArray | None = None
+    for _ in range(_BLOCKS):
+        found = run(system, (speed, speed), _BLOCK * 2 * np.pi / speed, (q, v), tolerance=tolerance)
+        if found.stopped:
+            raise ValueError(f"while it settles at the first speed {found.stopped}")
+        q, v, turn = found.q, found.v, found.z[-(found.time.size // _BLOCK) :]
+        if before is not None and np.abs(turn - before).max() <= _SETTLED * np.abs(turn).max():
+            return q, v, ()
+        before = turn
+    turns = _BLOCK * _BLOCKS
+    return q, v, (f"at the first speed the motion has not settled to a synchronous one in {turns} turns",)
+
+
+def displaced(system: MotionSystem, q: FloatArray, by: Mapping[int, complex]) -> FloatArray:
+    """The unknowns with these nodes moved by x + iy, m; errors for nodes that do not move."""
+    moved = q.copy()
+    for node, shift in by.items():
+        x, y = system.index(node)
+        moved[x] += shift.real
+        moved[y] += shift.imag
+    return moved

@@ -1,0 +1,223 @@
+"""Forces that are not linear in rotor files: read in field units, refused in words, written back."""
+
+import json
+
+import pytest
+from cases import each_of
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tables_data import complaints, write_csv
+
+import fem
+from rotorid.tables import InputError, TableWarning, read_rotor, write_rotor
+from rotorid.tables.rotor.node_forces import KEYS_OF_FORCE
+from rotorid.tables.schema import schema
+
+SHAFT = [["length_m", "diameter_m", "mass_kg"], [0.3, 0.1, 0], [0.4, 0.12, 20], [0.3, 0.1, 0]]
+BEARING = ["length_mm = 30", "diameter_mm = 100", "clearance_um = 100", "viscosity_mPa_s = 100"]
+CONTACT = ["gap_um = 9", "stiffness_N_per_m = 1e6"]
+SEAL = ["stiffness_N_per_um = 1", "damping_N_s_per_m = 50", "swirl_ratio = 0.4", "clearance_mm = 0.3"]
+
+
+@pytest.fixture
+def file(tmp_path):
+    write_csv(tmp_path / "shaft.csv", SHAFT)
+
+    def read(text):
+        station = '[[station]]\nname = "DE"\nnode = 1\n'
+        (tmp_path / "rotor.toml").write_text(f'shaft = "shaft.csv"\n{station}{text}', encoding="utf-8")
+        return read_rotor(tmp_path / "rotor.toml")
+
+    read.folder = tmp_path
+    return read
+
+
+def table(kind, *lines, node="2"):
+    return "\n".join([f"[[{kind}]]", f"node = {node}", *lines, ""])
+
+
+def test_every_kind_in_field_units(file):
+    rotor = file(
+        table("stop", "gap_um = 200", "stiffness_N_per_um = 10", "friction = 0.1", "diameter_mm = 100")
+        + table("journal_bearing", *BEARING, node='"DE"')
+        + table(
+            "journal_bearing",
+            'name = "NDE"',
+            "length_m = 0.03",
+            "diameter_in = 4",
+            "clearance_mil = 4",
+            "viscosity_cP = 28",
+            'film = "line of centres"',
+            node="4",
+        )
+        + table("squeeze_film", *BEARING, "centring_stiffness_N_per_mm = 500")
+        + table("annular_seal", *SEAL, "fluid_mass_g = 300", "stiffness_exponent = 0")
+        + table("cubic_spring", "cubic_stiffness_N_per_mm3 = 2", "stiffness_N_per_m = 5")
+        + table("internal_damping", "damping_N_s_per_mm = 0.2")
+    )
+    film = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.1}
+    assert rotor.forces == (
+        fem.JournalBearing(1, **film),
+        fem.JournalBearing(4, "NDE", 0.03, 4 * 254 / 1e4, 4 * 254 / 1e7, 28 / 1e3, "line of centres"),
+        fem.SqueezeFilm(2, **film, centring_stiffness=5e5),
+        fem.MuszynskaSeal(2, "", 1e6, 50.0, 0.3, 0.4, 3e-4, 0.0, 0.5),
+        fem.CubicSpring(2, "", 5.0, 2e9),
+        fem.Stop(2, "", 2e-4, 1e7, 0.0, 0.1, 0.1, 0.01),
+        fem.InternalDamping(2, "", 200.0),
+    )
+    assert rotor.linear.forces == ()
+    assert "7 forces" in repr(rotor)
+
+
+BAD = [
+    ("journal_bearing", BEARING[:3], "viscosity_mPa_s", "the viscosity of the fluid in the film"),
+    ("journal_bearing", [*BEARING[:3], "viscosity = 3"], "viscosity", "did you mean 'viscosity_mPa_s'?"),
+    ("journal_bearing", [*BEARING[:2], "clearance_um = 0", BEARING[3]], "clearance_um", "a number above 0"),
+    ("journal_bearing", [*BEARING, "clearance_mm = 0.1"], "clearance_mm", "clearance_um says it already"),
+    ("journal_bearing", [*BEARING, 'film = "pi"'], "film", "'pressure' or 'line of centres'"),
+    ("journal_bearing", [*BEARING, "orientation_deg = 30"], "orientation_deg", "a known key"),
+    ("squeeze_film", [*BEARING[:3], 'viscosity_cP = "9"'], "viscosity_cP", "a number, without quotes"),
+    (
+        "squeeze_film",
+        [*BEARING, "centring_stiffness_N_per_m = -1"],
+        "centring_stiffness_N_per_m",
+        "0 or more",
+    ),
+    ("annular_seal", SEAL[:3], "clearance_um", "the radial clearance"),
+    ("annular_seal", [*SEAL, "swirl_exponent = 11"], "swirl_exponent", "a number from 0 to 10"),
+    ("cubic_spring", ["stiffness_N_per_m = 1"], "cubic_stiffness_N_per_m3", "the force by the cube"),
+    ("stop", ["gap_um = 9"], "stiffness_N_per_m", "the stiffness of the contact"),
+    (
+        "stop",
+        ["gap_um = 9", "stiffness_N_per_m = 1e6", "friction = 0.1"],
+        "diameter_mm",
+        "acts against the slip",
+    ),
+    ("internal_damping", ["damping_N_s_per_m = nan"], "damping_N_s_per_m", "a finite number"),
+]
+
+
+@each_of("kind, lines, key, words", BAD)
+def test_bad_forces(file, kind, lines, key, words):
+    found = {problem.column: problem.expected for problem in complaints(file, table(kind, *lines))}
+    assert words in found.pop(f"{kind}[1].{key}")
+    assert not found or (key == "viscosity" and len(found) == 1), "misspelt, thus missing, too"
+
+
+@each_of("node", ["0", "5", '"NDE"', "1.5"])
+def test_a_node_that_is_none(file, node):
+    with pytest.raises(InputError, match=r"key internal_damping\[1\]\.node: .* a node from 1 to 4 or|whole"):
+        file(table("internal_damping", "damping_N_s_per_m = 1", node=node))
+
+
+def test_all_problems_at_once(file):
+    assert len(complaints(file, table("journal_bearing", node="9") + table("stop"))) == 7
+
+
+UNLIKELY = [
+    ("journal_bearing", [*BEARING[:2], "clearance_m = 100", BEARING[3]], "means 100 m; is this in um?"),
+    ("journal_bearing", [*BEARING[:2], "clearance_mm = 100", BEARING[3]], "means 0.1 m; is this in um?"),
+    ("journal_bearing", [*BEARING[:2], "clearance_um = 0.1", BEARING[3]], "is this in mm?"),
+    ("journal_bearing", [*BEARING[:3], "viscosity_Pa_s = 28"], "means 28 Pa·s; is this in mPa_s?"),
+    ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "is this in Pa_s?"),
+    ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length_m = 300 means 300 m; is this in mm?"),
+    ("squeeze_film", [*BEARING[:2], "clearance_um = 2000", BEARING[3]], "is 0.04 of the journal's radius"),
+    ("annular_seal", [*SEAL[:2], "swirl_ratio = 40", SEAL[3]], "swirl_ratio = 40; is this in percent?"),
+    ("stop", ["gap_m = 0.2", "stiffness_N_per_m = 1e7"], "is this in mm?"),
+]
+
+
+@each_of("kind, lines, words", UNLIKELY)
+def test_values_that_are_no_machine_s(file, kind, lines, words):
+    with pytest.warns(TableWarning) as caught:
+        file(table(kind, *lines))
+    (warning,) = caught
+    assert " at node 2: " in str(warning.message)
+    assert words in str(warning.message)
+
+
+SIZES = st.floats(1e-6, 1e6)
+NAMES = st.sampled_from(["", "DE", "two words", "ß"])
+
+
+def any_force(kind):
+    sizes = {}
+    for name, item in kind.__dataclass_fields__.items():
+        if item.type == "float":
+            sizes[name] = SIZES if name in kind.above_zero else st.just(0.0) | SIZES
+        if name.endswith("exponent"):
+            sizes[name] = st.floats(0, 10)
+    if kind is fem.Stop:
+        sizes["diameter"] = SIZES
+    if kind is fem.JournalBearing:
+        sizes["film"] = st.sampled_from(["pressure", "line of centres"])
+    return st.builds(kind, st.integers(1, 4), NAMES, **sizes)
+
+
+KINDS = (
+    fem.JournalBearing,
+    fem.SqueezeFilm,
+    fem.MuszynskaSeal,
+    fem.CubicSpring,
+    fem.Stop,
+    fem.InternalDamping,
+)
+
+
+@pytest.mark.filterwarnings("ignore::rotorid.tables.TableWarning")
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(forces=st.lists(st.one_of(*map(any_force, KINDS)), max_size=5))
+def test_forces_come_back_from_their_file(tmp_path, forces):
+    rotor = fem.Rotor([0.3, 0.4, 0.3], 0.1, forces=forces)
+    write_rotor(tmp_path / "r.toml", rotor)
+    again = read_rotor(tmp_path / "r.toml")
+    assert again == rotor
+    assert sorted(map(repr, again.forces)) == sorted(map(repr, forces))
+
+
+def test_a_table_alone_holds_no_forces(tmp_path):
+    rotor = fem.Rotor([0.3], 0.1, forces=[fem.InternalDamping(1, damping=1.0)])
+    with pytest.raises(ValueError, match="cannot hold forces that are not linear"):
+        write_rotor(tmp_path / "r.csv", rotor)
+
+
+def test_the_schema_knows_them_in_all_units():
+    known = schema("rotor")["properties"]
+    assert set(KEYS_OF_FORCE) <= set(known)
+    items = known["journal_bearing"]["items"]
+    assert {"clearance_um", "clearance_m", "viscosity_cP", "film", "node"} <= set(items["properties"])
+    either = [{each for one in part["anyOf"] for each in one["required"]} for part in items["allOf"]]
+    assert {"viscosity_mPa_s", "viscosity_Pa_s", "viscosity_cP"} in either
+    assert json.dumps(known)
+
+
+LINEAR = [
+    "critical rotor.toml",
+    "critical rotor.toml --mesh-check --json",
+    "campbell rotor.toml --speeds 1000:9000:1000rpm --output o.csv",
+    "response rotor.toml --unbalance u.csv --speeds 1000:9000:1000rpm --plot p.png",
+    "influence rotor.toml --planes 2 --sensors 3 --speeds 1000,2000rpm",
+    "unbalance job.toml --stations 2",
+    "balance job.toml",
+]
+
+
+@each_of("command", LINEAR)
+def test_linear_commands_refuse_and_say_what_helps(file, command, monkeypatch, cli):
+    file(table("journal_bearing", *BEARING, node="1") + table("journal_bearing", *BEARING, node="4"))
+    write_csv(file.folder / "u.csv", [["node", "unbalance_g_mm", "angle_deg"], [2, 100, 0]])
+    write_csv(
+        file.folder / "runs.csv",
+        [["run", "speed_rpm", "sensor", "amplitude_um", "phase_deg"], ["a", 1000, "s", 10, 20]],
+    )
+    job = 'runs = "runs.csv"\nrotor = "rotor.toml"\nphase = "lead"\n'
+    job += "[planes.p]\nnode = 2\n[sensors.s]\nnode = 3\n"
+    (file.folder / "job.toml").write_text(job, encoding="utf-8")
+    before = sorted(file.folder.iterdir())
+    monkeypatch.chdir(file.folder)
+    ended = cli(*command.split())
+    assert (ended.code, ended.out) == (2, "")
+    assert "the journal bearing at node 1 is not linear" in ended.err
+    assert "rotorid bearings ROTOR --speeds A:B --output linear.toml" in ended.err
+    assert len(ended.err.splitlines()) == 1
+    assert sorted(file.folder.iterdir()) == before
