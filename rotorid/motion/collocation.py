@@ -98,11 +98,12 @@ class Orbit:
 
     @cached_property
     def roughness(self) -> float:
-        """How much of the velocities the highest power of the polynomials is, at most."""
-        v = self.velocities
-        highest = np.einsum("l,ilk->ik", _HIGHEST, v)
-        size = self.scale[self.start.size :]
-        return float((np.abs(highest) / size).max())
+        """What the highest power of the polynomials moves in one step, of the whole motion, at most.
+
+        At the ends of the steps the motion is better by far, where the forces are smooth.
+        """
+        moved = self.step * np.abs(np.einsum("l,ilk->ik", _HIGHEST, self.velocities))
+        return float((moved / self.scale[: self.start.size]).max())
 
     def finer(self) -> Orbit:
         """The same in steps half as long."""

@@ -12,8 +12,8 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
-_ROUGH = 3e-4  # more of `Orbit.roughness` halves the steps in time
-_MOST_STEPS, _MOST_POINTS = 512, 1500
+_ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
+_MOST_STEPS, _MOST_POINTS = 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -298,7 +298,7 @@ def _solved(
 ) -> tuple[Linearised, int]:
     """A solution, its steps in time short enough."""
     at, iterations = problem.solve(guess, rows, values)
-    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS:
+    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS * max(problem.turns, 1):
         at, _ = problem.solve(at.orbit.finer(), rows, values)
     return at, iterations
 

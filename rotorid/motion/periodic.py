@@ -9,7 +9,7 @@ import scipy.linalg
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import rpm_text
-from rotorid.base.text import listing
+from rotorid.base.text import listing, percent
 from rotorid.motion.collocation import POINTS, Orbit, Periodic
 from rotorid.motion.continuation import (
     DOUBLING,
@@ -25,6 +25,8 @@ from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.system import MotionSystem
 
 _STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
+_COARSE = 1e-3
+"""Of `Orbit.roughness`."""
 _CYCLES = 100  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
@@ -291,4 +293,12 @@ def _really(orbit: Orbit, turns: int) -> bool:
 
 def _doubts(branches: list[Branch]) -> list[str]:
     """What may be wrong with the branches."""
-    return [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    said = [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    for branch in branches:
+        worst = max(point.orbit.roughness for point in branch.points)
+        if worst > _COARSE:
+            said.append(
+                f"the {branch.kind} branch has too few steps in time: {percent(worst)} of its motion may be wrong "
+                "(--steps)"
+            )
+    return said

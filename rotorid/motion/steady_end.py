@@ -12,6 +12,7 @@ from rotorid.motion.run import MotionRun
 _SHARE = 0.2
 """Part of the time that is looked at, its last."""
 _LEAST_TURNS = 8
+LEAST_SAMPLES = 64
 _CHANGE = 1e-3
 """Of amplitude and mean from one half of the window to the other, by the amplitude: steady below it."""
 _REST = 1e-6
@@ -83,8 +84,8 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
     first, last = motion.speeds
     if first != last:
         raise ValueError("the speed changes: there is no steady end")
-    if motion.time.size < 64:
-        raise ValueError("64 samples are needed at least to tell whether the end is steady")
+    if motion.time.size < LEAST_SAMPLES:
+        raise ValueError(f"{LEAST_SAMPLES} samples are needed at least to tell whether the end is steady")
     whole = float(motion.time[-1])
     window = max(_SHARE * whole, min(_LEAST_TURNS * 2 * np.pi / last, whole) if last else 0.0)
     k = int(np.searchsorted(motion.time, whole - window))

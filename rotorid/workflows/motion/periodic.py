@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from rotorid.motion.system import MotionSystem
 
 _MOST_STEPS = 4096
+_SMALL = 24
+"""Unknowns above which a rotor is reduced."""
 
 
 @dataclass(frozen=True)
@@ -145,8 +147,11 @@ def periodic(
     ValueError
         For a model or an option that cannot be, and where no periodic motion is found.
     """
+    import numpy as np
+
     from rotorid.motion.periodic import periodic_motion
     from rotorid.motion.periodic_table import Readings
+    from rotorid.motion.reduced_system import reduced_system
 
     low, high = band(options.speeds, "--speeds") or (0.0, 0.0)
     if low <= 0:
@@ -156,8 +161,14 @@ def periodic(
     if options.steps is not None and not 4 <= options.steps <= _MOST_STEPS:
         raise ValueError(f"--steps takes a whole number from 4 to {_MOST_STEPS}")
     what = moving(model, unbalance, bow, degrees(options.gravity_direction, "--gravity-direction"))
-    system = what.system(low, high)
-    labels, directions = _sensors(what, system, options.sensors)
+    full = what.system(low, high)
+    labels, sensed = _sensors(what, full, options.sensors)
+    mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
+    kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
+    system = full if full.size <= _SMALL else reduced_system(full, kept).system
+    directions = np.zeros((len(sensed), system.size))
+    for row, (node, angle) in zip(directions, sensed, strict=True):
+        row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     with phase("periodic motion"):
         motion = periodic_motion(
             system,
@@ -174,16 +185,10 @@ def periodic(
 
 def _sensors(
     what: Moving, system: MotionSystem, given: str | Sequence[Sensor] | None
-) -> tuple[tuple[str, ...], FloatArray]:
-    """Names of the sensors, and their directions in the coordinates, (k, n)."""
-    import numpy as np
-
+) -> tuple[tuple[str, ...], list[tuple[int, float]]]:
+    """Names of the sensors, their nodes and angles, degrees."""
     nodes = dict.fromkeys(force.node for force in system.forces) or dict.fromkeys(system.nodes)
     places = [*nodes] if given is None else sensors(given)
-    labels, directions = [], np.zeros((len(places), system.size))
-    for place, row in zip(places, directions, strict=True):
-        name, angle = place if isinstance(place, tuple) else (place, 0.0)
-        labels.append(f"{name}" if angle == 0 else f"{name}:{angle:g}")
-        turn = np.radians(angle)
-        row[[*system.index(what.node(name))]] = np.cos(turn), np.sin(turn)
-    return tuple(labels), directions
+    both = [place if isinstance(place, tuple) else (place, 0.0) for place in places]
+    labels = tuple(f"{name}" if angle == 0 else f"{name}:{angle:g}" for name, angle in both)
+    return labels, [(what.node(name), angle) for name, angle in both]
