@@ -1,7 +1,7 @@
 """A rotor in journal bearings as three masses: what holds it, when it whips, and a run-up.
 
-Run `python examples/reduce_and_run_up.py`; the first time numba compiles for half a minute where it is installed, and
-without it (`pip install "rotorid[fast]"`) it takes some hundred times longer.
+Run `python examples/reduce_and_run_up.py`; at the first time numba compiles for half a minute, and without it
+(`pip install "rotorid[fast]"`) all takes some hundred times longer.
 """
 
 from __future__ import annotations
@@ -37,13 +37,17 @@ def main() -> dict[str, float]:
     resting = equilibrium(small.system(500 * RPM, 9000 * RPM), 5000 * RPM)
     loads = np.abs(resting.load), np.abs(whole.found[0].load)
     print("loads in N, of the small model and of the rotor:", *(np.round(load, 3) for load in loads))
-    (lost,) = periodic_motion(small.system(500 * RPM, 9000 * RPM), 5000 * RPM, 8000 * RPM).branches[0].bifurcations
-    assert whole.stability is not None and whole.stability.threshold is not None
-    thresholds = lost.point.orbit.speed / RPM, whole.stability.threshold / RPM
+    (lost,) = (
+        periodic_motion(small.system(500 * RPM, 9000 * RPM), 5000 * RPM, 8000 * RPM).branches[0].bifurcations
+    )
+    assert whole.stability is not None
+    thresholds = lost.point.orbit.speed / RPM, (whole.stability.threshold or np.nan) / RPM
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
 
     # Half a percent of external damping moves the threshold far up, and yet a push makes it whip.
-    damped = reduce(ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)).motion_model
+    damped = reduce(
+        ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)
+    ).motion_model
     assert damped is not None
     system, speed = damped.system(500 * RPM, 13000 * RPM), 9000 * RPM
     (lost,) = periodic_motion(system, 9000 * RPM, 13000 * RPM).branches[0].bifurcations
@@ -57,7 +61,8 @@ def main() -> dict[str, float]:
         whirls.append(end)
         size = 1e3 * end.amplitude[2]
         print(f"pushed by {1e3 * push:.1f} mm at 9000 rpm: at its middle {size:.3f} mm after 20 s")
-    print(f"it whips at {whirls[1].frequency / RPM:.0f} rpm, its journals up to {whirls[1].eccentricity[0, 1]:.3f} c\n")
+    whip = whirls[1].frequency / RPM, whirls[1].eccentricity[0, 1]
+    print("it whips at {:.0f} rpm, its journals up to {:.2f} of their clearance".format(*whip), end="\n\n")
 
     # Run-up through both critical speeds.
     system = damped.system(500 * RPM, 7000 * RPM, unbalance=UNBALANCE)
@@ -73,13 +78,13 @@ def main() -> dict[str, float]:
     return {
         "mass_kg": float(small.masses.sum()),
         "load_N": float(loads[0][0]),
-        "threshold_rpm": float(thresholds[0]),
-        "rotor_threshold_rpm": float(thresholds[1]),
-        "damped_threshold_rpm": float(lost.point.orbit.speed / RPM),
-        "whip_rpm": float(whirls[1].frequency / RPM),
-        "whip_eccentricity": float(whirls[1].eccentricity[0, 1]),
-        "first_critical_rpm": float(peaks[800][0]),
-        "second_critical_rpm": float(peaks[4500][0]),
+        "threshold_rpm": round(float(thresholds[0]), 2),
+        "rotor_threshold_rpm": round(float(thresholds[1]), 1),
+        "damped_threshold_rpm": round(float(lost.point.orbit.speed / RPM), 1),
+        "whip_rpm": round(float(whip[0])),
+        "whip_eccentricity": round(float(whip[1]), 2),
+        "first_critical_rpm": round(float(peaks[800][0])),
+        "second_critical_rpm": round(float(peaks[4500][0])),
     }
 
 
