@@ -1,12 +1,13 @@
 """Motion in time of the reference rotor from rest under unbalance: 0.5 s at 3,000 rpm, 2,001 instants.
 
 Against ROSS' `Rotor.run_time_response`, which takes the equations of one speed to a state-space matrix and
-scipy's `lsim`; its other method, Newmark's, takes longer. Both planes, gyroscopic effect, linear damped bearings:
-ROSS has no film that is not linear. Here the rotor keeps its bearings, sensors and plane, and 12 modes between them
-(Craig and Bampton) of both planes together.
+scipy's `lsim`; its other method, Newmark's, takes longer. Both planes, gyroscopic effect, linear damped
+bearings: ROSS has no film that is not linear. Here the rotor keeps its bearings, sensors and plane, and 12
+modes between them (Craig and Bampton) of both planes together.
 
-Answers: the deflections of two nodes at all instants, by the largest. ROSS takes the force as linear between the
-instants: it is taken at a quarter of that step, and the note says how far its answer at the whole step is off.
+Answers: the deflections of two nodes at all instants, by the largest. ROSS takes the force as linear
+between the instants: it is taken at a quarter of that step, and the note says how far its answer at the
+whole step is off.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import numpy as np
 import fem
 from benchmarks.rotors import ROSS, Bearing, ross_rotor, rotorid_rotor, table
 from benchmarks.timing import Row, best_of, once
-
 from rotorid.motion.reduced_system import reduced_system
 from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.run import run as move
