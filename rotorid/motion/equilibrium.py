@@ -21,8 +21,8 @@ from rotorid.motion.system import MotionSystem
 _CLOSER = 0.8
 """Share of the way to its wall that a journal goes in one step at most."""
 _ROUNDS = 60
-_SMALLEST_STEP = 1e-4
-"""Of the load, in its continuation; of Newton's way."""
+_SMALLEST_SHARE, _SMALLEST_STEP = 1e-9, 1e-4
+"""Of the load in its continuation, and of Newton's way."""
 _CONVERGED = 1e-8
 """Last step by the film's thickness: the error is its square."""
 _SINGULAR = 1e13
@@ -172,7 +172,7 @@ def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray
         found = _newton(system, K, q, speed, further)
         if found is not None:
             q, share, step = found, further, 2 * step
-        elif step < _SMALLEST_STEP:
+        elif step < _SMALLEST_SHARE:
             e = np.abs(_places(system, q)) / _walls(system)
             k = int(np.argmax(e))
             raise ValueError(
