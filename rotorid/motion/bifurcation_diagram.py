@@ -1,4 +1,4 @@
-"""Bifurcation diagram: amplitudes of periodic motions over speed, stable, unstable, and where that changes."""
+"""Bifurcation diagram: amplitudes over speed of stable and unstable periodic motions, bifurcations."""
 
 from __future__ import annotations
 

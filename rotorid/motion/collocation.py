@@ -39,6 +39,7 @@ def _radau() -> tuple[FloatArray, FloatArray]:
 
 POINTS, _A = _radau()
 _INVERSE = np.linalg.inv(_A)
+_HIGHEST = np.linalg.inv(np.polynomial.legendre.legvander(2 * POINTS - 1, _S - 1))[-1]
 _NEWTON = 14
 _SMALL = 1e-9  # last change of Newton's method, by the size of the motion
 
@@ -86,8 +87,10 @@ class Orbit:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Half of what each coordinate moves, or a hundredth of the largest deflection (or all of it, where
-        nothing moves more), and the same of its velocity, shape (2n,)."""
+        """Sizes of the state, shape (2n,): half of what each coordinate moves, and of its velocity.
+
+        At least a hundredth of the largest deflection, or all of it, where nothing moves more.
+        """
         q = self.deflections.reshape(-1, self.start.size)
         moved, largest = np.ptp(q, axis=0) / 2, max(float(np.abs(q).max()), 1e-9)
         size = np.maximum(moved, largest * (1e-2 if moved.max() > 1e-2 * largest else 1.0))
@@ -95,18 +98,19 @@ class Orbit:
 
     @cached_property
     def roughness(self) -> float:
-        """How much of the velocities the highest power of the polynomials is, at most."""
-        v = self.velocities
-        highest = np.einsum("l,ilk->ik", np.linalg.inv(np.polynomial.legendre.legvander(2 * POINTS - 1, 3))[3], v)
-        size = self.scale[self.start.size :]
-        return float((np.abs(highest) / size).max())
+        """What the highest power of the polynomials moves in one step, of the whole motion, at most.
+
+        At the ends of the steps the motion is better by far, where the forces are smooth.
+        """
+        moved = self.step * np.abs(np.einsum("l,ilk->ik", _HIGHEST, self.velocities))
+        return float((moved / self.scale[: self.start.size]).max())
 
     def finer(self) -> Orbit:
         """The same in steps half as long."""
         v = self.velocities
         known = np.concatenate([np.roll(v[:, -1:], 1, axis=0), v], axis=1)
         from_known = np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
-        halves = [np.vander(half, _S + 1, increasing=True) @ from_known for half in (POINTS / 2, POINTS / 2 + 0.5)]
+        halves = [np.vander(x, _S + 1, increasing=True) @ from_known for x in (POINTS / 2, POINTS / 2 + 0.5)]
         both = np.stack([np.einsum("jl,ilk->ijk", half, known) for half in halves], axis=1)
         return replace(self, velocities=both.reshape(-1, *v.shape[1:]))
 
@@ -166,8 +170,8 @@ class Periodic:
 
         Returns
         -------
-        What is left, shape (N, 4 n); the derivatives by V, shape (N, 4 n, 4 n), and by q, v, h and Ω, the angle
-        of rotation held, shape (N, 4 n, 2 n + 2).
+        What is left, shape (N, 4 n); the derivatives by V, shape (N, 4 n, 4 n), and by q, v, h and Ω, the
+        angle of rotation held, shape (N, 4 n, 2 n + 2).
         """
         system = self.system
         N, _, n = V.shape
@@ -179,9 +183,7 @@ class Periodic:
         F, F_speed = np.zeros(shape), np.zeros(shape)
         C_t, K_t = np.zeros((*shape, n)), np.zeros((*shape, n))
         _forces_along(*system.law_tables, Q.reshape(shape), V.reshape(shape), speed, F, K_t, C_t, F_speed)
-        K_t, C_t = (
-            (linear - own).reshape(N, _S, n, n) for linear, own in ((K, K_t), (C, C_t))
-        )
+        K_t, C_t = ((linear - own).reshape(N, _S, n, n) for linear, own in ((K, K_t), (C, C_t)))
         turning = np.exp(1j * angles)[..., None]
         driven = (system.unbalance * speed**2 + system.bow) * turning
         inert = (np.einsum("jl,ilk->ijk", _INVERSE, V) - _INVERSE.sum(axis=1)[:, None] * v[:, None]) @ M.T / h
@@ -354,10 +356,8 @@ class Linearised:
             "ijkm,im->ijk", self.steps, np.concatenate([states, np.tile(rest, (len(states), 1))], axis=1)
         )
         speed = orbit.speed + change[-1]
-        if self.free == 1:
-            period = orbit.period * orbit.speed / speed
-        else:
-            period = orbit.period + change[-2]
+        own = self.free == 2
+        period = orbit.period + change[-2] if own else orbit.period * orbit.speed / speed
         return Orbit(float(speed), float(period), orbit.start + change[:n], velocities)
 
 
@@ -366,8 +366,8 @@ def _linear(system: MotionSystem, speed: float) -> tuple[FloatArray, ...]:
     knots = system.knots
     i = max(0, min(int(np.searchsorted(knots, speed, "right")) - 1, len(knots) - 2))
     slopes = [(matrix[i + 1] - matrix[i]) / (knots[i + 1] - knots[i]) for matrix in (system.C, system.K)]
-    values = [m[i] + (speed - knots[i]) * slope for m, slope in zip((system.C, system.K), slopes, strict=True)]
-    return (*values, *slopes)
+    past = speed - knots[i]
+    return (system.C[i] + past * slopes[0], system.K[i] + past * slopes[1], *slopes)
 
 
 @compiled

@@ -12,8 +12,8 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
-_ROUGH = 3e-4  # more of `Orbit.roughness` halves the steps in time
-_MOST_STEPS, _MOST_POINTS = 512, 1500
+_ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
+_MOST_STEPS, _MOST_POINTS = 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -187,7 +187,9 @@ class _Walk:
         phase[:n] = at.orbit.state[n:] / at.orbit.scale[:n] ** 2
         return np.array([phase, along])
 
-    def corrected(self, at: Linearised, tangent: FloatArray, length: float) -> tuple[Linearised, FloatArray, int]:
+    def corrected(
+        self, at: Linearised, tangent: FloatArray, length: float
+    ) -> tuple[Linearised, FloatArray, int]:
         """The solution at a length from another one, its tangent, and the iterations it took."""
         rows = self.rows(at, tangent)
         values = rows @ self.problem.unknowns(at.orbit)
@@ -218,7 +220,10 @@ class _Walk:
             values = last @ y
             values[-1] = end
             new, _ = _solved(self.problem, new.orbit, last, values, self.fixed_steps)
-            onwards, length = self.onwards(new, rows), float(rows[-1] @ (self.problem.unknowns(new.orbit) - y))
+            onwards, length = (
+                self.onwards(new, rows),
+                float(rows[-1] @ (self.problem.unknowns(new.orbit) - y)),
+            )
         return new, onwards, iterations, length
 
     def point(self, at: Linearised) -> Point:
@@ -242,9 +247,9 @@ class _Walk:
         before, now = self.point(at), self.point(new)
         few, many = sorted((before.outside, now.outside))
         fold = tangent[-1] * onwards[-1] < 0
-        if fold and many - few > 1 or many - few > 2:
-            if length > 1e-3 * _LONGEST:
-                raise np.linalg.LinAlgError("several bifurcations at once")
+        long = length > 1e-3 * _LONGEST
+        if long and many - few > (1 if fold else 2):
+            raise np.linalg.LinAlgError("several bifurcations at once")
         if not fold and many == few:
             return []
 
@@ -254,7 +259,7 @@ class _Walk:
 
         there = self.corrected(at, tangent, _root(test, length))[0]
         kind, eigenvector = (FOLD, tangent[: -at.free].astype(complex)) if fold else self._kind(there, few)
-        if kind in (BRANCH, DOUBLING) and many - few == 2 and length > 1e-3 * _LONGEST:
+        if long and kind in (BRANCH, DOUBLING) and many - few == 2:
             raise np.linalg.LinAlgError("two bifurcations at once")
         return [Bifurcation(kind, self.point(there), after, eigenvector)]
 
@@ -293,7 +298,7 @@ def _solved(
 ) -> tuple[Linearised, int]:
     """A solution, its steps in time short enough."""
     at, iterations = problem.solve(guess, rows, values)
-    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS:
+    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS * max(problem.turns, 1):
         at, _ = problem.solve(at.orbit.finer(), rows, values)
     return at, iterations
 

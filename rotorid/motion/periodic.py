@@ -9,7 +9,7 @@ import scipy.linalg
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.rpm import rpm_text
-from rotorid.base.text import listing
+from rotorid.base.text import listing, percent
 from rotorid.motion.collocation import POINTS, Orbit, Periodic
 from rotorid.motion.continuation import (
     DOUBLING,
@@ -25,6 +25,8 @@ from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.system import MotionSystem
 
 _STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
+_COARSE = 1e-3
+"""Of `Orbit.roughness`."""
 _CYCLES = 100  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
@@ -70,8 +72,8 @@ def periodic_motion(
     low, high
         rad/s.
     subsynchronous
-        Also motions of so many revolutions: those that begin at a period doubling, where that number is 2, and
-        those that the motion in time comes to at a speed of the range.
+        Also motions of so many revolutions: those that begin at a period doubling, for 2, or else those that
+        the motion in time comes to at a speed of the range.
     limit_cycle
         Self-excited motions from the Hopf points of the rotor at rest.
     steps
@@ -87,7 +89,7 @@ def periodic_motion(
     forced = bool(np.abs(system.unbalance).any() or np.abs(system.bow).any())
     if limit_cycle and forced:
         raise ValueError(
-            "a limit cycle has a period of its own, which unbalance and bow do not let it have: leave them out"
+            "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
     search = _Search(system, low, high, steps)
     kind = "synchronous" if forced else "rest"
@@ -99,7 +101,7 @@ def periodic_motion(
         branches += more
     if limit_cycle:
         more = search.cycles(branches)
-        warnings += [] if more else ["no limit cycle was found: no Hopf point, and motion in time comes to none"]
+        warnings += [] if more else ["no limit cycle found: no Hopf point, and motion in time comes to none"]
         branches += more
     return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings + _doubts(branches)))
 
@@ -122,7 +124,7 @@ class _Search:
         return follow(problem, start, self.low, self.high, kind, fixed_steps=self.steps is not None)
 
     def main(self, kind: str) -> list[Branch]:
-        """From the lowest speed upwards and, where that does not come to the same, from the highest downwards."""
+        """From the lowest speed upwards and, if that is another branch, from the highest downwards."""
         problem, found = Periodic(self.system, 1), list[Branch]()
         problems: list[str] = []
         for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
@@ -175,15 +177,13 @@ class _Search:
         at = Periodic(self.system, 1).linearised(orbit)
         change = np.append(direction, 0.0) * amplitude
         halves = [at.moved(sign * change).velocities for sign in (1.0, -1.0)]
-        guess = Orbit(
-            orbit.speed, 2 * orbit.period, orbit.start + change[:n], np.concatenate(halves)
-        )
+        guess = Orbit(orbit.speed, 2 * orbit.period, orbit.start + change[:n], np.concatenate(halves))
         row = np.append(direction / orbit.scale**2, 0.0)
         size = row[:-1] @ direction
         return Start(guess, row[None], np.array([row[:-1] @ orbit.state + amplitude * size]))
 
     def cycles(self, branches: list[Branch]) -> list[Branch]:
-        """Those that begin at Hopf points, and the one that the motion in time comes to at the highest speed."""
+        """Those that begin at Hopf points, and what motion in time comes to at the highest speed."""
         hopf = [b for branch in branches for b in branch.bifurcations if b.kind == HOPF]
         found = [self.cycle(b) for b in hopf]
         problem = Periodic(self.system, 0)
@@ -202,7 +202,7 @@ class _Search:
         return found
 
     def whirling(self, problem: Periodic) -> Orbit:
-        """What a small disturbance at rest comes to at the highest speed, cut where it is nearest to periodic."""
+        """What a disturbance at rest comes to at the highest speed, cut where it is nearly periodic."""
         rest = _at_rest(self.system, self.high)
         whirl, shape = whirl_at_rest(self.system, rest, self.high)
         start = rest + _FIRST * _length(self.system, rest) * shape.real / np.abs(shape).max()
@@ -293,4 +293,12 @@ def _really(orbit: Orbit, turns: int) -> bool:
 
 def _doubts(branches: list[Branch]) -> list[str]:
     """What may be wrong with the branches."""
-    return [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    said = [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    for branch in branches:
+        worst = max(point.orbit.roughness for point in branch.points)
+        if worst > _COARSE:
+            said.append(
+                f"the {branch.kind} branch has too few steps in time: {percent(worst)} of its motion may be wrong "
+                "(--steps)"
+            )
+    return said

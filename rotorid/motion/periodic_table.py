@@ -102,7 +102,9 @@ class Readings:
 
     def bifurcations(self) -> tuple[Column, ...]:
         """One row a bifurcation."""
-        each = [(k, branch, b) for k, branch in enumerate(self.motion.branches, 1) for b in branch.bifurcations]
+        each = [
+            (k, branch, b) for k, branch in enumerate(self.motion.branches, 1) for b in branch.bifurcations
+        ]
         sizes = np.concatenate(self.at)
         ratios = [self._whirl(branch, b) for _, branch, b in each]
         return (
@@ -152,7 +154,8 @@ class Readings:
                 "branches": branches,
                 "bifurcations": rows(self.bifurcations()),
                 "jumps": [
-                    {"speed_rad_s": speed, "from_m": before, "to_m": after} for speed, before, after in self.jumps
+                    {"speed_rad_s": speed, "from_m": before, "to_m": after}
+                    for speed, before, after in self.jumps
                 ],
                 "warnings": self.motion.warnings,
             }

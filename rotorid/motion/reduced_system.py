@@ -65,8 +65,8 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
     from scipy.linalg import eigh
 
     kept_nodes = sorted({*nodes, *(force.node for force in system.forces)})
-    kept = [i for node in kept_nodes for i in system.index(node)]
-    kept += [i for i, name in enumerate(system.coordinates) if name.startswith("foot")]
+    feet = [i for i, name in enumerate(system.coordinates) if name.startswith("foot")]
+    kept = np.array([*(i for node in kept_nodes for i in system.index(node)), *feet], dtype=np.intp)
     others = np.setdiff1d(np.arange(system.size), kept)
     if modes is not None and not 0 <= modes <= others.size:
         raise ValueError(f"modes: from 0 to {others.size} between the kept nodes, not {modes}")
@@ -100,7 +100,7 @@ def _error(K: FloatArray, M: FloatArray, T: FloatArray, highest: float) -> float
     from scipy.linalg import eigh
 
     def frequencies(K: FloatArray, M: FloatArray) -> FloatArray:
-        return np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0))
+        return np.asarray(np.sqrt(np.maximum(eigh(K, M, eigvals_only=True), 0.0)))
 
     full, few = frequencies(K, M), frequencies(T.T @ K @ T, T.T @ M @ T)
     bends = int((full <= _RIGID * full[-1]).sum())

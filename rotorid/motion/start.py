@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.motion.equilibrium import equilibrium
-from rotorid.motion.run import run
+from rotorid.motion.run import TOLERANCE, run
 from rotorid.motion.system import MotionSystem
 
 _BLOCK = 32  # turns
@@ -26,7 +28,7 @@ def at_rest(system: MotionSystem, speed: float) -> FloatArray:
 
 
 def steady_linear(
-    system: MotionSystem, speeds: Sequence[float]
+    system: MotionSystem, speeds: Sequence[float] | FloatArray
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
 
@@ -58,24 +60,58 @@ def steady_linear(
     return np.array(at), np.array(rests), np.array(responses)
 
 
-def in_steady_motion(
-    system: MotionSystem, speed: float, tolerance: float
-) -> tuple[FloatArray, FloatArray, tuple[str, ...]]:
-    """Unknowns, velocities, (n,) each, and warnings: steady motion at a speed, where the angle is 0.
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Unknowns and their velocities, shape (n,) each, where the angle of rotation is 0; and warnings."""
 
-    Where forces are not linear it begins near the steady motion of the linear rotor and settles for so many
-    turns as it takes, 2048 at most.
+    q: FloatArray
+    v: FloatArray
+    warnings: tuple[str, ...] = ()
+
+
+def begin(
+    system: MotionSystem,
+    speed: float,
+    how: Literal["rest", "steady"] = "rest",
+    shift: Mapping[int, complex] | None = None,
+    tolerance: float = TOLERANCE,
+) -> Beginning:
+    """How a motion begins.
+
+    Parameters
+    ----------
+    system
+        What moves.
+    speed
+        rad/s.
+    how
+        At rest in equilibrium, or in steady motion: where forces are not linear it begins near the steady
+        motion of the linear rotor and settles for so many turns as it takes, 2048 at most.
+    shift
+        Nodes moved from there, x + iy, m.
+    tolerance
+        As `run` takes it.
 
     Raises
     ------
     ValueError
-        As `equilibrium` and `run`, and if it touches a wall.
+        As `equilibrium` and `run`, if it touches a wall, and for nodes that do not move.
     """
+    found = in_steady_motion(system, speed, tolerance) if how == "steady" else None
+    found = found or Beginning(at_rest(system, speed), np.zeros(system.size))
+    q = found.q.copy()
+    for node, by in (shift or {}).items():
+        q[[*system.index(node)]] += by.real, by.imag
+    return replace(found, q=q)
+
+
+def in_steady_motion(system: MotionSystem, speed: float, tolerance: float) -> Beginning:
+    """In steady motion, see `begin`."""
     rest = at_rest(system, speed)
     *_, response = steady_linear(system, [speed])
     q, v = rest + response[0].real, (1j * speed * response[0]).real
     if not system.forces or not speed:
-        return q, v, ()
+        return Beginning(q, v)
     walls = np.array([force.wall for force in system.forces])
     x, y = system.law_tables[2].T
     if (np.hypot(q[x], q[y]) > _NEAR * walls).any():
@@ -87,17 +123,7 @@ def in_steady_motion(
             raise ValueError(f"while it settles at the first speed {found.stopped}")
         q, v, turn = found.q, found.v, found.z[-(found.time.size // _BLOCK) :]
         if before is not None and np.abs(turn - before).max() <= _SETTLED * np.abs(turn).max():
-            return q, v, ()
+            return Beginning(q, v)
         before = turn
-    turns = _BLOCK * _BLOCKS
-    return q, v, (f"at the first speed the motion has not settled to a synchronous one in {turns} turns",)
-
-
-def displaced(system: MotionSystem, q: FloatArray, by: Mapping[int, complex]) -> FloatArray:
-    """The unknowns with these nodes moved by x + iy, m; errors for nodes that do not move."""
-    moved = q.copy()
-    for node, shift in by.items():
-        x, y = system.index(node)
-        moved[x] += shift.real
-        moved[y] += shift.imag
-    return moved
+    warning = f"at the first speed nothing that comes again each turn is reached in {_BLOCK * _BLOCKS} turns"
+    return Beginning(q, v, (warning,))

@@ -12,6 +12,7 @@ from rotorid.motion.run import MotionRun
 _SHARE = 0.2
 """Part of the time that is looked at, its last."""
 _LEAST_TURNS = 8
+LEAST_SAMPLES = 64
 _CHANGE = 1e-3
 """Of amplitude and mean from one half of the window to the other, by the amplitude: steady below it."""
 _REST = 1e-6
@@ -35,8 +36,10 @@ class SteadyEnd:
         x + iy, m, shape (m,).
     amplitude
         Largest distance from the mean, m, shape (m,).
+    change
+        Of amplitude and mean from one half of this part to the other, by the amplitude.
     steady
-        Whether amplitude and mean stay as they are, to a thousandth of the amplitude.
+        Whether they stay as they are, to a thousandth.
     at_rest
         Whether nothing moves any more.
     frequency
@@ -54,6 +57,7 @@ class SteadyEnd:
     begins: float
     mean: ComplexArray
     amplitude: FloatArray
+    change: float
     steady: bool
     at_rest: bool
     frequency: float
@@ -83,8 +87,8 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
     first, last = motion.speeds
     if first != last:
         raise ValueError("the speed changes: there is no steady end")
-    if motion.time.size < 64:
-        raise ValueError("64 samples are needed at least to tell whether the end is steady")
+    if motion.time.size < LEAST_SAMPLES:
+        raise ValueError(f"{LEAST_SAMPLES} samples are needed at least to tell whether the end is steady")
     whole = float(motion.time[-1])
     window = max(_SHARE * whole, min(_LEAST_TURNS * 2 * np.pi / last, whole) if last else 0.0)
     k = int(np.searchsorted(motion.time, whole - window))
@@ -98,7 +102,8 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
     means = [_hann_mean(half) for half in halves]
     sizes = [np.abs(half - mean).max(axis=0) for half in halves]
     change = max(np.abs(sizes[1] - sizes[0]).max(), np.abs(means[1] - means[0]).max())
-    steady = at_rest or bool(change <= _CHANGE * size[most])
+    change = float(change / (size[most] or 1.0))
+    steady = at_rest or change <= _CHANGE
     frequency = np.nan if at_rest else _strongest(t, z[:, most] - mean[most])
     period = np.nan if at_rest else _period(t, z[:, most] - mean[most], frequency, last, _forced(motion))
     return SteadyEnd(
@@ -106,6 +111,7 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
         begins=float(t[0]),
         mean=mean,
         amplitude=size,
+        change=change,
         steady=steady,
         at_rest=at_rest,
         frequency=frequency,

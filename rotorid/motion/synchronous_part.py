@@ -1,0 +1,55 @@
+"""The part of a motion that turns with the shaft (1×), by a slow filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotorid.base.arrays import ComplexArray, FloatArray
+from rotorid.motion.run import MotionRun
+
+_LEAST = 8
+"""Samples a turn that it needs."""
+_OF_A_TURN, _A_TURN = 64, 8
+"""Of these so many are told."""
+
+
+def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
+    """Follow the synchronous part of the deflections in x, that of x(t) = Re(X e^{iφ}) + the rest.
+
+    Each value is that of so many whole turns.
+
+    Parameters
+    ----------
+    motion
+        With eight samples a turn at least.
+    turns
+        Averaged over, 1 or more.
+
+    Returns
+    -------
+    Speeds in the middle of these turns, rad/s, shape (r,), and X at the nodes, m, shape (r, m).
+
+    Raises
+    ------
+    ValueError
+        For fewer samples a turn, or fewer turns.
+    """
+    from scipy.interpolate import CubicSpline
+
+    angle = motion.turned - motion.turned[0]
+    whole = int(angle[-1] / (2 * np.pi))
+    if whole < turns:
+        raise ValueError(f"the rotor makes {whole} turns; {turns} are needed for its synchronous part")
+    if np.diff(angle).max() > 2 * np.pi / _LEAST:
+        raise ValueError(
+            f"{_LEAST} samples a turn are needed at least for the synchronous part: a higher rate"
+        )
+    even = np.arange(whole * _OF_A_TURN + 1) * (2 * np.pi / _OF_A_TURN)
+    rising = np.concatenate([[True], np.diff(angle) > 0])
+    x = CubicSpline(angle[rising], motion.z.real[rising])(even)
+    turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
+    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(turning, axis=0)])
+    width = turns * _OF_A_TURN
+    mean = (total[width:-1] - total[: -1 - width]) / width
+    each = slice(None, None, _OF_A_TURN // _A_TURN)
+    return np.interp(even[: len(mean)] + turns * np.pi, angle, motion.speed)[each], mean[each]

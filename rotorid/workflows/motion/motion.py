@@ -1,0 +1,430 @@
+"""`motion`: motion in time of a rotor whose forces are not linear, at a speed or through a range of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import plain
+from rotorid.base.result import Column, frame, text
+from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.text import counted, figures, percent
+from rotorid.tables.reader import units
+from rotorid.workflows.motion.moving_system import moving
+from rotorid.workflows.option_quantities import quantity
+from rotorid.workflows.option_values import (
+    FASTEST,
+    Nodes,
+    Speeds,
+    degrees,
+    nodes,
+    number,
+    one_of,
+    one_speed,
+    pairs,
+    speeds,
+)
+from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.reduced_system import ReducedSystem
+    from rotorid.motion.run import MotionRun
+    from rotorid.motion.small_model import SmallModel
+    from rotorid.motion.steady_end import SteadyEnd
+    from rotorid.motion.system import MotionSystem
+    from rotorid.workflows.motion.moving_system import Moving
+
+View = Literal["motion", "orbits", "bode", "polar"]
+"""What a picture shows."""
+Start = Literal["rest", "steady"]
+_SMALL = 24
+"""Unknowns above which a rotor is reduced, where nothing else is asked for."""
+_LOOSER = 30.0
+"""Times the tolerance: the motion is found twice, and what differs is told as its error."""
+_UNSURE = 1e-3
+
+
+@dataclass(frozen=True)
+class MotionOptions:
+    """Options of `motion`.
+
+    Attributes
+    ----------
+    speed : SPEED
+        A constant speed, 6000rpm; without a unit rad/s.
+    run_up : A:B
+        From one speed to another one, up or down, evenly: 500:9000rpm, 9000:500rpm.
+    time : TIME
+        How long, 2s.
+    acceleration : A
+        Of a run-up or a run-down, in place of its time: 300rpm/s.
+    unbalance : FILE
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+    bow : FILE
+        Table of the shaft's bow at rest; a small model has its own.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
+    start
+        At rest in equilibrium, or in steady motion at the first speed.
+    displaced : LIST
+        Nodes moved from there, with the direction from x: 7=20um@90,12=5um.
+    sensors : NODES
+        Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
+    modes : N
+        Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
+        together; default: those up to 4 times the highest speed; small models keep all.
+    rate : N
+        Samples a second; default: 64 a turn at the highest speed.
+    tolerance : T
+        Error of one step by the largest deflection; default: 1e-6.
+    """
+
+    speed: str | float | None = None
+    run_up: Speeds | None = None
+    time: str | float | None = None
+    acceleration: str | float | None = None
+    unbalance: Path | str | Mapping[int, complex] | None = None
+    bow: Path | str | Mapping[int, complex] | None = None
+    gravity_direction: float = -90.0
+    start: Start = "rest"
+    displaced: str | Mapping[str, complex] | None = None
+    sensors: Nodes | None = None
+    modes: int | None = None
+    rate: float | None = None
+    tolerance: float = 1e-6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion(Outcome):
+    """Motion in time, what it comes to, and how sure it is.
+
+    Attributes
+    ----------
+    motion
+        What was found.
+    reduced
+        What moved, if it is a rotor with fewer unknowns than it has.
+    end
+        What it has come to; None where the speed changes or too little is known.
+    error
+        Largest difference of positions from those with a tolerance thirty times as large, by the largest
+        deflection; the error itself is smaller, except where two motions part.
+    warnings
+        What the reader must know.
+    """
+
+    motion: MotionRun
+    reduced: ReducedSystem | None
+    end: SteadyEnd | None
+    error: float
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        motion, end, reduced = self.motion, self.end, self.reduced
+        names = [force.name or f"node {force.node}" for force, _ in motion.bearings]
+        ranges = _ranges(motion) if end is None else end.eccentricity
+        return plain(
+            {
+                "time_s": motion.time,
+                "speed_rad_s": motion.speed,
+                "angle_rad": motion.turned,
+                "positions_m": {
+                    str(node): [[z.real, z.imag] for z in motion.z[:, i].tolist()]
+                    for i, node in enumerate(motion.nodes)
+                },
+                "steady": end and end.steady,
+                "periodic": end and end.periodic,
+                "period": end and end.period,
+                "whirl_ratio": end and end.whirl_ratio,
+                "whirl_frequency_rad_s": end and end.frequency,
+                "amplitude_m": end and dict(zip(map(str, motion.nodes), end.amplitude.tolist(), strict=True)),
+                "eccentricity": dict(zip(names, ranges.tolist(), strict=True)),
+                "multipliers": None,
+                "steps": motion.steps,
+                "tolerance": motion.tolerance,
+                "position_error": self.error,
+                "reduction": reduced
+                and {
+                    "modes": reduced.modes,
+                    "first_left_out_rad_s": reduced.first_left_out,
+                    "frequency_error": reduced.error,
+                },
+                "warnings": self.warnings,
+            }
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row a sample: time, speed, angle, deflections."""
+        import numpy as np
+
+        motion = self.motion
+        places = [
+            Column(f"{axis}_{node}_um", 1e6 * part)
+            for node, z in zip(motion.nodes, motion.z.T, strict=True)
+            for axis, part in (("x", z.real), ("y", z.imag))
+        ]
+        return frame(
+            (
+                Column("t_s", motion.time),
+                Column("speed_rpm", motion.speed * RPM),
+                Column("angle_deg", np.degrees(motion.turned)),
+                *places,
+            )
+        )
+
+    @property
+    def answer(self) -> Answer:
+        """What it has come to or where it was largest, and each node; how it was found."""
+        motion = self.motion
+        tables = [text(self._largest(), width=COLUMNS)]
+        if motion.bearings:
+            tables.append(text(self._eccentricities(), width=COLUMNS))
+        return Answer(self._judgement(), "\n\n".join(tables), self.warnings, self._notes())
+
+    def _judgement(self) -> str:
+        end, motion = self.end, self.motion
+        if end is None:
+            first, last = motion.speeds
+            if first == last:
+                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say more."
+            size = abs(motion.z)
+            k, i = divmod(int(size.argmax()), len(motion.nodes))
+            return (
+                f"From {rpm_text(first)} to {rpm_text(last)} in {figures(motion.time[-1])} s: furthest from "
+                f"the line of bearings at node {motion.nodes[i]}, {figures(1e6 * size[k, i])} µm at "
+                f"{rpm_text(motion.speed[k])}."
+            )
+        where = f"At {rpm_text(end.speed)}"
+        if end.at_rest:
+            return f"{where} it comes to rest."
+        if not end.steady:
+            return (
+                f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: amplitude or mean still "
+                f"change by {percent(end.change)} % within its last tenths; give it more --time."
+            )
+        whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
+        if end.speed:
+            way = ", against the rotation" if end.frequency < 0 else ""
+            whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
+        unit = " s" if not end.speed else " turn" if round(end.period, 3) == 1 else " turns"
+        again = f"comes again every {end.period:.5g}{unit}" if end.periodic else "does not come again"
+        return f"{where} the motion is steady and {again}; {whirl}."
+
+    def _largest(self) -> tuple[Column, ...]:
+        """A row for each node: where it was furthest from the line of bearings, and what the end is."""
+        import numpy as np
+
+        motion, end = self.motion, self.end
+        size = abs(motion.z)
+        at = size.argmax(axis=0)
+        columns = (
+            Column("node", motion.nodes, str),
+            Column("largest_m", 1e6 * size[at, np.arange(at.size)], figures, "furthest, µm"),
+            Column("at_s", motion.time[at], figures, "at, s"),
+            Column("at_rpm", motion.speed[at] * RPM, "{:.6g}".format, "at, rpm"),
+        )
+        if end is None:
+            return columns
+        return (
+            *columns,
+            Column("amplitude", 1e6 * end.amplitude, figures, "at the end: amplitude, µm"),
+            Column("x", 1e6 * end.mean.real, figures, "mean x, µm"),
+            Column("y", 1e6 * end.mean.imag, figures, "mean y, µm"),
+        )
+
+    def _eccentricities(self) -> tuple[Column, ...]:
+        """A row for each bearing: of the whole motion, or of its end."""
+        motion, end = self.motion, self.end
+        least, most = (_ranges(motion) if end is None else end.eccentricity).T
+        when = "" if end is None else "at the end "
+        return (
+            Column("bearing", [force.name or f"node {force.node}" for force, _ in motion.bearings], str),
+            Column("least", least, "{:.4f}".format, f"eccentricity {when}from"),
+            Column("most", most, "{:.4f}".format, "to"),
+        )
+
+    def _notes(self) -> tuple[str, ...]:
+        motion, reduced = self.motion, self.reduced
+        found = (
+            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; "
+            f"positions differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
+        )
+        if reduced is None:
+            return found
+        return (
+            *found,
+            f"of the rotor {counted(reduced.system.size, 'unknown')} move, {counted(reduced.modes, 'mode')} "
+            f"among them; natural frequencies without films are high by {percent(reduced.error)} % at most",
+        )
+
+    def figure(self, view: View = "motion") -> Figure:
+        """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""
+        from rotorid.motion.motion_pictures import FIGURES
+
+        one_of(view, "view", get_args(View))
+        return FIGURES[view](self.motion)
+
+
+@workflow
+def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Motion:
+    """Follow the motion of a rotor or a small model in time.
+
+    Parameters
+    ----------
+    model
+        A rotor, a rotor table, a rotor file, or a small model or its file.
+    options
+        Speed and time, and what differs from the defaults.
+
+    Raises
+    ------
+    ValueError
+        For a model or options that cannot be; where a journal touches its wall, with time and node.
+    """
+    import numpy as np
+
+    from rotorid.motion.run import run
+    from rotorid.motion.start import begin
+    from rotorid.motion.steady_end import LEAST_SAMPLES, steady_end
+
+    ends, time = _course(options)
+    direction = degrees(options.gravity_direction, "--gravity-direction")
+    source = moving(model, options.unbalance, options.bow, direction)
+    low, high = min(ends), max(ends)
+    system = source.system(low, high if high > low else low * (1 + 1e-6) + 1e-9)
+    shown = _shown(source, system, options.sensors)
+    shift = {source.node(node): by for node, by in _displaced(options.displaced).items()}
+    with phase("equations"):
+        reduced = _reduced(system, sorted({*shown, *shift, *_loaded(system)}), options.modes)
+        system = system if reduced is None else reduced.system
+    tolerance = options.tolerance
+    with phase("start"):
+        start = begin(system, ends[0], options.start, shift, tolerance)
+    with phase("motion"):
+        found, rough = (
+            run(system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate, tolerance=one)
+            for one in (tolerance, min(_LOOSER * tolerance, 1e-2))
+        )
+    if found.stopped:
+        raise ValueError(f"{found.stopped} (--time {0.999 * found.time[-1]:.4g} shows the motion until then)")
+    k = min(found.time.size, rough.time.size)
+    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / (np.abs(found.z).max() or 1.0))
+    constant = ends[0] == ends[1] and found.time.size >= LEAST_SAMPLES
+    return Motion(
+        motion=found,
+        reduced=reduced,
+        end=steady_end(found) if constant else None,
+        error=error,
+        warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
+        provenance=provenance(source.files, options),
+    )
+
+
+def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
+    """First and last speed, rad/s, and the time between them, s."""
+    if (options.speed is None) == (options.run_up is None):
+        raise ValueError("one of --speed and --run-up is needed")
+    if options.speed is not None:
+        speed = one_speed(options.speed, "--speed")
+        if options.acceleration is not None:
+            raise ValueError("--acceleration belongs to --run-up")
+        ends = (speed, speed)
+    else:
+        given = options.run_up or ""
+        found = speeds(given.replace(":", ",") if isinstance(given, str) else given, what="--run-up")
+        if len(found) != 2 or found[0] == found[1]:
+            raise ValueError(
+                f"--run-up {options.run_up!r}: use FIRST:LAST, two different speeds: 500:9000rpm"
+            )
+        ends = (found[0], found[1])
+    if (options.time is None) == (options.acceleration is None):
+        raise ValueError("--time is needed" + (", or --acceleration" if options.run_up is not None else ""))
+    if options.time is None:
+        return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
+    time = number(str(options.time).strip().removesuffix("s"))
+    if not 0 < time < FASTEST:
+        raise ValueError(f"--time {options.time!r}: seconds above 0 are needed, such as 2s")
+    return ends, time
+
+
+def _acceleration(given: str | float) -> float:
+    """Read "300rpm/s", rad/s²."""
+    if not isinstance(given, str):
+        value = given
+    elif given.strip().endswith("/s"):
+        value = one_speed(given.strip().removesuffix("/s"), "--acceleration")
+    else:
+        raise ValueError(f"--acceleration {given!r}: a speed a second is needed, such as 300rpm/s or 5Hz/s")
+    if not value > 0:
+        raise ValueError(
+            f"--acceleration {given!r} must be above 0; the speeds tell whether it goes up or down"
+        )
+    return value
+
+
+def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[int, ...]:
+    """Nodes whose motion is told."""
+    import numpy as np
+
+    walled = [force.node for force in system.forces if np.isfinite(force.wall)]
+    if given is not None:
+        return tuple(dict.fromkeys([*(source.node(node) for node in nodes(given, "--sensors")), *walled]))
+    stations = list(getattr(source.model, "stations", {}))
+    supports = [support.node for support in source.model.supports]
+    chosen = (
+        {*map(source.node, stations), *walled, *supports} if stations or len(system.nodes) > _SMALL else ()
+    )
+    return tuple(sorted(chosen)) or system.nodes
+
+
+def _displaced(given: str | Mapping[str, complex] | None) -> dict[str, complex]:
+    """Read "7=20um@90" as x + iy in m, by node."""
+    import numpy as np
+
+    def read(_: str, value: str) -> complex:
+        size, _, angle = value.partition("@")
+        length = quantity(size, "--displaced", units.LENGTH, "20um")
+        return complex(length * np.exp(1j * np.radians(degrees(angle or "0", "--displaced"))))
+
+    return pairs(given or {}, "--displaced", read, "7=20um@90")
+
+
+def _loaded(system: MotionSystem) -> list[int]:
+    """Nodes with unbalance, unless they are too many."""
+    found = [node for node in system.nodes if system.unbalance[system.index(node)[0]]]
+    return found if len(found) <= _SMALL // 2 else []
+
+
+def _reduced(system: MotionSystem, kept: Sequence[int], modes: int | None) -> ReducedSystem | None:
+    from rotorid.motion.reduced_system import reduced_system
+
+    return reduced_system(system, kept, modes) if modes is not None or system.size > _SMALL else None
+
+
+def _ranges(found: MotionRun) -> FloatArray:
+    """Least and largest eccentricity of each bearing in the whole motion, shape (b, 2)."""
+    import numpy as np
+
+    sizes = [np.abs(found.z[:, i]) / force.wall for force, i in found.bearings]
+    return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
+
+
+def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
+    said = []
+    if error > _UNSURE:
+        said.append(
+            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of the largest "
+            "deflection: where a rotor whips, amplitude and frequency of the whirl count, not its phase"
+        )
+    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
+        said.append("nothing excites it: no unbalance, no bow (--unbalance)")
+    return tuple(said)

@@ -1,0 +1,194 @@
+"""`periodic`: periodic motion of a rotor over speed, its stability and bifurcations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.result import frame, text
+from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.text import listing
+from rotorid.workflows.motion.moving_system import Moving, Table, moving
+from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
+from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from fem import Rotor
+    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.periodic_table import Readings
+    from rotorid.motion.small_model import SmallModel
+    from rotorid.motion.system import MotionSystem
+
+_MOST_STEPS = 4096
+_SMALL = 24
+"""Unknowns above which a rotor is reduced."""
+
+
+@dataclass(frozen=True)
+class PeriodicOptions:
+    """Options of `periodic`.
+
+    Attributes
+    ----------
+    speeds : A:B
+        Range of speeds, 1000:9000rpm.
+    sensors : LIST
+        Nodes or stations with angles from x in degrees, 2:45,22:45; default: where forces that are not linear
+        act, in x.
+    subsynchronous : K
+        Also motions that repeat after K revolutions.
+    limit_cycle
+        Also self-excited motions with a period of their own; of a rotor without unbalance.
+    steps : N
+        Steps in time of one revolution or cycle; default: 16 or more, as the motion needs them.
+    gravity_direction : DEGREES
+        Where gravity points, from x with the rotation; default: -90, to -y.
+    """
+
+    speeds: Band
+    sensors: str | Sequence[Sensor] | None = None
+    subsynchronous: int | None = None
+    limit_cycle: bool = False
+    steps: int | None = None
+    gravity_direction: float = -90.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PeriodicMotions(Outcome):
+    """Branches of periodic motion as sensors read them."""
+
+    readings: Readings
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON types, without the provenance."""
+        return self.readings.to_dict()
+
+    @property
+    def answer(self) -> Answer:
+        """Where the motion is stable, and the bifurcations; behind it the branches."""
+        bifurcations, motion = self.readings.bifurcations(), self.readings.motion
+        told = [self._judgement(k) for k in range(len(motion.branches))]
+        return Answer(
+            "\n".join(told),
+            text(bifurcations, width=COLUMNS) if bifurcations[0].values else "No bifurcation.",
+            motion.warnings,
+            tuple(
+                f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
+                f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
+                for speed, at, to in self.readings.jumps
+            ),
+        )
+
+    def _judgement(self, k: int) -> str:
+        branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
+        low, high = min(branch.speeds), max(branch.speeds)
+        parts = [
+            f"{low * RPM:.6g} to {rpm_text(high)}"
+            for stable, low, high in _ranges(branch.speeds, branch.stable)
+            if stable
+        ]
+        where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
+        where = "stable throughout" if branch.stable.all() else where
+        return (
+            f"{k + 1} {branch.kind}, {range_text(low, high)}, up to {sizes.max():.4g} µm at "
+            f"{self.readings.labels[0]}: {where}."
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per point of a branch."""
+        return frame(self.readings.points())
+
+    def figure(self) -> Figure:
+        """The bifurcation diagram."""
+        from rotorid.base.plot_style import on_figure
+        from rotorid.motion.bifurcation_diagram import draw_bifurcations
+
+        return on_figure(lambda ax: draw_bifurcations(self.readings, ax), height=4.6)
+
+
+def _ranges(speeds: FloatArray, stable: Sequence[bool]) -> list[tuple[bool, float, float]]:
+    """Stretches of a branch with the same stability, and their speeds."""
+    found: list[tuple[bool, float, float]] = []
+    for speed, steady in zip(speeds, stable, strict=True):
+        if found and found[-1][0] == steady:
+            _, low, high = found.pop()
+            found.append((steady, min(low, speed), max(high, speed)))
+        else:
+            found.append((bool(steady), speed, speed))
+    return found
+
+
+@workflow
+def periodic(
+    model: Rotor | SmallModel | Path | str,
+    options: PeriodicOptions,
+    unbalance: Table | None = None,
+    bow: Table | None = None,
+) -> PeriodicMotions:
+    """Find periodic motions of a rotor over a range of speeds, their stability and bifurcations.
+
+    Parameters
+    ----------
+    model
+        A rotor, a rotor table or file, or a small model.
+    options
+        The speeds, and what differs from the defaults.
+    unbalance, bow
+        Of a rotor: tables, or kg·m and m by node.
+
+    Raises
+    ------
+    ValueError
+        For a model or an option that cannot be, and where no periodic motion is found.
+    """
+    import numpy as np
+
+    from rotorid.motion.periodic import periodic_motion
+    from rotorid.motion.periodic_table import Readings
+    from rotorid.motion.reduced_system import reduced_system
+
+    low, high = band(options.speeds, "--speeds") or (0.0, 0.0)
+    if low <= 0:
+        raise ValueError("--speeds: periodic motion needs a turning rotor, so speeds above 0")
+    if options.subsynchronous is not None and not 2 <= options.subsynchronous <= 12:
+        raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 12")
+    if options.steps is not None and not 4 <= options.steps <= _MOST_STEPS:
+        raise ValueError(f"--steps takes a whole number from 4 to {_MOST_STEPS}")
+    what = moving(model, unbalance, bow, degrees(options.gravity_direction, "--gravity-direction"))
+    full = what.system(low, high)
+    labels, sensed = _sensors(what, full, options.sensors)
+    mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
+    kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
+    system = full if full.size <= _SMALL else reduced_system(full, kept).system
+    directions = np.zeros((len(sensed), system.size))
+    for row, (node, angle) in zip(directions, sensed, strict=True):
+        row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    with phase("periodic motion"):
+        motion = periodic_motion(
+            system,
+            low,
+            high,
+            subsynchronous=options.subsynchronous,
+            limit_cycle=options.limit_cycle,
+            steps=options.steps,
+        )
+    return PeriodicMotions(
+        readings=Readings(motion, labels, directions), provenance=provenance(what.files, options)
+    )
+
+
+def _sensors(
+    what: Moving, system: MotionSystem, given: str | Sequence[Sensor] | None
+) -> tuple[tuple[str, ...], list[tuple[int, float]]]:
+    """Names of the sensors, their nodes and angles, degrees."""
+    nodes = dict.fromkeys(force.node for force in system.forces) or dict.fromkeys(system.nodes)
+    places = [*nodes] if given is None else sensors(given)
+    both = [place if isinstance(place, tuple) else (place, 0.0) for place in places]
+    labels = tuple(f"{name}" if angle == 0 else f"{name}:{angle:g}" for name, angle in both)
+    return labels, [(what.node(name), angle) for name, angle in both]
