@@ -132,6 +132,8 @@ def run(
         raise ValueError("time must be above 0 s")
     if not 1e-13 <= tolerance <= 1e-2:
         raise ValueError(f"tolerance must be from 1e-13 to 1e-2, not {tolerance:g}")
+    for speed in (first, last):
+        system.linear(speed)  # refuses what lies outside the knots
     _check_journals(system, first, last)
     reference = max(first, last) or 2 * np.pi / time
     rate = A_TURN * reference / (2 * np.pi) if rate is None and max(first, last) else rate or 10_000 / time
