@@ -120,7 +120,7 @@ def _at_the_line(
 ) -> None:
     """Add what the ends of the film at the line of centres count, and where u < 0 the change of its force.
 
-    There q = e / c, w = e' and u = −s / e with s = x b − y a; |u| in place of u adds −g s (x, y) to the force,
+    There q = e / c, w = e', u = −s / e with s = x b − y a; |u| in place of u adds −g s (x, y) to the force,
     g = 4 C / (c e k⁴).
     """
     e2 = x * x + y * y
