@@ -105,14 +105,15 @@ class Orbit:
         moved = self.step * np.abs(np.einsum("l,ilk->ik", _HIGHEST, self.velocities))
         return float((moved / self.scale[: self.start.size]).max())
 
-    def finer(self) -> Orbit:
-        """The same in steps half as long."""
-        v = self.velocities
+    def resampled(self, count: int) -> Orbit:
+        """The same in so many steps."""
+        N, v = len(self.velocities), self.velocities
         known = np.concatenate([np.roll(v[:, -1:], 1, axis=0), v], axis=1)
-        from_known = np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
-        halves = [np.vander(x, _S + 1, increasing=True) @ from_known for x in (POINTS / 2, POINTS / 2 + 0.5)]
-        both = np.stack([np.einsum("jl,ilk->ijk", half, known) for half in halves], axis=1)
-        return replace(self, velocities=both.reshape(-1, *v.shape[1:]))
+        at = (np.arange(count)[:, None] + POINTS) * (N / count)
+        step = np.ceil(at - 1e-9).astype(int) - 1
+        powers = np.vander((at - step).ravel(), _S + 1, increasing=True).reshape(count, _S, _S + 1)
+        weights = powers @ np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
+        return replace(self, velocities=np.einsum("ijl,ijlk->ijk", weights, known[step]))
 
     def readings(self, directions: FloatArray, count: int = 2048) -> FloatArray:
         """What sensors read over one period, shape (count, k), of directions (k, n)."""

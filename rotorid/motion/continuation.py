@@ -13,7 +13,7 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
-_MOST_STEPS, _MOST_POINTS = 256, 1500  # steps in a revolution or cycle
+_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -296,10 +296,16 @@ def _root(test: Callable[[float], float], length: float) -> float:
 def _solved(
     problem: Periodic, guess: Orbit, rows: FloatArray, values: FloatArray, fixed: bool
 ) -> tuple[Linearised, int]:
-    """A solution, its steps in time short enough."""
+    """A solution, its steps in time short enough, and longer again where they may be."""
+    steps, turns = len(guess.velocities), max(problem.turns, 1)
+    if not fixed and guess.roughness < _ROUGH / 100 and steps >= 2 * _LEAST_STEPS * turns:
+        guess = guess.resampled(steps // 2)
     at, iterations = problem.solve(guess, rows, values)
-    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS * max(problem.turns, 1):
-        at, _ = problem.solve(at.orbit.finer(), rows, values)
+    while not fixed and at.orbit.roughness > _ROUGH:
+        steps = 2 * len(at.orbit.velocities)
+        if steps > _MOST_STEPS * turns:
+            break
+        at, _ = problem.solve(at.orbit.resampled(steps), rows, values)
     return at, iterations
 
 

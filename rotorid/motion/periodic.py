@@ -298,7 +298,7 @@ def _doubts(branches: list[Branch]) -> list[str]:
         worst = max(point.orbit.roughness for point in branch.points)
         if worst > _COARSE:
             said.append(
-                f"the {branch.kind} branch has too few steps in time: {percent(worst)} of its motion may be wrong "
-                "(--steps)"
+                f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be "
+                "wrong (--steps)"
             )
     return said
