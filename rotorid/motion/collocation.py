@@ -105,6 +105,16 @@ class Orbit:
         moved = self.step * np.abs(np.einsum("l,ilk->ik", _HIGHEST, self.velocities))
         return float((moved / self.scale[: self.start.size]).max())
 
+    def repeats(self, turns: int) -> bool:
+        """Whether a motion of so many revolutions is one of fewer."""
+        ends, N = self.ends[:-1], len(self.velocities)
+        away = [
+            np.abs((ends - np.roll(ends, N // turns * k, axis=0)) / self.scale[: self.start.size]).max()
+            for k in range(1, turns)
+            if turns % k == 0
+        ]
+        return bool(away) and min(away) < 0.02
+
     def resampled(self, count: int) -> Orbit:
         """The same in so many steps."""
         N, v = len(self.velocities), self.velocities

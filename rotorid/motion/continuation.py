@@ -131,15 +131,20 @@ def follow(
     walk = _Walk(problem, low, high, fixed_steps, kind)
     tangent = walk.unit(at, at.change(start.rows, np.eye(len(start.rows))[-1], left=0.0))
     points, found, length = [walk.point(at)], list[Bifurcation](), _LONGEST / 4
-    origin, smallest, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
+    origin, first, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
     while not ended:
         try:
             new, new_tangent, iterations, length = walk.step(at, tangent, length)
-            found += walk.passed(at, tangent, new, new_tangent, length, len(points))
+            passed = walk.passed(at, tangent, new, new_tangent, length, len(points))
         except np.linalg.LinAlgError as problem_met:
             length /= 2
             ended = f"stopped: {problem_met}" if length < _SHORTEST else ""
             continue
+        if joined := [one.point for one in passed if walk.ends(one.point.orbit, first)]:
+            points += joined
+            ended = "joins the motion that it comes from"
+            break
+        found += passed
         points.append(walk.point(new))
         at, tangent = new, new_tangent
         away = walk.weights(at) * (problem.unknowns(at.orbit) - origin)
@@ -147,8 +152,6 @@ def follow(
             ended = "end of the range of speeds"
         elif len(points) > 20 and np.linalg.norm(away) < length:
             ended = "closed"
-        elif not problem.turns and (at.orbit.scale < smallest / 2).all():
-            ended = "the cycle dies out"
         elif _at_wall(problem, at.orbit):
             ended = "stopped: a node is at its wall"
         elif len(points) >= _MOST_POINTS:
@@ -225,6 +228,13 @@ class _Walk:
                 float(rows[-1] @ (self.problem.unknowns(new.orbit) - y)),
             )
         return new, onwards, iterations, length
+
+    def ends(self, orbit: Orbit, first: FloatArray) -> bool:
+        """Whether a motion is that of fewer revolutions, or rest; `first` is the size of the first motion."""
+        if self.problem.turns:
+            return orbit.repeats(self.problem.turns)
+        moved = np.ptp(orbit.ends, axis=0)
+        return bool((moved < 0.1 * first[: moved.size]).all())
 
     def point(self, at: Linearised) -> Point:
         """What is kept of a solution."""
