@@ -172,6 +172,7 @@ class _Search:
 
     def known(self, orbit: Orbit, branches: list[Branch]) -> bool:
         """Whether a branch comes through this motion, or through the same some revolutions later."""
+        size = orbit.scale[: orbit.start.size]
         for branch in branches:
             later = orbit.ends[:-1][:: len(orbit.velocities) // max(branch.turns, 1)]
             states = (
