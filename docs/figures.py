@@ -179,6 +179,13 @@ GALLERY = (
         "the probe DE near 5500 rpm.",
     ),
     Picture(
+        "bearings",
+        "rotors",
+        "bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm",
+        "The journals rise with the speed, aside with the rotation; a rigid rotor would be stable nearly up "
+        "to 9000 rpm, this one, which bends, up to 6407 rpm.",
+    ),
+    Picture(
         "reduction",
         "reduction",
         f"{THREE} --modes 2",

@@ -29,7 +29,14 @@ ANSWERS = (
         "split-holes",
     ),
     *("split-drill", "trial-weight", "tolerance", "critical-rotor23", "campbell-compressor"),
-    *("response-compressor", "influence-compressor", "reduce-report", "reduce-rank", "identify-task_5_1"),
+    *(
+        "response-compressor",
+        "influence-compressor",
+        "bearings",
+        "reduce-report",
+        "reduce-rank",
+        "identify-task_5_1",
+    ),
     *(
         "identify-task_4_1",
         "identify-two-models",

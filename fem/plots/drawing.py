@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fem.model.node_forces import FORCES, kind_of
 from fem.model.rotor import Disc, Rotor, Support
 from fem.model.sensors import SensorLike, as_sensor, label
 from fem.model.supports import KINDS
@@ -36,7 +37,8 @@ def draw_rotor(
     Lengths are in m, radii in mm. A disc with moments of inertia is drawn as the solid steel-like disc
     that has the same mass and moments; a mass without them is a point of an area in proportion to it. A
     bearing is a triangle that holds the shaft at its tip, coloured if it has damping, on a block if it stands
-    on a pedestal; a seal is a comb above and below the shaft.
+    on a pedestal; a seal is a comb above and below the shaft. Forces that are not linear have marks of
+    their own colour below it: films a triangle, others a diamond.
 
     Parameters
     ----------
@@ -78,6 +80,7 @@ def draw_rotor(
     _masses(rotor, ax)
     for each in KINDS:
         _supports(rotor, [s for s in rotor.supports if s.kind == each.name], each.name, ax, scale)
+    _forces(rotor, ax, scale)
     span = float(rotor.positions[-1])
     halves = [(rotor.positions[d.node - 1], max(_solid(d)[1], 0.004 * span) / 2) for d in discs]
     left, right = min([0.0, *(x - w for x, w in halves)]), max([span, *(x + w for x, w in halves)])
@@ -175,6 +178,25 @@ def _supports(rotor: Rotor, supports: Sequence[Support], kind: str, ax: Axes, sc
                 linewidth=width,
                 zorder=4,
                 label=named,
+            )
+
+
+def _forces(rotor: Rotor, ax: Axes, scale: float) -> None:
+    """Those that are not linear, where they touch the shaft from below."""
+    film, seal = _triangle(), _comb(-1)
+    marks: dict[str, Any] = {"journal_bearing": film, "squeeze_film": film, "annular_seal": seal}
+    for number, kind in enumerate(method.name for method in FORCES):
+        nodes = [force.node - 1 for force in rotor.forces if kind_of(force) == kind]
+        if nodes:
+            ax.scatter(
+                rotor.positions[nodes],
+                -scale * radii(rotor)[nodes],
+                marker=marks.get(kind, "D"),
+                s=200 if kind in marks else 50,
+                facecolor=COLORS[number],
+                edgecolor=SUPPORT,
+                zorder=4.2,
+                label=f"{kind.replace('_', ' ')}{'s' if len(nodes) > 1 else ''}",
             )
 
 

@@ -62,7 +62,7 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "periodic": periodic.periodic,
     },
     "Make a small model": {"reduce": reduce.reduce},
-    "Move on films and seals": {"bearings": bearings.bearings, "motion": motion.motion},
+    "Bearings and motion": {"bearings": bearings.bearings, "motion": motion.motion},
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,

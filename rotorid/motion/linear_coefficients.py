@@ -10,11 +10,11 @@ import numpy as np
 import fem
 from fem.model.node_forces import SqueezeFilm, Stop, kind_of
 from rotorid.base.arrays import FloatArray
-from rotorid.motion.equilibrium import Equilibrium, each_force, equilibrium
+from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria
 from rotorid.motion.system import MotionSystem
 
-_ROUNDS = 4
-_CONVERGED = 1e-7
+_AROUND = (2e-2, 1e-3, 1e-4)
+"""How far from the threshold, by its speed, the equilibria beside it are, time after time."""
 
 
 def coefficients(found: Sequence[Equilibrium]) -> tuple[FloatArray, FloatArray]:
@@ -66,16 +66,15 @@ def linear_rotor(rotor: fem.Rotor, found: Sequence[Equilibrium]) -> fem.Rotor:
 def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibrium]) -> fem.Stability:
     """Where the linear rotor loses stability, between the speeds of two equilibria or more.
 
-    Coefficients are linear between these speeds; the equilibrium at the threshold is added to them until the
-    threshold stays where it is.
+    Coefficients are linear between these speeds; equilibria near the threshold are added, nearer each time.
     """
-    known, last = list(found), np.nan
-    for _ in range(_ROUNDS):
+    known = list(found)
+    for share in (*_AROUND, None):
         stable = fem.stability_threshold(linear_rotor(rotor, known), known[-1].speed, lowest=known[0].speed)
-        speed = stable.threshold
-        if speed is None or abs(speed - last) <= _CONVERGED * speed or speed in {one.speed for one in known}:
+        if stable.threshold is None or share is None:
             break
-        last = speed
-        near = min(known, key=lambda one: abs(one.speed - last))
-        known = sorted([*known, equilibrium(system, speed, near.q)], key=lambda one: one.speed)
+        beside = {stable.threshold * (1 - share), stable.threshold * (1 + share)}
+        added = [speed for speed in beside if found[0].speed < speed < found[-1].speed]
+        every = {one.speed: one for one in (*found, *equilibria(system, added))}
+        known = [every[speed] for speed in sorted(every)]
     return stable

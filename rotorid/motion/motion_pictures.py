@@ -1,4 +1,4 @@
-"""Pictures of a motion in time: time and spectrum, orbits with phase marks, run-up beside the steady response."""
+"""Pictures of a motion: over time with spectrum, orbits with phase marks, run-up beside steady response."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from rotorid.base.plot_style import (
     note,
     plain,
 )
-from rotorid.base.rpm import RPM, rpm_text
+from rotorid.base.rpm import RPM
 from rotorid.motion.run import MotionRun
 from rotorid.motion.start import steady_linear
 from rotorid.motion.synchronous_part import synchronous_part
@@ -32,10 +32,11 @@ if TYPE_CHECKING:
 _TURNS = 12
 """Turns of an orbit that is drawn."""
 _LARGEST_ORDER = 4.0
-_STEADY = 200
+_STEADY = 600
 """Speeds of the steady response."""
 _PANELS = 4
-_SHORT = 0.25
+_MARKED = 0.3
+"""Of the largest vector: smaller ones have no speed written beside them."""
 
 
 def motion_figure(motion: MotionRun) -> Figure:
@@ -61,18 +62,21 @@ def orbits_figure(motion: MotionRun) -> Figure:
     shown = range(min(len(motion.nodes), _PANELS))
     columns = min(2, len(shown))
     rows = -(-len(shown) // columns)
-    figure = new_figure(0.6 + 3.3 * rows)
+    figure = new_figure(0.9 + 3.2 * rows)
     walls = {force.node: 1e6 * force.wall for force, _ in motion.bearings}
     for i in shown:
         ax = figure.add_subplot(rows, columns, i + 1)
         _draw_orbit(motion, i, ax)
         if wall := walls.get(motion.nodes[i]):
+            ax.axhline(0, color=QUIET, linewidth=0.5)
+            ax.axvline(0, color=QUIET, linewidth=0.5)
             turn = wall * np.exp(1j * np.linspace(0, 2 * np.pi, 181))
             ax.plot(turn.real, turn.imag, color=DARK, linewidth=1.2)
             note(ax, "clearance", (0.0, wall), (0, 2), color=DARK, ha="center")
         ax.set(xlabel="x, µm", ylabel="y, µm", title=f"node {motion.nodes[i]}")
         ax.set_aspect("equal", adjustable="datalim")
         plain(ax)
+    legend_below(figure, figure.axes)
     return figure
 
 
@@ -88,7 +92,7 @@ def bode_figure(motion: MotionRun) -> Figure:
         ):
             above.plot(at * RPM, 1e6 * np.abs(value), style, color=color, label=words)
             phase = np.degrees(np.unwrap(np.angle(value)))
-            phase -= 360 * np.round(phase[: 1 + phase.size // 8].mean() / 360) if phase.size else 0.0
+            phase -= 360 * np.round(phase[-1:] / 360)
             below.plot(at * RPM, phase, style, color=color)
     above.set(ylabel="1× of x, µm", ylim=(0, None))
     below.set(xlabel="speed, rpm", ylabel="phase lead, °")
@@ -106,11 +110,10 @@ def polar_figure(motion: MotionRun) -> Figure:
         color, name = look(i)["color"], f"node {motion.nodes[i]}"
         ax.plot(1e6 * X.real, 1e6 * X.imag, "-", color=color, label=name)
         ax.plot(1e6 * steady.real, 1e6 * steady.imag, ":", color=color, label=f"{name}, steady, linear")
-        for k in _marked(X):
-            ax.plot(1e6 * X[k].real, 1e6 * X[k].imag, "o", color=color, markersize=4)
-            if i == 0:
-                at = (1e6 * X[k].real, 1e6 * X[k].imag)
-                note(ax, rpm_text(speed[k]), at, (4, 3), bbox=BOX)
+        for k in _marked(X) if i == 0 else []:
+            at = (1e6 * X[k].real, 1e6 * X[k].imag)
+            ax.plot(*at, "o", color=color, markersize=4)
+            note(ax, f"{speed[k] * RPM:.4g} rpm", at, (4, 3), bbox=BOX)
     ax.axhline(0, color=GRID)
     ax.axvline(0, color=GRID)
     ax.set(xlabel="1× of x, cosine, µm", ylabel="sine, with phase lead upwards, µm")
@@ -162,9 +165,6 @@ def _draw_orbit(motion: MotionRun, i: int, ax: Axes) -> None:
     if z.size > 3 and marks.size and angle[-1] > angle[k]:
         at = CubicSpline(angle[k:], z)(marks)
         ax.plot(at.real, at.imag, "o", markersize=4, color=VERMILION, label="once a turn")
-        ax.legend(frameon=False, fontsize="small", loc="upper right")
-    ax.axhline(0, color=QUIET, linewidth=0.5)
-    ax.axvline(0, color=QUIET, linewidth=0.5)
 
 
 def _beside(motion: MotionRun) -> list[tuple[np.ndarray, ComplexArray, np.ndarray, ComplexArray]]:
@@ -178,7 +178,8 @@ def _beside(motion: MotionRun) -> list[tuple[np.ndarray, ComplexArray, np.ndarra
     return [(speed, X[:, i], at, response[:, column]) for i, column in enumerate(columns)][:_PANELS]
 
 
-def _marked(X: ComplexArray, count: int = 7) -> list[int]:
-    """Places evenly along a curve."""
+def _marked(X: ComplexArray, count: int = 9) -> list[int]:
+    """Places evenly along a curve, where it is far from the centre."""
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(X)))])
-    return [int(k) for k in np.searchsorted(way, np.linspace(0, way[-1], count)).clip(0, X.size - 1)]
+    places = np.searchsorted(way, np.linspace(0, way[-1], count)).clip(0, X.size - 1)
+    return [int(k) for k in places if abs(X[k]) > _MARKED * np.abs(X).max()]

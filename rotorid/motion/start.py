@@ -28,7 +28,7 @@ def at_rest(system: MotionSystem, speed: float) -> FloatArray:
 
 
 def steady_linear(
-    system: MotionSystem, speeds: Sequence[float]
+    system: MotionSystem, speeds: Sequence[float] | FloatArray
 ) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Steady response to unbalance and bow of the rotor made linear about its equilibrium at each speed.
 

@@ -36,8 +36,10 @@ class SteadyEnd:
         x + iy, m, shape (m,).
     amplitude
         Largest distance from the mean, m, shape (m,).
+    change
+        Of amplitude and mean from one half of this part to the other, by the amplitude.
     steady
-        Whether amplitude and mean stay as they are, to a thousandth of the amplitude.
+        Whether they stay as they are, to a thousandth.
     at_rest
         Whether nothing moves any more.
     frequency
@@ -55,6 +57,7 @@ class SteadyEnd:
     begins: float
     mean: ComplexArray
     amplitude: FloatArray
+    change: float
     steady: bool
     at_rest: bool
     frequency: float
@@ -99,7 +102,8 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
     means = [_hann_mean(half) for half in halves]
     sizes = [np.abs(half - mean).max(axis=0) for half in halves]
     change = max(np.abs(sizes[1] - sizes[0]).max(), np.abs(means[1] - means[0]).max())
-    steady = at_rest or bool(change <= _CHANGE * size[most])
+    change = float(change / (size[most] or 1.0))
+    steady = at_rest or change <= _CHANGE
     frequency = np.nan if at_rest else _strongest(t, z[:, most] - mean[most])
     period = np.nan if at_rest else _period(t, z[:, most] - mean[most], frequency, last, _forced(motion))
     return SteadyEnd(
@@ -107,6 +111,7 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
         begins=float(t[0]),
         mean=mean,
         amplitude=size,
+        change=change,
         steady=steady,
         at_rest=at_rest,
         frequency=frequency,

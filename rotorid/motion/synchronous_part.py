@@ -1,4 +1,4 @@
-"""The part of a motion that turns with the shaft (1×), turn by turn, by a slow filter."""
+"""The part of a motion that turns with the shaft (1×), by a slow filter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from rotorid.motion.run import MotionRun
 
 _LEAST = 8
 """Samples a turn that it needs."""
-_OF_A_TURN = 64
+_OF_A_TURN, _A_TURN = 64, 8
+"""Of these so many are told."""
 
 
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
@@ -43,14 +44,12 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         raise ValueError(
             f"{_LEAST} samples a turn are needed at least for the synchronous part: a higher rate"
         )
-    even = np.arange(whole * _OF_A_TURN) * (2 * np.pi / _OF_A_TURN)
-    turned = angle > 1e-9 * angle[-1]
-    turned[0] = True
-    turned[1:] &= np.diff(angle) > 0
-    x = CubicSpline(angle[turned], motion.z.real[turned])(even)
-    each = 2 * (x * np.exp(-1j * (motion.turned[0] + even))[:, None]).reshape(whole, _OF_A_TURN, -1).mean(
-        axis=1
-    )
-    total = np.concatenate([np.zeros((1, each.shape[1])), np.cumsum(each, axis=0)])
-    middle = 2 * np.pi * (np.arange(whole - turns + 1) + turns / 2)
-    return np.interp(middle, angle, motion.speed), (total[turns:] - total[:-turns]) / turns
+    even = np.arange(whole * _OF_A_TURN + 1) * (2 * np.pi / _OF_A_TURN)
+    rising = np.concatenate([[True], np.diff(angle) > 0])
+    x = CubicSpline(angle[rising], motion.z.real[rising])(even)
+    turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
+    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(turning, axis=0)])
+    width = turns * _OF_A_TURN
+    mean = (total[width:-1] - total[: -1 - width]) / width
+    each = slice(None, None, _OF_A_TURN // _A_TURN)
+    return np.interp(even[: len(mean)] + turns * np.pi, angle, motion.speed)[each], mean[each]

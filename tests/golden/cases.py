@@ -61,6 +61,7 @@ class Case:
 
 REFUSED_TARGETS = ("critical-two-into-one",)
 ROTOR23 = "sample_data/rotor23.csv"
+MOTION = "sample_data/motion/rotor.toml"
 COMPRESSOR = "sample_data/compressor/rotor.toml"
 RESPONSE = f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv"
 TURBO = "sample_data/turbo_job"
@@ -98,6 +99,9 @@ response-orbits             {RESPONSE} --speeds 4000:6000:500rpm {PROBES} --view
 response-report             {RESPONSE} --speeds 4000:10000:3000rpm {PROBES} --report response.html
 response-compressor         {RESPONSE} --speeds 1000:15000:50rpm {PROBES} --operating 5300:6500rpm --plot bode.png
 response-no-sensor          {RESPONSE} --speeds 5000rpm --sensors "prob DE:45"
+bearings                    bearings {MOTION} --speeds 1000:9000:500rpm --plot bearings.png
+bearings-linear             bearings {MOTION} --speeds 2000,5000rpm --gravity-direction -45 --output linear.toml
+bearings-at-rest            bearings {MOTION} --speeds 0:3000:1000rpm
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
@@ -313,6 +317,7 @@ COMMANDS = (
         "campbell",
         "response",
         "influence",
+        "bearings",
         "balance",
         "trial-weight",
         "split",

@@ -18,9 +18,10 @@ def bearings(rotor: RotorArgument, options: BearingsOptions, to: Destination) ->
     --output FILE.toml writes the rotor with bearing tables over speed, which critical, campbell, response
     and reduce read.
 
-    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm --plot bearings.png
+    Example: rotorid bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm
 
     Example: rotorid bearings sample_data/motion/rotor.toml --speeds 600:9000:100rpm --output linear.toml
+    --plot bearings.png
     """
     dataclasses.replace(to, output=None).deliver(
         "equilibrium",

@@ -1,4 +1,4 @@
-"""`motion`: motion in time of a rotor whose forces are not linear, at a speed or through a range of speeds."""
+"""`motion`: motion in time of a rotor whose forces are not linear, at a speed or through a range of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.json import plain
 from rotorid.base.result import Column, frame, text
-from rotorid.base.rpm import RPM, range_text, rpm_text
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import counted, figures, percent
 from rotorid.tables.reader import units
 from rotorid.workflows.motion.moving_system import moving
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from rotorid.motion.reduced_system import ReducedSystem
     from rotorid.motion.run import MotionRun
     from rotorid.motion.small_model import SmallModel
-    from rotorid.motion.start import Beginning
     from rotorid.motion.steady_end import SteadyEnd
     from rotorid.motion.system import MotionSystem
     from rotorid.workflows.motion.moving_system import Moving
@@ -131,10 +130,8 @@ class Motion(Outcome):
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
         motion, end, reduced = self.motion, self.end, self.reduced
-        bearings = {force.name or f"node {force.node}": motion.z[:, i] for force, i in motion.bearings}
-        walls = [force.wall for force, _ in motion.bearings]
-        whole = [[abs(z).min() / wall, abs(z).max() / wall] for z, wall in zip(bearings.values(), walls)]
-        ranges = whole if end is None else end.eccentricity.tolist()
+        names = [force.name or f"node {force.node}" for force, _ in motion.bearings]
+        ranges = _ranges(motion) if end is None else end.eccentricity
         return plain(
             {
                 "time_s": motion.time,
@@ -150,7 +147,7 @@ class Motion(Outcome):
                 "whirl_ratio": end and end.whirl_ratio,
                 "whirl_frequency_rad_s": end and end.frequency,
                 "amplitude_m": end and dict(zip(map(str, motion.nodes), end.amplitude.tolist(), strict=True)),
-                "eccentricity": dict(zip(bearings, ranges, strict=True)),
+                "eccentricity": dict(zip(names, ranges.tolist(), strict=True)),
                 "multipliers": None,
                 "steps": motion.steps,
                 "tolerance": motion.tolerance,
@@ -198,7 +195,7 @@ class Motion(Outcome):
         if end is None:
             first, last = motion.speeds
             if first == last:
-                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say what it comes to."
+                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say more."
             size = abs(motion.z)
             k, i = divmod(int(size.argmax()), len(motion.nodes))
             return (
@@ -210,17 +207,16 @@ class Motion(Outcome):
         if end.at_rest:
             return f"{where} it comes to rest."
         if not end.steady:
-            return f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: give it more --time."
+            return (
+                f"{where} it is NOT STEADY yet after {figures(motion.time[-1])} s: amplitude or mean still "
+                f"change by {percent(end.change)} % within its last tenths; give it more --time."
+            )
         whirl = f"the largest part of its motion has {abs(end.frequency) * RPM:.6g} cycles a minute"
         if end.speed:
             way = ", against the rotation" if end.frequency < 0 else ""
             whirl += f", {abs(end.whirl_ratio):.4f} of the speed{way}"
         unit = " s" if not end.speed else " turn" if round(end.period, 3) == 1 else " turns"
-        again = (
-            f"comes again every {end.period:.5g}{unit}"
-            if end.periodic
-            else "does not come again (up to 8 periods)"
-        )
+        again = f"comes again every {end.period:.5g}{unit}" if end.periodic else "does not come again"
         return f"{where} the motion is steady and {again}; {whirl}."
 
     def _largest(self) -> tuple[Column, ...]:
@@ -248,9 +244,7 @@ class Motion(Outcome):
     def _eccentricities(self) -> tuple[Column, ...]:
         """A row for each bearing: of the whole motion, or of its end."""
         motion, end = self.motion, self.end
-        size = [abs(motion.z[:, i]) / force.wall for force, i in motion.bearings]
-        least = [one.min() for one in size] if end is None else end.eccentricity[:, 0]
-        most = [one.max() for one in size] if end is None else end.eccentricity[:, 1]
+        least, most = (_ranges(motion) if end is None else end.eccentricity).T
         when = "" if end is None else "at the end "
         return (
             Column("bearing", [force.name or f"node {force.node}" for force, _ in motion.bearings], str),
@@ -261,23 +255,23 @@ class Motion(Outcome):
     def _notes(self) -> tuple[str, ...]:
         motion, reduced = self.motion, self.reduced
         found = (
-            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; positions "
-            f"differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
+            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; "
+            f"positions differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
         )
         if reduced is None:
             return found
         return (
             *found,
-            f"the rotor moves with {counted(reduced.system.size, 'unknown')}, {counted(reduced.modes, 'mode')} "
-            f"among them; its natural frequencies without films are high by {percent(reduced.error)} at most",
+            f"of the rotor {counted(reduced.system.size, 'unknown')} move, {counted(reduced.modes, 'mode')} "
+            f"among them; natural frequencies without films are high by {percent(reduced.error)} % at most",
         )
 
     def figure(self, view: View = "motion") -> Figure:
         """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""
-        from rotorid.motion import plots
+        from rotorid.motion.motion_pictures import FIGURES
 
         one_of(view, "view", get_args(View))
-        return plots.FIGURES[view](self.motion)
+        return FIGURES[view](self.motion)
 
 
 @workflow
@@ -330,7 +324,7 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
         reduced=reduced,
         end=steady_end(found) if constant else None,
         error=error,
-        warnings=(*start.warnings, *_warnings(found, error)),
+        warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
         provenance=provenance(source.files, options),
     )
 
@@ -416,14 +410,21 @@ def _reduced(system: MotionSystem, kept: Sequence[int], modes: int | None) -> Re
     return reduced_system(system, kept, modes) if modes is not None or system.size > _SMALL else None
 
 
-def _warnings(found: MotionRun, error: float) -> tuple[str, ...]:
+def _ranges(found: MotionRun) -> FloatArray:
+    """Least and largest eccentricity of each bearing in the whole motion, shape (b, 2)."""
+    import numpy as np
+
+    sizes = [np.abs(found.z[:, i]) / force.wall for force, i in found.bearings]
+    return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
+
+
+def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
     if error > _UNSURE:
         said.append(
-            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} of the largest deflection: "
-            "where a rotor whips, its phase is not determined, and its amplitude and frequency are what counts"
+            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of the largest "
+            "deflection: where a rotor whips, amplitude and frequency of the whirl count, not its phase"
         )
-    system = found.system
-    if not system.unbalance.any() and not system.bow.any():
+    if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
         said.append("nothing excites it: no unbalance, no bow (--unbalance)")
     return tuple(said)

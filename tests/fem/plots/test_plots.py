@@ -172,6 +172,16 @@ def whirl(criticals=()):
     )
 
 
+def test_forces_that_are_not_linear_are_drawn_where_they_stand():
+    film = {"length": 0.03, "diameter": 0.05, "clearance": 5e-5, "viscosity": 0.02}
+    forces = [fem.JournalBearing(1, **film), fem.Stop(2, stiffness=1e6), fem.JournalBearing(3, **film)]
+    rotor = fem.Rotor([0.4, 0.6], [0.05, 0.08], forces=forces)
+    ax = fem.draw_rotor(rotor)
+    assert labels(ax) == ["journal bearings", "stop"]
+    places = [marks.get_offsets().tolist() for marks in ax.collections]
+    assert places == [[[0.0, -25.0], [1.0, -40.0]], [[0.4, -40.0]]]
+
+
 def test_a_campbell_diagram_tells_directions_apart_without_colour():
     figure = campbell_figure(whirl([(380.95, 0.3), (421.05, 0.19)]), operating=(600, 700))
     above, below = figure.axes[:2]

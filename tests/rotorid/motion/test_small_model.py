@@ -56,7 +56,7 @@ def test_forces_at_kept_nodes_bend_it_as_the_whole_shaft():
 
 @pytest.mark.parametrize("three", [False, True])
 def test_bearings_carry_the_weight_that_they_carry_in_the_rotor(three):
-    """Of a shaft on three bearings, too, where statics alone does not say what each carries."""
+    """Of a shaft on three bearings, too, where the weight alone does not say what each carries."""
     supports = [fem.Support(2, 3e7), fem.Support(22, 5e7), *([fem.Support(10, 2e7)] if three else [])]
     rotor = replace(rotor23(), supports=supports)
     full, model = static_deflection(rotor), reduced(rotor)

@@ -146,7 +146,7 @@ def any_force(kind):
         if item.type == "float":
             sizes[name] = SIZES if name in kind.above_zero else st.just(0.0) | SIZES
         if name.endswith("exponent"):
-            sizes[name] = st.floats(0, 10)
+            sizes[name] = st.just(0.0) | st.floats(1e-6, 10)
     if kind is fem.Stop:
         sizes["diameter"] = SIZES
     if kind is fem.JournalBearing:

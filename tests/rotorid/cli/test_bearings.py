@@ -1,0 +1,161 @@
+"""`rotorid bearings`: what it prints, writes, draws and refuses."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import fem
+from fem.model.node_forces import CubicSpring, JournalBearing, MuszynskaSeal, SqueezeFilm
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor, write_rotor
+from rotorid.workflows import BearingsOptions, bearings
+
+ROTOR = sample_data() / "motion" / "rotor.toml"
+SPEEDS = ("--speeds", "1000:9000:1000rpm")
+BEARING = {"length": 0.03, "diameter": 0.1, "clearance": 1e-4, "viscosity": 0.02}
+
+
+def shaft(forces, supports=()):
+    return fem.Rotor(length=[0.2] * 4, outer_diameter=0.08, forces=forces, supports=supports)
+
+
+def test_the_document_says_where_each_journal_is(cli):
+    found = cli("bearings", ROTOR, *SPEEDS, "--json").json
+    assert found["speeds_rad_s"] == pytest.approx(np.arange(1000, 9001, 1000) * np.pi / 30)
+    rows = pd.DataFrame(found["bearings"])
+    assert list(rows["bearing"][:2]) == ["left", "right"]
+    assert len(rows) == 18
+    # Ocvirk: S_s = η Ω R L³ / (4 c² W) = (1 − ε²)² / (ε √(16 ε² + π² (1 − ε²))), S = N η L D / W (R / c)²
+    e, S = rows["eccentricity"], rows["sommerfeld"]
+    ocvirk = (1 - e**2) ** 2 / (e * np.sqrt(16 * e**2 + np.pi**2 * (1 - e**2)))
+    np.testing.assert_allclose(np.pi * S * (50 / 110) ** 2, ocvirk, rtol=1e-8)
+    np.testing.assert_allclose(rows["film_m"], 1.5e-4 * (1 - e), rtol=1e-9)
+    attitude = np.degrees(np.arctan(np.pi * np.sqrt(1 - e**2) / (4 * e)))
+    np.testing.assert_allclose(rows["attitude_deg"], attitude, rtol=1e-8)
+    weight = 9.80665 * read_rotor(ROTOR).total_mass
+    np.testing.assert_allclose(rows.groupby("speed_rpm")["load_N"].sum(), weight, rtol=1e-8)
+    stability = found["stability"]
+    assert stability["status"] == "threshold"
+    assert stability["threshold_rpm"] == pytest.approx(6407.0, abs=0.1)
+    assert stability["whirl_ratio"] == pytest.approx(0.191, abs=5e-4)
+
+
+def test_the_threshold_does_not_depend_on_the_steps(cli):
+    coarse, fine = (
+        cli("bearings", ROTOR, "--speeds", f"1000:9000:{step}rpm", "--json").json["stability"]
+        for step in (4000, 250)
+    )
+    assert coarse["threshold_rad_s"] == pytest.approx(fine["threshold_rad_s"], rel=1e-8)
+
+
+def test_the_linear_rotor_is_read_by_the_other_commands(cli, tmp_path):
+    linear = tmp_path / "linear.toml"
+    outcome = cli("bearings", ROTOR, "--speeds", "600:9000:400rpm", "--output", linear)
+    assert outcome.code == 0
+    assert outcome.out.count("written: ") == 4
+    rotor = read_rotor(linear)
+    assert [s.name for s in rotor.supports] == ["left", "right"]
+    made = bearings(ROTOR, BearingsOptions(speeds="600:9000:400rpm"))
+    assert made.linear == rotor
+    assert cli("critical", linear, "-n", 1, "--json").code == 0
+    whirl = cli("campbell", linear, "--speeds", "600:9000:400rpm", "--json").json
+    # coefficients are linear between the speeds of the table
+    assert whirl["unstable"][0]["speed_rpm"] == pytest.approx(6407.02, abs=0.2)
+    weights = tmp_path / "unbalance.csv"
+    weights.write_text("plane,unbalance_g_mm,angle_deg\n12,1000,0\n")
+    response = cli("response", linear, "--unbalance", weights, "--speeds", "800:6000:100rpm", "--json")
+    assert 1150 < response.json["largest"][0]["speed_rad_s"] * 30 / np.pi < 1400
+    table = tmp_path / "bearings.csv"
+    cli("bearings", ROTOR, *SPEEDS, "--output", table)
+    assert len(pd.read_csv(table)) == 18
+
+
+def test_gravity_turns_everything_with_it(cli):
+    down, aside = (
+        cli("bearings", ROTOR, *SPEEDS, "--gravity-direction", angle, "--json").json for angle in (-90, 0)
+    )
+    for key in ("eccentricity", "attitude_deg"):
+        here, there = ([row[key] for row in one["bearings"]] for one in (down, aside))
+        assert here == pytest.approx(there, rel=1e-8)
+    assert down["bearings"][0]["kyy_N_per_m"] == pytest.approx(aside["bearings"][0]["kxx_N_per_m"], rel=1e-7)
+    assert down["stability"]["threshold_rad_s"] == pytest.approx(
+        aside["stability"]["threshold_rad_s"], rel=1e-6
+    )
+
+
+def test_the_picture_shows_loci_map_and_coefficients():
+    found = bearings(ROTOR, BearingsOptions(speeds="1000:9000:2000rpm"))
+    axes = found.figure().axes
+    assert [ax.get_xlabel() for ax in axes[:2]] == ["x by clearance", "eccentricity by clearance"]
+    assert [ax.get_ylabel() for ax in axes[2:4]] == ["left\nk, MN/m", "left\nc, kN·s/m"]
+    kyy = axes[2].get_lines()[3].get_ydata()
+    assert kyy == pytest.approx([s[1][1] / 1e6 for s in found.linear.supports[0].stiffness])
+    loci = [line for line in axes[0].get_lines() if line.get_label() in ("left", "right")]
+    x, y = loci[0].get_data()
+    assert np.hypot(x, y) == pytest.approx([at.eccentricity[0] for at in found.found])
+
+
+def test_other_forces_are_listed_and_explained():
+    forces = [
+        SqueezeFilm(1, "", **BEARING, centring_stiffness=1e7),
+        MuszynskaSeal(3, "seal", 1e6, 100.0, 2.0, 0.4, 1e-3),
+    ]
+    found = bearings(shaft(forces, [fem.Support(5, 1e8)]), BearingsOptions(speeds=[100.0, 200.0]))
+    assert found.labels == ["squeeze film at node 1", "seal"]
+    assert [row["sommerfeld"] for row in found.to_dict()["bearings"]] == [None] * 4
+    said = found.summary()
+    assert "Warning: the squeeze film at node 1: stiffness and damping are those at its centre" in said
+    assert "its fluid is a disc of 2 kg in the linear rotor" in said
+    found.figure()
+
+
+def test_one_speed_alone(cli, tmp_path):
+    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--plot", tmp_path / "one.png")
+    assert outcome.out.startswith("One speed: no threshold is sought.")
+    assert cli("bearings", ROTOR, "--speeds", "3000rpm", "--json").json["stability"] is None
+    outcome = cli("bearings", ROTOR, "--speeds", "3000rpm", "--output", tmp_path / "linear.toml")
+    assert (outcome.code, list(tmp_path.glob("*.toml"))) == (2, [])
+    assert "a table over speed needs two speeds at least (--speeds)" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("forces", "words"),
+    [
+        ([JournalBearing(1, "DE", **BEARING)], "nothing holds the rotor, its position is not determined"),
+        ([CubicSpring(1, "", 1e6), CubicSpring(5, "", 1e6)], "the rotor has no [[journal_bearing]]"),
+        ([SqueezeFilm(1, "", **BEARING), JournalBearing(5, "", **BEARING)], "squeeze film at node 1 has no "
+         "centring spring"),
+        ([SqueezeFilm(1, "", **BEARING, centring_stiffness=1e5), JournalBearing(5, "", **BEARING)],
+         "touches the squeeze film at node 1 under its weight: it drops by"),
+    ],
+)  # fmt: skip
+def test_what_has_no_equilibrium_is_refused(cli, tmp_path, forces, words):
+    write_rotor(tmp_path / "rotor.toml", shaft(forces))
+    outcome = cli("bearings", tmp_path / "rotor.toml", *SPEEDS, "--output", tmp_path / "out.toml")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert not (tmp_path / "out.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--speeds", "0:1000:500rpm"), "speed 0: the journal bearing 'left' at node 2 carries nothing"),
+        ((*SPEEDS, "--gravity-direction", "400"), "--gravity-direction: '400.0' is no angle"),
+        ((*SPEEDS, "--output", "linear.txt"), "the name must end in .csv, .xlsx, .toml"),
+    ],
+)
+def test_bad_options(cli, options, words):
+    outcome = cli("bearings", ROTOR, *options)
+    assert outcome.code == 2
+    assert words in outcome.err
+
+
+def test_the_linear_rotor_does_not_overwrite_its_own_shaft(cli, tmp_path):
+    """Of a rotor in linear_shaft.csv, --output linear.toml would be written over what is read."""
+    write_rotor(tmp_path / "linear.toml", read_rotor(ROTOR))
+    (tmp_path / "rotor.toml").write_bytes((tmp_path / "linear.toml").read_bytes())
+    (tmp_path / "linear.toml").unlink()
+    outcome = cli("bearings", tmp_path / "rotor.toml", *SPEEDS, "--output", tmp_path / "linear.toml")
+    assert outcome.code == 2
+    assert "linear_shaft.csv: this is an input of the command" in outcome.err
