@@ -231,7 +231,7 @@ class Periodic:
             by_free, h_free = np.concatenate([by_h / N, by_speed], axis=-1), np.array([1 / N, 0.0])
         right = np.concatenate([others[..., :-2], R[..., None], by_free], axis=-1)
         if not np.isfinite(right).all():
-            raise np.linalg.LinAlgError("a node is at the wall")
+            raise np.linalg.LinAlgError(wall_met(self.system, orbit.deflections) or "the forces overflow")
         S = -np.linalg.solve(J, right).reshape(N, _S, n, -1)
         P = np.concatenate([h * np.einsum("l,ilkm->ikm", _A[-1], S), S[:, -1]], axis=1)
         P[:, :n, :n] += np.eye(n)
@@ -258,7 +258,8 @@ class Periodic:
             for _ in range(_NEWTON):
                 R, J, _ = self.step_equations(q[None], v[None], V[i : i + 1], h, orbit.speed, angles[None])
                 if not np.isfinite(R).all():
-                    raise np.linalg.LinAlgError("a node is at the wall")
+                    met = wall_met(self.system, q + h * np.einsum("jl,lk->jk", _A, V[i]))
+                    raise np.linalg.LinAlgError(met or "the forces overflow")
                 change = np.linalg.solve(J[0], R[0]).reshape(_S, n)
                 V[i] -= change
                 if np.abs(change).max() <= 1e-8 * max(np.abs(V[i]).max(), 1e-300):
@@ -370,6 +371,14 @@ class Linearised:
         own = self.free == 2
         period = orbit.period + change[-2] if own else orbit.period * orbit.speed / speed
         return Orbit(float(speed), float(period), orbit.start + change[:n], velocities)
+
+
+def wall_met(system: MotionSystem, q: FloatArray, near: float = 1.0) -> str:
+    """The node that is nearer to its wall than 1 − `near` of its clearance, in words; q (…, n)."""
+    places = system.law_tables[2]
+    walls = np.array([force.wall for force in system.forces])
+    share = np.hypot(q[..., places[:, 0]], q[..., places[:, 1]]).reshape(-1, len(walls)).max(axis=0) / walls
+    return f"node {system.forces[int(share.argmax())].node} is at its wall" if (share >= near).any() else ""
 
 
 def _linear(system: MotionSystem, speed: float) -> tuple[FloatArray, ...]:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.motion.collocation import Linearised, Orbit, Periodic
+from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
+_NEAR = 0.999  # of a clearance is at the wall
 _LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
@@ -152,8 +153,8 @@ def follow(
             ended = "end of the range of speeds"
         elif len(points) > 20 and np.linalg.norm(away) < length:
             ended = "closed"
-        elif _at_wall(problem, at.orbit):
-            ended = "stopped: a node is at its wall"
+        elif met := wall_met(problem.system, at.orbit.deflections, _NEAR):
+            ended = f"stopped: {met}"
         elif len(points) >= _MOST_POINTS:
             ended = f"stopped: {_MOST_POINTS} points"
         length = min(_LONGEST, length * (1.5 if iterations < 5 else 1.0 if iterations < 8 else 0.6))
@@ -283,14 +284,6 @@ class _Walk:
         if self.kind == "rest" and not (alone and value.real > 0):
             return HOPF, direction
         return (BRANCH if value.real > 0 else DOUBLING) if alone else TORUS, direction
-
-
-def _at_wall(problem: Periodic, orbit: Orbit) -> bool:
-    """Whether a node comes nearer to its wall than a thousandth of the clearance."""
-    places = problem.system.law_tables[2]
-    walls = [force.wall for force in problem.system.forces]
-    q = orbit.deflections[..., places]
-    return bool((np.hypot(q[..., 0], q[..., 1]).max(axis=(0, 1)) > 0.999 * np.array(walls)).any())
 
 
 def _root(test: Callable[[float], float], length: float) -> float:

@@ -136,6 +136,7 @@ class _Search:
             except np.linalg.LinAlgError as met:
                 problems.append(f"at {rpm_text(speed)}: {met}")
         if not found:
+            equilibrium(self.system, self.low)  # its message is the better one
             raise ValueError(f"no periodic motion was found to begin with, {listing(problems, 'and')}")
         return found
 
@@ -166,7 +167,8 @@ class _Search:
             at, _ = problem.solve(start.guess, start.rows, start.values)
             if self.known(at.orbit, known):
                 return []
-            return [self.follow(problem, start, f"period {problem.turns}")]
+            kind = f"period {problem.turns}" if problem.turns else "limit cycle"
+            return [self.follow(problem, start, kind)]
         except np.linalg.LinAlgError:
             return []
 
@@ -203,8 +205,9 @@ class _Search:
     def cycles(self, branches: list[Branch]) -> list[Branch]:
         """Those that begin at Hopf points, and what motion in time comes to at the highest speed."""
         hopf = [b for branch in branches for b in branch.bifurcations if b.kind == HOPF]
-        found = [self.cycle(b) for b in hopf]
-        problem = Periodic(self.system, 0)
+        problem, found = Periodic(self.system, 0), list[Branch]()
+        for point in hopf:
+            found += self._try(problem, self.cycle(point), [])
         try:
             guess = self.whirling(problem)
             row = at_speed(problem, guess, -1.0)
@@ -234,8 +237,8 @@ class _Search:
         near = steps // 2 + int(away[steps // 2 : 3 * steps // 2 + 1].argmin())
         return problem.marched(replace(orbit, period=orbit.period * near / steps))
 
-    def cycle(self, point: Bifurcation) -> Branch:
-        """The limit cycles that begin at a Hopf point."""
+    def cycle(self, point: Bifurcation) -> Start:
+        """Of the limit cycles that begin at a Hopf point."""
         orbit = point.point.orbit
         whirl, shape = whirl_at_rest(self.system, orbit.start, orbit.speed)
         shape *= np.exp(-0.5j * np.angle(np.sum(shape * shape))) / np.abs(shape).max()
@@ -249,7 +252,7 @@ class _Search:
         rows = np.zeros((2, 2 * n + 2))
         rows[0, :n], rows[1, :n] = shape.imag, shape.real
         values = rows[:, :n] @ orbit.start + [0.0, amplitude * shape.real @ shape.real]
-        return self.follow(Periodic(self.system, 0), Start(guess, rows, values), "limit cycle")
+        return Start(guess, rows, values)
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
