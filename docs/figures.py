@@ -187,6 +187,13 @@ GALLERY = (
         "to 9000 rpm, this one, which bends, up to 6407 rpm.",
     ),
     Picture(
+        "motion",
+        "rotors",
+        "motion sample_data/motion/small.toml --speed 8000rpm --time 20s --displaced 12=20um --view orbits",
+        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its turns "
+        "do not come to the same place.",
+    ),
+    Picture(
         "reduction",
         "reduction",
         f"{THREE} --modes 2",
