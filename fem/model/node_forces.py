@@ -23,14 +23,7 @@ centres bounds, on the side where a steady journal's pressure is positive (the t
 
 @dataclass(frozen=True)
 class NodeForce:
-    """What all of them have; numbers are finite and not negative, those of `above_zero` above 0.
-
-    Attributes
-    ----------
-    node
-        Node number, from 1.
-    name
-        For messages and drawings.
+    """What all of them have: a node, from 1, a name for messages, numbers that are finite and not negative.
 
     Raises
     ------
@@ -42,6 +35,7 @@ class NodeForce:
     name: str = ""
 
     above_zero: ClassVar[tuple[str, ...]] = ()
+    """Numbers that must be so, 1e-30 at least."""
 
     def __post_init__(self) -> None:
         what = attachment(self)
@@ -49,8 +43,8 @@ class NodeForce:
             if item.type != "float":
                 continue
             value = number(getattr(self, item.name), f"{what}: {item.name}")
-            if value == 0 and item.name in self.above_zero:
-                raise ValueError(f"{what}: {item.name} must be above 0")
+            if value < 1e-30 and item.name in self.above_zero:
+                raise ValueError(f"{what}: {item.name} must be above 0, not {value:g}")
             object.__setattr__(self, item.name, value)
 
     @property
@@ -60,17 +54,29 @@ class NodeForce:
 
     @property
     def mass(self) -> float:
-        """Inertia that it adds at its node, kg."""
-        return 0.0
+        """Inertia that it adds at its node, kg: that of a seal's fluid."""
+        return float(getattr(self, "fluid_mass", 0.0))
 
     @property
     def wall(self) -> float:
-        """From the centre to where its law ends, m; infinite without a wall."""
-        return np.inf
+        """From the centre to where its law ends, m: its clearance; infinite without one."""
+        return float(getattr(self, "clearance", np.inf))
 
 
 @dataclass(frozen=True)
-class _ShortFilm(NodeForce):
+class ShortFilm(NodeForce):
+    """A film that is short along the shaft: up to half the diameter; a longer one carries less than it says.
+
+    Attributes
+    ----------
+    length, diameter
+        Along the shaft, and of the journal, m.
+    clearance
+        Radial, m.
+    viscosity
+        Pa·s.
+    """
+
     length: float = 0.0
     diameter: float = 0.0
     clearance: float = 0.0
@@ -78,31 +84,15 @@ class _ShortFilm(NodeForce):
 
     above_zero: ClassVar[tuple[str, ...]] = ("length", "diameter", "clearance", "viscosity")
 
-    @property
-    def wall(self) -> float:
-        """The radial clearance."""
-        return self.clearance
-
 
 @dataclass(frozen=True)
-class JournalBearing(_ShortFilm):
-    """A short plain journal bearing (Ocvirk).
-
-    It has no orientation: its film lies where the rotor's weight and motion put it. Lengths up to half the
-    diameter are short; a longer one carries less than this says.
+class JournalBearing(ShortFilm):
+    """A short plain journal bearing (Ocvirk), its film where the rotor's weight and motion put it.
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    length, diameter
-        Along the shaft, and of the journal, m.
-    clearance
-        Radial, m.
-    viscosity
-        Pa·s.
     film
-        Where its film carries, see `Film`.
+        Where it carries, see `Film`.
     """
 
     film: Film = "pressure"
@@ -113,19 +103,11 @@ class JournalBearing(_ShortFilm):
 
 
 @dataclass(frozen=True)
-class SqueezeFilm(_ShortFilm):
+class SqueezeFilm(ShortFilm):
     """A short squeeze-film damper, its film where the pressure is positive; its ring does not turn.
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
-    length, diameter
-        Along the shaft, and of the journal, m.
-    clearance
-        Radial, m.
-    viscosity
-        Pa·s.
     centring_stiffness
         N/m, of the spring that centres it; 0 for none.
     """
@@ -146,8 +128,6 @@ class MuszynskaSeal(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
     stiffness, damping, fluid_mass
         K₀ N/m, D₀ N·s/m, m kg.
     swirl_ratio
@@ -168,16 +148,6 @@ class MuszynskaSeal(NodeForce):
 
     above_zero: ClassVar[tuple[str, ...]] = ("clearance",)
 
-    @property
-    def mass(self) -> float:
-        """The fluid's."""
-        return self.fluid_mass
-
-    @property
-    def wall(self) -> float:
-        """The radial clearance."""
-        return self.clearance
-
 
 @dataclass(frozen=True)
 class CubicSpring(NodeForce):
@@ -185,8 +155,6 @@ class CubicSpring(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
     stiffness, cubic_stiffness
         k, N/m, and k₃, N/m³.
     """
@@ -204,8 +172,6 @@ class Stop(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
     gap
         m.
     stiffness, damping
@@ -236,8 +202,6 @@ class InternalDamping(NodeForce):
 
     Attributes
     ----------
-    node, name
-        As of `NodeForce`.
     damping
         c, N·s/m.
     """
@@ -271,11 +235,5 @@ def kind_of(force: NodeForce) -> str:
 
 
 def in_order(forces: Iterable[NodeForce]) -> tuple[NodeForce, ...]:
-    """Sorted by their kinds, as files have them; of one kind as they are.
-
-    Raises
-    ------
-    ValueError
-        As `kind_of`.
-    """
+    """Sorted by `kind_of`, as files have them; of one kind as they are."""
     return tuple(sorted(forces, key=lambda force: names(FORCES).index(kind_of(force))))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fem.model.node_forces import JournalBearing, NodeForce, SqueezeFilm
+from fem.model.node_forces import NodeForce, ShortFilm
 from fem.model.rotor import Rotor
 from rotorid.base.arrays import BoolArray
 from rotorid.base.checks import attachment
@@ -70,6 +70,7 @@ USUAL = {
     "friction": Usual(0.0, 1.5, "of the normal force", (0.01, 0.9), (("percent", 0.01),)),
 }
 _CLEARANCE_BY_RADIUS = (2e-4, 1e-2)
+_SHORT = 0.5  # length by diameter up to which the film of `fem.forces` is used
 _STIFF = (("N/mm", 1e3), ("N/µm", 1e6))  # by their size in N/m
 
 
@@ -117,14 +118,20 @@ def warn_of_force(source: str, force: NodeForce, written: Mapping[str, Quantity 
         if question:
             _warn(f"{what}: {shown}; {question}")
             return
-    if isinstance(force, (JournalBearing, SqueezeFilm)):
-        ratio = 2 * force.clearance / force.diameter
-        low, high = _CLEARANCE_BY_RADIUS
-        if not low <= ratio <= high:
-            _warn(
-                f"{what}: the radial clearance is {ratio:.3g} of the journal's radius, in machines {low:g} "
-                f"to {high:g}; is one of them in another unit, or a diameter taken for a radius?"
-            )
+    if not isinstance(force, ShortFilm):
+        return
+    ratio, slender = 2 * force.clearance / force.diameter, force.length / force.diameter
+    low, high = _CLEARANCE_BY_RADIUS
+    if not low <= ratio <= high:
+        _warn(
+            f"{what}: the radial clearance is {ratio:.3g} of the journal's radius, in machines {low:g} "
+            f"to {high:g}; is one of them in another unit, or a diameter taken for a radius?"
+        )
+    elif round(slender, 6) > _SHORT:
+        _warn(
+            f"{what}: its length is {slender:.3g} of its diameter; short films have up to {_SHORT:g}, a "
+            "longer one carries less than is computed, about half as much at 1"
+        )
 
 
 def warn_of_rotor(source: str, rotor: Rotor) -> None:

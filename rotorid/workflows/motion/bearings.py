@@ -118,7 +118,7 @@ class BearingEquilibria(Outcome):
             Column("speed_rpm", speeds * RPM, "{:.6g}".format, "rpm"),
             Column("load_N", abs(each("load")), figures, "load, N"),
             Column("eccentricity", each("eccentricity"), "{:.4f}".format),
-            Column("attitude_deg", np.degrees(each("attitude")), "{:.2f}".format, "attitude, °"),
+            Column("attitude_deg", np.degrees(each("attitude")), "{:z.2f}".format, "attitude, °"),
             Column("film_m", each("film"), lambda film: figures(1e6 * film), "least film, µm"),
             Column("sommerfeld", each("sommerfeld"), figures, "Sommerfeld"),
             *(Column(f"k{n}_N_per_m", values) for n, values in zip(_AXES, K, strict=True)),
@@ -126,11 +126,10 @@ class BearingEquilibria(Outcome):
         )
 
     def figure(self) -> Figure:
-        """Loci, stability map, coefficients over speed."""
+        """Loci and stability map."""
         from rotorid.motion.bearing_pictures import bearings_figure
 
-        threshold = None if self.stability is None else self.stability.threshold
-        return bearings_figure(self.found, self.labels, threshold)
+        return bearings_figure(self.found, self.labels)
 
     def files(self, path: Path) -> Mapping[Path, bytes]:
         """The linear rotor as a rotor file, .toml, with its tables; or the table, .csv or .xlsx.

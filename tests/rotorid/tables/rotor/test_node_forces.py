@@ -122,6 +122,7 @@ UNLIKELY = [
     ("squeeze_film", [*BEARING[:3], "viscosity_mPa_s = 0.005"], "is this in Pa_s?"),
     ("squeeze_film", ["length_m = 300", *BEARING[1:]], "length_m = 300 means 300 m; is this in mm?"),
     ("squeeze_film", [*BEARING[:2], "clearance_um = 2000", BEARING[3]], "is 0.04 of the journal's radius"),
+    ("journal_bearing", ["length_mm = 90", *BEARING[1:]], "its length is 0.9 of its diameter; short films"),
     ("annular_seal", [*SEAL[:2], "swirl_ratio = 40", SEAL[3]], "swirl_ratio = 40; is this in percent?"),
     ("stop", ["gap_m = 0.2", "stiffness_N_per_m = 1e7"], "is this in mm?"),
 ]
