@@ -75,7 +75,7 @@ def _draw_stability_map(found: Sequence[Equilibrium], style: Sequence[dict[str, 
     ax.plot(e, M, color=DARK)
     ax.fill_between(e, M, 1e3, color=VERMILION, alpha=0.14, linewidth=0)
     low, high = 0.5, 100.0
-    for k in np.flatnonzero(np.isfinite(found[0].sommerfeld)):
+    for k in np.flatnonzero(np.isfinite(found[0].sommerfeld)).tolist():
         numbers = found[0].bearings[k].wall * np.array([at.speed for at in found]) ** 2 / GRAVITY
         ax.plot([at.eccentricity[k] for at in found], numbers, **style[k])
         low, high = min(low, 0.7 * numbers.min()), max(high, 2 * numbers.max())

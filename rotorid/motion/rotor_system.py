@@ -24,14 +24,10 @@ def rotor_system(
     gravity: float = GRAVITY,
     direction: float = -90.0,
 ) -> MotionSystem:
-    """Put together what moves of a rotor at speeds from `lowest` to `highest`.
+    """Put together what moves of a rotor at speeds from `lowest` to `highest`, rad/s.
 
     Parameters
     ----------
-    rotor
-        With the forces at its nodes.
-    lowest, highest
-        rad/s.
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
     bow
@@ -85,21 +81,14 @@ def weight_along(gravity: float, direction: float) -> tuple[float, float]:
 
 
 def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> ComplexArray:
-    """Forces that bend the straight shaft as it is bent at rest, N.
+    """Forces that bend the straight shaft as it is bent at rest: (K_bb − K_bo K_oo⁻¹ K_ob) times the bow.
 
     Parameters
     ----------
     stiffness
         Of the free shaft in one plane, N/m, shape (n, n).
-    at
-        Unknowns where the bow is known, b of them; the others follow without a force.
-    bow
-        m, shape (b,).
-
-    Returns
-    -------
-    numpy.ndarray
-        At these unknowns, shape (b,): (K_bb − K_bo K_oo⁻¹ K_ob) times the bow.
+    at, bow
+        Unknowns where the bow is known, and its size, m, (b,); the others follow without a force. N, (b,).
 
     Raises
     ------

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,8 +16,6 @@ from rotorid.base.checks import attachment
 from rotorid.base.text import counted
 from rotorid.tables.reader.columns import Table
 from rotorid.tables.reader.problems import TableWarning
-from rotorid.tables.reader.settings_keys import Quantity
-from rotorid.tables.reader.units import LENGTH, VISCOSITY
 
 _GRAVITY = 9.81
 _SAG = 10.0  # m: of a rotor on its bearings, which then swings below 0.2 Hz
@@ -101,22 +98,13 @@ def warn_of_value(source: str, key: str, stem: str, value: float) -> None:
         _warn(f"{source}, {key}: {value:.6g} {USUAL[stem].unit}; {question}")
 
 
-def warn_of_force(source: str, force: NodeForce, written: Mapping[str, Quantity | float]) -> None:
-    """A force at a node whose values are unlike those of any machine; `written` are its numbers by field."""
+def warn_of_force(source: str, force: NodeForce) -> None:
+    """A force at a node whose values are unlike those of any machine."""
     what = f"{source}, {attachment(force)}"
-    for stem, value in written.items():
-        if stem not in USUAL:
-            continue
-        usual = USUAL[stem]
-        if isinstance(value, Quantity):
-            alike = [unit for unit in (*LENGTH.values(), *VISCOSITY.values()) if unit.kind == value.unit.kind]
-            usual = replace(usual, others=tuple((u.name, value.unit.scale / u.scale) for u in alike))
-            question = usual.question(value.si)
-            shown = f"{value.key} = {value.value:.6g} means {value.si:.6g} {usual.unit}"
-        else:
-            question, shown = usual.question(value), f"{stem} = {value:.6g}"
-        if question:
-            _warn(f"{what}: {shown}; {question}")
+    for stem, usual in USUAL.items():
+        value = getattr(force, stem, 0.0)
+        if question := usual.question(value):
+            _warn(f"{what}: {stem} {value:.6g} {usual.unit}; {question}")
             return
     if not isinstance(force, ShortFilm):
         return
