@@ -189,8 +189,8 @@ GALLERY = (
         "motion",
         "rotors",
         "motion sample_data/motion/small.toml --speed 8000rpm --time 20s --displaced 12=20um --view orbits",
-        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its turns "
-        "do not come to the same place.",
+        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its "
+        "turns do not come to the same place.",
     ),
     Picture(
         "reduction",

@@ -80,7 +80,7 @@ class MotionOptions:
         Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
     modes : N
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
-        together; default: those up to 4 times the highest speed; small models keep all.
+        together; default: those up to 8 times the highest speed; small models keep all.
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
     tolerance : T
@@ -260,11 +260,11 @@ class Motion(Outcome):
         )
         if reduced is None:
             return found
-        return (
-            *found,
-            f"of the rotor {counted(reduced.system.size, 'unknown')} move, {counted(reduced.modes, 'mode')} "
-            f"among them; natural frequencies without films are high by {percent(reduced.error)} % at most",
-        )
+        high = f"natural frequencies without films are high by {percent(reduced.error)} % at most"
+        if reduced.error == float("inf"):
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        size, modes = counted(reduced.system.size, "unknown"), counted(reduced.modes, "mode")
+        return (*found, f"of the rotor {size} move, {modes} among them; {high}")
 
     def figure(self, view: View = "motion") -> Figure:
         """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""
