@@ -105,14 +105,25 @@ class Orbit:
         moved = self.step * np.abs(np.einsum("l,ilk->ik", _HIGHEST, self.velocities))
         return float((moved / self.scale[: self.start.size]).max())
 
-    def finer(self) -> Orbit:
-        """The same in steps half as long."""
-        v = self.velocities
+    def repeats(self, turns: int) -> bool:
+        """Whether a motion of so many revolutions is one of fewer."""
+        ends, N = self.ends[:-1], len(self.velocities)
+        away = [
+            np.abs((ends - np.roll(ends, N // turns * k, axis=0)) / self.scale[: self.start.size]).max()
+            for k in range(1, turns)
+            if turns % k == 0
+        ]
+        return bool(away) and min(away) < 0.02
+
+    def resampled(self, count: int) -> Orbit:
+        """The same in so many steps."""
+        N, v = len(self.velocities), self.velocities
         known = np.concatenate([np.roll(v[:, -1:], 1, axis=0), v], axis=1)
-        from_known = np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
-        halves = [np.vander(x, _S + 1, increasing=True) @ from_known for x in (POINTS / 2, POINTS / 2 + 0.5)]
-        both = np.stack([np.einsum("jl,ilk->ijk", half, known) for half in halves], axis=1)
-        return replace(self, velocities=both.reshape(-1, *v.shape[1:]))
+        at = (np.arange(count)[:, None] + POINTS) * (N / count)
+        step = np.ceil(at - 1e-9).astype(int) - 1
+        powers = np.vander((at - step).ravel(), _S + 1, increasing=True).reshape(count, _S, _S + 1)
+        weights = powers @ np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
+        return replace(self, velocities=np.einsum("ijl,ijlk->ijk", weights, known[step]))
 
     def readings(self, directions: FloatArray, count: int = 2048) -> FloatArray:
         """What sensors read over one period, shape (count, k), of directions (k, n)."""
@@ -220,7 +231,7 @@ class Periodic:
             by_free, h_free = np.concatenate([by_h / N, by_speed], axis=-1), np.array([1 / N, 0.0])
         right = np.concatenate([others[..., :-2], R[..., None], by_free], axis=-1)
         if not np.isfinite(right).all():
-            raise np.linalg.LinAlgError("a node is at the wall")
+            raise np.linalg.LinAlgError(wall_met(self.system, orbit.deflections) or "the forces overflow")
         S = -np.linalg.solve(J, right).reshape(N, _S, n, -1)
         P = np.concatenate([h * np.einsum("l,ilkm->ikm", _A[-1], S), S[:, -1]], axis=1)
         P[:, :n, :n] += np.eye(n)
@@ -247,7 +258,8 @@ class Periodic:
             for _ in range(_NEWTON):
                 R, J, _ = self.step_equations(q[None], v[None], V[i : i + 1], h, orbit.speed, angles[None])
                 if not np.isfinite(R).all():
-                    raise np.linalg.LinAlgError("a node is at the wall")
+                    met = wall_met(self.system, q + h * np.einsum("jl,lk->jk", _A, V[i]))
+                    raise np.linalg.LinAlgError(met or "the forces overflow")
                 change = np.linalg.solve(J[0], R[0]).reshape(_S, n)
                 V[i] -= change
                 if np.abs(change).max() <= 1e-8 * max(np.abs(V[i]).max(), 1e-300):
@@ -359,6 +371,14 @@ class Linearised:
         own = self.free == 2
         period = orbit.period + change[-2] if own else orbit.period * orbit.speed / speed
         return Orbit(float(speed), float(period), orbit.start + change[:n], velocities)
+
+
+def wall_met(system: MotionSystem, q: FloatArray, near: float = 1.0) -> str:
+    """The node that is nearer to its wall than 1 − `near` of its clearance, in words; q (…, n)."""
+    places = system.law_tables[2]
+    walls = np.array([force.wall for force in system.forces])
+    share = np.hypot(q[..., places[:, 0]], q[..., places[:, 1]]).reshape(-1, len(walls)).max(axis=0) / walls
+    return f"node {system.forces[int(share.argmax())].node} is at its wall" if (share >= near).any() else ""
 
 
 def _linear(system: MotionSystem, speed: float) -> tuple[FloatArray, ...]:

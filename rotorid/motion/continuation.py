@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotorid.base.arrays import BoolArray, ComplexArray, FloatArray
-from rotorid.motion.collocation import Linearised, Orbit, Periodic
+from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
-_MOST_STEPS, _MOST_POINTS = 256, 1500  # steps in a revolution or cycle
+_NEAR = 0.999  # of a clearance is at the wall
+_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -131,15 +132,20 @@ def follow(
     walk = _Walk(problem, low, high, fixed_steps, kind)
     tangent = walk.unit(at, at.change(start.rows, np.eye(len(start.rows))[-1], left=0.0))
     points, found, length = [walk.point(at)], list[Bifurcation](), _LONGEST / 4
-    origin, smallest, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
+    origin, first, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
     while not ended:
         try:
             new, new_tangent, iterations, length = walk.step(at, tangent, length)
-            found += walk.passed(at, tangent, new, new_tangent, length, len(points))
+            passed = walk.passed(at, tangent, new, new_tangent, length, len(points))
         except np.linalg.LinAlgError as problem_met:
             length /= 2
             ended = f"stopped: {problem_met}" if length < _SHORTEST else ""
             continue
+        if joined := [one.point for one in passed if walk.ends(one.point.orbit, first)]:
+            points += joined
+            ended = "joins the motion that it comes from"
+            break
+        found += passed
         points.append(walk.point(new))
         at, tangent = new, new_tangent
         away = walk.weights(at) * (problem.unknowns(at.orbit) - origin)
@@ -147,10 +153,8 @@ def follow(
             ended = "end of the range of speeds"
         elif len(points) > 20 and np.linalg.norm(away) < length:
             ended = "closed"
-        elif not problem.turns and (at.orbit.scale < smallest / 2).all():
-            ended = "the cycle dies out"
-        elif _at_wall(problem, at.orbit):
-            ended = "stopped: a node is at its wall"
+        elif met := wall_met(problem.system, at.orbit.deflections, _NEAR):
+            ended = f"stopped: {met}"
         elif len(points) >= _MOST_POINTS:
             ended = f"stopped: {_MOST_POINTS} points"
         length = min(_LONGEST, length * (1.5 if iterations < 5 else 1.0 if iterations < 8 else 0.6))
@@ -226,6 +230,13 @@ class _Walk:
             )
         return new, onwards, iterations, length
 
+    def ends(self, orbit: Orbit, first: FloatArray) -> bool:
+        """Whether a motion is that of fewer revolutions, or rest; `first` is the size of the first motion."""
+        if self.problem.turns:
+            return orbit.repeats(self.problem.turns)
+        moved = np.ptp(orbit.ends, axis=0)
+        return bool((moved < 0.1 * first[: moved.size]).all())
+
     def point(self, at: Linearised) -> Point:
         """What is kept of a solution."""
         multipliers = at.multipliers
@@ -275,14 +286,6 @@ class _Walk:
         return (BRANCH if value.real > 0 else DOUBLING) if alone else TORUS, direction
 
 
-def _at_wall(problem: Periodic, orbit: Orbit) -> bool:
-    """Whether a node comes nearer to its wall than a thousandth of the clearance."""
-    places = problem.system.law_tables[2]
-    walls = [force.wall for force in problem.system.forces]
-    q = orbit.deflections[..., places]
-    return bool((np.hypot(q[..., 0], q[..., 1]).max(axis=(0, 1)) > 0.999 * np.array(walls)).any())
-
-
 def _root(test: Callable[[float], float], length: float) -> float:
     """Where a test along a step changes its sign; the step's end where it does so only by rounding."""
     from scipy.optimize import brentq
@@ -296,10 +299,16 @@ def _root(test: Callable[[float], float], length: float) -> float:
 def _solved(
     problem: Periodic, guess: Orbit, rows: FloatArray, values: FloatArray, fixed: bool
 ) -> tuple[Linearised, int]:
-    """A solution, its steps in time short enough."""
+    """A solution, its steps in time short enough, and longer again where they may be."""
+    steps, turns = len(guess.velocities), max(problem.turns, 1)
+    if not fixed and guess.roughness < _ROUGH / 100 and steps >= 2 * _LEAST_STEPS * turns:
+        guess = guess.resampled(steps // 2)
     at, iterations = problem.solve(guess, rows, values)
-    while not fixed and at.orbit.roughness > _ROUGH and len(at.orbit.velocities) < _MOST_STEPS * max(problem.turns, 1):
-        at, _ = problem.solve(at.orbit.finer(), rows, values)
+    while not fixed and at.orbit.roughness > _ROUGH:
+        steps = 2 * len(at.orbit.velocities)
+        if steps > _MOST_STEPS * turns:
+            break
+        at, _ = problem.solve(at.orbit.resampled(steps), rows, values)
     return at, iterations
 
 

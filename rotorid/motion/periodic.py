@@ -27,6 +27,7 @@ from rotorid.motion.system import MotionSystem
 _STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
 _COARSE = 1e-3
 """Of `Orbit.roughness`."""
+_SAME = 0.02  # of the motion: what differs by less is no other motion
 _CYCLES = 100  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
@@ -130,11 +131,12 @@ class _Search:
         for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
             try:
                 guess = settled(problem, speed, self.count, _at_rest(self.system, speed))
-                if not _known(guess, found):
+                if not self.known(guess, found):
                     found.append(self.follow(problem, at_speed(problem, guess, sign), kind))
             except np.linalg.LinAlgError as met:
                 problems.append(f"at {rpm_text(speed)}: {met}")
         if not found:
+            equilibrium(self.system, self.low)  # its message is the better one
             raise ValueError(f"no periodic motion was found to begin with, {listing(problems, 'and')}")
         return found
 
@@ -154,7 +156,7 @@ class _Search:
                 guess = problem.solve(guess, begin.rows, begin.values)[0].orbit
             except np.linalg.LinAlgError:
                 continue
-            if _really(guess, turns) and not _known(guess, found):
+            if not guess.repeats(turns) and not self.known(guess, found):
                 for sign in (1.0, -1.0):
                     found += self._try(problem, at_speed(problem, guess, sign), [])
         return found
@@ -163,11 +165,29 @@ class _Search:
         """The branch, if there is one that is not known."""
         try:
             at, _ = problem.solve(start.guess, start.rows, start.values)
-            if _known(at.orbit, known):
+            if self.known(at.orbit, known):
                 return []
-            return [self.follow(problem, start, f"period {problem.turns}")]
+            kind = f"period {problem.turns}" if problem.turns else "limit cycle"
+            return [self.follow(problem, start, kind)]
         except np.linalg.LinAlgError:
             return []
+
+    def known(self, orbit: Orbit, branches: list[Branch]) -> bool:
+        """Whether a branch comes through this motion, or through the same some revolutions later."""
+        size = orbit.scale[: orbit.start.size]
+        for branch in branches:
+            later = orbit.ends[:-1][:: len(orbit.velocities) // max(branch.turns, 1)]
+            states = (
+                np.array([point.orbit.start for point in branch.points]) / orbit.scale[: orbit.start.size]
+            )
+            way = np.column_stack([states, branch.speeds / (self.high - self.low)])
+            step = np.diff(way, axis=0)
+            for state in later / size:
+                from_here = np.append(state, orbit.speed / (self.high - self.low)) - way[:-1]
+                share = np.clip((from_here * step).sum(axis=1) / (step * step).sum(axis=1), 0.0, 1.0)
+                if np.linalg.norm(from_here - share[:, None] * step, axis=1).min(initial=1.0) < _SAME:
+                    return True
+        return False
 
     def doubled(self, point: Bifurcation) -> Start:
         """Of the branch of twice the period that begins at a period doubling."""
@@ -185,8 +205,9 @@ class _Search:
     def cycles(self, branches: list[Branch]) -> list[Branch]:
         """Those that begin at Hopf points, and what motion in time comes to at the highest speed."""
         hopf = [b for branch in branches for b in branch.bifurcations if b.kind == HOPF]
-        found = [self.cycle(b) for b in hopf]
-        problem = Periodic(self.system, 0)
+        problem, found = Periodic(self.system, 0), list[Branch]()
+        for point in hopf:
+            found += self._try(problem, self.cycle(point), [])
         try:
             guess = self.whirling(problem)
             row = at_speed(problem, guess, -1.0)
@@ -216,8 +237,8 @@ class _Search:
         near = steps // 2 + int(away[steps // 2 : 3 * steps // 2 + 1].argmin())
         return problem.marched(replace(orbit, period=orbit.period * near / steps))
 
-    def cycle(self, point: Bifurcation) -> Branch:
-        """The limit cycles that begin at a Hopf point."""
+    def cycle(self, point: Bifurcation) -> Start:
+        """Of the limit cycles that begin at a Hopf point."""
         orbit = point.point.orbit
         whirl, shape = whirl_at_rest(self.system, orbit.start, orbit.speed)
         shape *= np.exp(-0.5j * np.angle(np.sum(shape * shape))) / np.abs(shape).max()
@@ -231,7 +252,7 @@ class _Search:
         rows = np.zeros((2, 2 * n + 2))
         rows[0, :n], rows[1, :n] = shape.imag, shape.real
         values = rows[:, :n] @ orbit.start + [0.0, amplitude * shape.real @ shape.real]
-        return self.follow(Periodic(self.system, 0), Start(guess, rows, values), "limit cycle")
+        return Start(guess, rows, values)
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
@@ -262,33 +283,12 @@ def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
     return q if q.any() else np.full(system.size, 1e-4 * _length(system, q))
 
 
-def _known(orbit: Orbit, branches: list[Branch]) -> bool:
-    """Whether a branch comes through this motion."""
-    for branch in branches:
-        for a, b in zip(branch.points, branch.points[1:], strict=False):
-            low, high = sorted((a.orbit.speed, b.orbit.speed))
-            if low * (1 - 1e-9) <= orbit.speed <= high * (1 + 1e-9):
-                share = (orbit.speed - a.orbit.speed) / (b.orbit.speed - a.orbit.speed or 1.0)
-                between = a.orbit.state + share * (b.orbit.state - a.orbit.state)
-                if (np.abs(between - orbit.state) < 0.02 * orbit.scale).all():
-                    return True
-    return False
-
-
 def _same_cycle(cycle: Orbit, branch: Branch) -> bool:
     """Whether a limit cycle at one end of the range of speeds is that of a branch."""
     last = branch.points[-1].orbit
     sizes = [np.ptp(orbit.ends, axis=0) for orbit in (cycle, last)]
     same = np.abs(sizes[0] - sizes[1]) <= 0.02 * sizes[0].max()
     return bool(abs(last.speed / cycle.speed - 1) < 1e-6 and same.all())
-
-
-def _really(orbit: Orbit, turns: int) -> bool:
-    """Whether a motion of several revolutions is none of fewer."""
-    ends, N = orbit.ends[:-1], len(orbit.velocities)
-    shifts = [N // turns * k for k in range(1, turns) if turns % k == 0]
-    size = orbit.scale[: orbit.start.size]
-    return all((np.abs(ends - np.roll(ends, k, axis=0)) / size).max() > 1e-3 for k in shifts)
 
 
 def _doubts(branches: list[Branch]) -> list[str]:
@@ -298,7 +298,7 @@ def _doubts(branches: list[Branch]) -> list[str]:
         worst = max(point.orbit.roughness for point in branch.points)
         if worst > _COARSE:
             said.append(
-                f"the {branch.kind} branch has too few steps in time: {percent(worst)} of its motion may be wrong "
-                "(--steps)"
+                f"the {branch.kind} branch has too few steps in time: {percent(worst)} % of it may be "
+                "wrong (--steps)"
             )
     return said
