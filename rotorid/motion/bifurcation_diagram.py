@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotorid.base.plot_style import (
+    BOX,
     COLORS,
     DARK,
     MARKERS,
@@ -58,6 +59,7 @@ def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
                 style,
                 color=colors[branch.kind],
                 linewidth=1.6,
+                clip_on=False,
                 label="" if label in named or not there.any() else label,
             )
             named |= {label} if there.any() else set()
@@ -81,7 +83,8 @@ def draw_bifurcations(readings: Readings, ax: Axes | None = None) -> Axes:
         )
         up = after[0] > before[0]
         middle = (speed * RPM, 5e5 * (before[0] + after[0]))
-        note(ax, "jump up" if up else "jump down", middle, (4, 0), color=DARK, rotation=90, va="center")
+        where = {"rotation": 90, "va": "center", "ha": "right", "bbox": BOX}
+        note(ax, "jump up" if up else "jump down", middle, (-3, 0), color=DARK, **where)
     ax.set(xlabel="speed, rpm", ylabel=f"amplitude at {readings.labels[0]}, µm")
     ax.set_ylim(bottom=0.0)
     plain(ax)

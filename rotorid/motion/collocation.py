@@ -41,7 +41,8 @@ POINTS, _A = _radau()
 _INVERSE = np.linalg.inv(_A)
 _HIGHEST = np.linalg.inv(np.polynomial.legendre.legvander(2 * POINTS - 1, _S - 1))[-1]
 _NEWTON = 14
-_SMALL = 1e-9  # last change of Newton's method, by the size of the motion
+_SMALL, _ROUNDED = 1e-9, 1e-6
+"""Last change of Newton's method by the size of the motion; below what it may be that of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +90,13 @@ class Orbit:
     def scale(self) -> FloatArray:
         """Sizes of the state, shape (2n,): half of what each coordinate moves, and of its velocity.
 
-        At least a hundredth of the largest deflection, or all of it, where nothing moves more.
+        At least a hundredth of its largest value, or all of that, where nothing moves more; and no coordinate
+        counts as less than 1e-3 of the largest one.
         """
         q = self.deflections.reshape(-1, self.start.size)
-        moved, largest = np.ptp(q, axis=0) / 2, max(float(np.abs(q).max()), 1e-9)
-        size = np.maximum(moved, largest * (1e-2 if moved.max() > 1e-2 * largest else 1.0))
+        moved, largest = np.ptp(q, axis=0) / 2, np.abs(q).max(axis=0)
+        size = np.maximum(moved, largest * (1e-2 if (moved > 1e-2 * largest).any() else 1.0))
+        size = np.maximum(size, max(1e-3 * float(size.max()), 1e-9))
         return np.concatenate([size, size * 2 * np.pi / self.period])
 
     @cached_property
@@ -281,12 +284,13 @@ class Periodic:
         numpy.linalg.LinAlgError
             If it does not converge.
         """
-        orbit = guess
+        orbit, before = guess, np.inf
         for k in range(_NEWTON):
             at = self.linearised(orbit)
             orbit, change = at.corrected(rows, values - rows @ self.unknowns(orbit))
-            if change < _SMALL:
+            if change < _SMALL or 0.1 * before < change < _ROUNDED:
                 return self.linearised(orbit), k + 1
+            before = change
             if not change < 1e3 or not orbit.period > 0:
                 break
         raise np.linalg.LinAlgError("Newton's method does not converge")

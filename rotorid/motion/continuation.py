@@ -130,7 +130,7 @@ def follow(
     """
     at, _ = _solved(problem, start.guess, start.rows, start.values, fixed_steps)
     walk = _Walk(problem, low, high, fixed_steps, kind)
-    tangent = walk.unit(at, at.change(start.rows, np.eye(len(start.rows))[-1], left=0.0))
+    tangent = walk.onwards(at, start.rows[-1])
     points, found, length = [walk.point(at)], list[Bifurcation](), _LONGEST / 4
     origin, first, ended = problem.unknowns(at.orbit), at.orbit.scale, ""
     while not ended:
@@ -178,16 +178,15 @@ class _Walk:
         size[-1] = self.high - self.low
         return 1 / size
 
-    def unit(self, at: Linearised, change: FloatArray) -> FloatArray:
-        """A change of length 1."""
-        return change / np.linalg.norm(self.weights(at) * change)
-
     def rows(self, at: Linearised, tangent: FloatArray) -> FloatArray:
         """The phase condition, if there is one, and the length along the tangent."""
-        along = self.weights(at) ** 2 * tangent
+        return self.with_phase(at, self.weights(at) ** 2 * tangent)
+
+    def with_phase(self, at: Linearised, along: FloatArray) -> FloatArray:
+        """A condition, after that of the phase, if there is one: the motion is not moved along itself."""
         if self.problem.turns:
             return along[None]
-        n, phase = at.orbit.start.size, np.zeros(tangent.size)
+        n, phase = at.orbit.start.size, np.zeros(along.size)
         phase[:n] = at.orbit.state[n:] / at.orbit.scale[:n] ** 2
         return np.array([phase, along])
 
@@ -200,11 +199,13 @@ class _Walk:
         values[-1] += length
         guess = at.moved(tangent * length)
         new, iterations = _solved(self.problem, guess, rows, values, self.fixed_steps)
-        return new, self.onwards(new, rows), iterations
+        return new, self.onwards(new, rows[-1]), iterations
 
-    def onwards(self, at: Linearised, rows: FloatArray) -> FloatArray:
-        """The tangent, in the direction of the last row."""
-        return self.unit(at, at.change(rows, np.eye(len(rows))[-1], left=0.0))
+    def onwards(self, at: Linearised, along: FloatArray) -> FloatArray:
+        """The tangent, in the direction of a row."""
+        rows = self.with_phase(at, along)
+        change = at.change(rows, np.eye(len(rows))[-1], left=0.0)
+        return change / np.linalg.norm(self.weights(at) * change)
 
     def step(
         self, at: Linearised, tangent: FloatArray, length: float
@@ -224,10 +225,8 @@ class _Walk:
             values = last @ y
             values[-1] = end
             new, _ = _solved(self.problem, new.orbit, last, values, self.fixed_steps)
-            onwards, length = (
-                self.onwards(new, rows),
-                float(rows[-1] @ (self.problem.unknowns(new.orbit) - y)),
-            )
+            onwards = self.onwards(new, rows[-1])
+            length = float(rows[-1] @ (self.problem.unknowns(new.orbit) - y))
         return new, onwards, iterations, length
 
     def ends(self, orbit: Orbit, first: FloatArray) -> bool:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fem import Rotor
-    from rotorid.base.arrays import FloatArray
+    from rotorid.motion.continuation import Branch
     from rotorid.motion.periodic_table import Readings
     from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
@@ -88,11 +88,7 @@ class PeriodicMotions(Outcome):
     def _judgement(self, k: int) -> str:
         branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
         low, high = min(branch.speeds), max(branch.speeds)
-        parts = [
-            f"{low * RPM:.6g} to {rpm_text(high)}"
-            for stable, low, high in _ranges(branch.speeds, branch.stable)
-            if stable
-        ]
+        parts = [f"{least * RPM:.6g} to {rpm_text(most)}" for least, most in _stable_ranges(branch)]
         where = f"stable at {listing(parts, 'and')}" if parts else "unstable"
         where = "stable throughout" if branch.stable.all() else where
         return (
@@ -112,16 +108,20 @@ class PeriodicMotions(Outcome):
         return on_figure(lambda ax: draw_bifurcations(self.readings, ax), height=4.6)
 
 
-def _ranges(speeds: FloatArray, stable: Sequence[bool]) -> list[tuple[bool, float, float]]:
-    """Stretches of a branch with the same stability, and their speeds."""
-    found: list[tuple[bool, float, float]] = []
-    for speed, steady in zip(speeds, stable, strict=True):
-        if found and found[-1][0] == steady:
-            _, low, high = found.pop()
-            found.append((steady, min(low, speed), max(high, speed)))
-        else:
-            found.append((bool(steady), speed, speed))
-    return found
+def _stable_ranges(branch: Branch) -> list[tuple[float, float]]:
+    """Speeds of the stretches of a branch that are stable, from bifurcation to bifurcation, rad/s."""
+    found: list[list[float]] = []
+    turns = {one.after: one.point.orbit.speed for one in branch.bifurcations}
+    before = False
+    for k, (speed, stable) in enumerate(zip(branch.speeds, branch.stable, strict=True)):
+        at = [turns[k]] if k in turns and stable != before else []
+        if stable:
+            found = found if before else [*found, []]
+            found[-1] += [*at, speed]
+        elif before:
+            found[-1] += at
+        before = stable
+    return [(min(speeds), max(speeds)) for speeds in found]
 
 
 @workflow
