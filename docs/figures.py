@@ -189,9 +189,10 @@ GALLERY = (
     Picture(
         "motion",
         "rotors",
-        "motion sample_data/motion/small.toml --speed 8000rpm --time 20s --displaced 12=20um --view orbits",
-        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its "
-        "turns do not come to the same place.",
+        "motion sample_data/motion/unbalanced.toml --run-up 1000:6000rpm --time 10s "
+        "--sensors 12 --view bode",
+        "In a run-up of 10 s the first critical speed comes later and lower than in steady motion, and the rotor "
+        "rings after it; further up it follows the steady response.",
     ),
     Picture(
         "reduction",

@@ -115,7 +115,7 @@ class Motion(Outcome):
     end
         What it has come to; None where the speed changes or too little is known.
     error
-        Largest difference of positions from those with a tolerance thirty times as large, by how far it moves;
+        Largest difference of positions from those with a tolerance thirty times as large, by its way;
         the error itself is smaller, except where two motions part.
     warnings
         What the reader must know.
