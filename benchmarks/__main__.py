@@ -20,6 +20,7 @@ BENCHMARKS = (
     "balancing_solvers",
     "balancing_discrete",
     "reduction",
+    "motion",
 )
 
 

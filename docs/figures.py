@@ -22,6 +22,7 @@ RESPONSE = (
     f"response {COMPRESSOR} --unbalance sample_data/compressor/unbalance.csv "
     f"--speeds 1000:15000:100rpm {PROBES}"
 )
+MOTION = "sample_data/motion"
 THREE = "reduce sample_data/rotor23.csv --nodes 7,12,18"
 PNG_DOTS = 150
 """Dots an inch of a .png."""
@@ -186,6 +187,13 @@ GALLERY = (
         "to 9000 rpm, this one, which bends, up to 6407 rpm.",
     ),
     Picture(
+        "motion",
+        "rotors",
+        "motion sample_data/motion/small.toml --speed 8000rpm --time 20s --displaced 12=20um --view orbits",
+        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its turns "
+        "do not come to the same place.",
+    ),
+    Picture(
         "reduction",
         "reduction",
         f"{THREE} --modes 2",
@@ -268,6 +276,23 @@ GALLERY = (
         f"fit {FIT}/run_down/model.toml {FIT}/run_down/record.csv",
         "The model follows all three readings and leaves no pattern; the damping at the ends is known"
         " to about 10 %, the mass in the middle to 0.02 %.",
+        dense=True,
+    ),
+    Picture(
+        "run-up",
+        "motion",
+        f"motion {MOTION}/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode",
+        "The run-up passes the first critical speed later and lower than in steady motion, and the second one, "
+        "which the bearings damp well, as in steady motion.",
+        dense=True,
+    ),
+    Picture(
+        "whip",
+        "motion",
+        f"motion {MOTION}/small.toml --speed 9000rpm --time 20s --displaced 7=500um,12=500um,18=500um "
+        "--view orbits",
+        "After a push the rotor whips at 1302 rpm: its journals go round near their clearance circle, its "
+        "middle with 5.6 mm.",
         dense=True,
     ),
 )

@@ -21,6 +21,9 @@ and so on by differentiation. Where the film is that of positive pressure, β = 
 with β alone, since the pressure is zero at both ends. Where it is bound to the line of centres, β = atan2(−x,
 y), the ends count: ∂F_⊥/∂β = −C w ((1 − q)⁻³ − (1 + q)⁻³).
 
+That film is the textbook's: where the line of centres turns faster than the fluid, u < 0, its pressure would
+pull, and the force along the line of centres keeps the sign that it has below, −C (|u| I₂ + w I₃).
+
 Sources: F. W. Ocvirk, NACA TN 2808 (1952); for the film of positive pressure G. Adiletta, A. R. Guido, C.
 Rossi, Nonlinear Dynamics 10 (1996) 251.
 """
@@ -107,12 +110,34 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
         out[i, 2] = gp * S_ + gq * C_ + 0.5 * omega * fa
         out[i, 3], out[i, 4] = fa, fb
         out[i, 5] = 0.5 * (y * fa - x * fb)
-    if line_of_centres:
-        e2 = x * x + y * y
-        if e2 > 0.0:
-            ends = -C * w * ((1.0 - q) ** -3 - (1.0 + q) ** -3)
-            # β = atan2(−x, y): dβ = (−y dx + x dy) / e², and e_⊥ = (−sin β, cos β)
-            out[0, 1] += ends * -S_ * -y / e2
-            out[0, 2] += ends * -S_ * x / e2
-            out[1, 1] += ends * C_ * -y / e2
-            out[1, 2] += ends * C_ * x / e2
+    if line_of_centres and x * x + y * y > 0.0:
+        _at_the_line(C, c, x, y, vx, vy, omega, out)
+
+
+@compiled
+def _at_the_line(
+    C: float, c: float, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray
+) -> None:
+    """Add what the ends of the film at the line of centres count, and where u < 0 the change of its force.
+
+    There q = e / c, w = e', u = −s / e with s = x b − y a; |u| in place of u adds −g s (x, y) to the force,
+    g = 4 C / (c e k⁴).
+    """
+    e2 = x * x + y * y
+    e = math.sqrt(e2)
+    q, k2 = e / c, 1.0 - e2 / (c * c)
+    ends = -C * (x * vx + y * vy) / e * ((1.0 - q) ** -3 - (1.0 + q) ** -3)
+    s = x * vy - y * vx - 0.5 * omega * e2
+    g = 4.0 * C / (c * e * k2 * k2) if s > 0.0 else 0.0
+    slope = g * (4.0 / (c * c * k2) - 1.0 / e2)  # of g by x and y, over x and y
+    s_x, s_y = vy - omega * x, -vx - omega * y
+    for i in range(2):
+        r = x if i == 0 else y
+        # β = atan2(−x, y): dβ = (−y dx + x dy) / e², and e_⊥ = (x, y) / e
+        out[i, 1] -= ends * r / e * y / e2 + (slope * x * s + g * s_x) * r
+        out[i, 2] += ends * r / e * x / e2 - (slope * y * s + g * s_y) * r
+        out[i, 0] -= g * s * r
+        out[i, 1 + i] -= g * s
+        out[i, 3] += g * y * r
+        out[i, 4] -= g * x * r
+        out[i, 5] += 0.5 * g * e2 * r

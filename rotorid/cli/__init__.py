@@ -59,10 +59,13 @@ _COMMANDS: dict[str, dict[str, Callable[..., None]]] = {
         "campbell": campbell.campbell,
         "response": response.response,
         "influence": influence.influence,
+    },
+    "Reduce rotors, let them move": {
+        "reduce": reduce.reduce,
+        "bearings": bearings.bearings,
+        "motion": motion.motion,
         "periodic": periodic.periodic,
     },
-    "Make a small model": {"reduce": reduce.reduce},
-    "Bearings and motion": {"bearings": bearings.bearings, "motion": motion.motion},
     "Identify coefficients": {
         "identify": identify.identify,
         "fit": fit.fit,

@@ -12,6 +12,7 @@ from rotorid.base.plot_style import (
     DARK,
     VERMILION,
     legend_above,
+    legend_below,
     look,
     new_figure,
     note,
@@ -59,11 +60,14 @@ def bearings_figure(found: Sequence[Equilibrium], labels: Sequence[str], thresho
                 ax.plot(rpm, values[:, k].reshape(-1, 4)[:, j], label=sign + name, **look(j))
             if threshold is not None:
                 ax.axvline(threshold * RPM, color=VERMILION, linewidth=0.8)
-                note(ax, "threshold", (threshold * RPM, ax.get_ylim()[1]), (2, -9), color=VERMILION)
+                side = 1 if 2 * threshold * RPM < rpm[0] + 1.4 * rpm[-1] else -1
+                style = {"color": VERMILION, "ha": "left" if side > 0 else "right"}
+                note(ax, "threshold", (threshold * RPM, ax.get_ylim()[1]), (2 * side, -9), **style)
             ax.set(xlabel="speed, rpm" if row == len(labels) else "", ylabel=f"{label}\n{sign}, {unit}")
             plain(ax)
             if row == 1:
                 legend_above(ax, 4, handlelength=1.6, columnspacing=1.0)
+    legend_below(figure, (locus,), 3, title="journals in the clearance circle and in the stability map")
     return figure
 
 
@@ -77,8 +81,17 @@ def draw_loci(found: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> 
         ax.plot(
             Z[:, k].real, Z[:, k].imag, label=label, marker="o", markersize=4, markevery=marked, **look(k)
         )
-    for end, text in ((0, rpm_text(found[0].speed)), (-1, rpm_text(found[-1].speed))):
-        note(ax, text, (Z[end, 0].real, Z[end, 0].imag), (-7, 0), ha="right", va="center")
+    for end in (0, -1):
+        side = 1 if end == 0 and abs(Z[0, 0]) < 0.6 else -1  # where neither wall nor the other speed is
+        shift, words = (7.0 * side, 0.0), rpm_text(found[end].speed)
+        note(
+            ax,
+            words,
+            (Z[end, 0].real, Z[end, 0].imag),
+            shift,
+            ha="left" if side > 0 else "right",
+            va="center",
+        )
     load = found[-1].load.sum()
     if load:
         tip = 0.32 * load / abs(load)
@@ -89,7 +102,6 @@ def draw_loci(found: Sequence[Equilibrium], labels: Sequence[str], ax: Axes) -> 
     note(ax, "Ω", (0.46, 0.54), (2, 2), color=DARK)
     ax.set(xlabel="x by clearance", ylabel="y by clearance", aspect="equal")
     plain(ax)
-    legend_above(ax)
 
 
 def draw_stability_map(found: Sequence[Equilibrium], ax: Axes) -> None:

@@ -1,7 +1,7 @@
 """Static equilibrium of a rotor in its journal bearings, of any number: K(Ω) q = w + Σ F(q, 0, Ω).
 
-By Newton's method, its steps damped and kept inside the clearances; where it fails by continuation in the
-load, from the centred journals on.
+By Newton's method, its steps damped, which keeps them inside the clearances, since beyond a wall a law gives
+NaN; where it fails by continuation in the load, from the centred journals on.
 """
 
 from __future__ import annotations
@@ -18,11 +18,9 @@ from rotorid.base.checks import number
 from rotorid.base.rpm import speed_text
 from rotorid.motion.system import MotionSystem
 
-_CLOSER = 0.8
-"""Share of the way to its wall that a journal goes in one step at most."""
-_ROUNDS = 60
-_SMALLEST_STEP = 1e-4
-"""Of the load, in its continuation; of Newton's way."""
+_ROUNDS = 100
+_SMALLEST_STEP = 1e-9
+"""Of Newton's way, and of the load in its continuation."""
 _CONVERGED = 1e-8
 """Last step by the film's thickness: the error is its square."""
 _SINGULAR = 1e13
@@ -194,11 +192,11 @@ def _newton(
             d = np.asarray(np.linalg.solve(J, r), dtype=float)
         except np.linalg.LinAlgError:
             return None
-        z, dz, walls = _places(system, q), _places(system, d), _walls(system)
-        gap = min((walls - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
+        z, dz = _places(system, q), _places(system, d)
+        gap = min((_walls(system) - np.abs(z)).min(initial=np.inf), np.abs(z + dz).max(initial=0.0))
         if np.abs(dz).max(initial=0.0) <= _CONVERGED * gap:
             return np.asarray(q + d)
-        t, size = _inside(z, dz, walls), np.linalg.norm(r)
+        t, size = 1.0, np.linalg.norm(r)
         while True:
             r, J = _left_over(system, K, q + t * d, speed, share)
             if np.linalg.norm(r) < (1 - 0.1 * t) * size:
@@ -208,16 +206,6 @@ def _newton(
                 return None
         q = q + t * d
     return None
-
-
-def _inside(z: ComplexArray, dz: ComplexArray, walls: FloatArray) -> float:
-    """Share of a step, 1 at most, that leaves the shaft inside all walls."""
-    bounded = np.isfinite(walls) & (dz != 0)
-    z, dz, walls = z[bounded], dz[bounded], walls[bounded]
-    furthest = np.abs(z) + _CLOSER * (walls - np.abs(z))
-    half, square = (z.conj() * dz).real, np.abs(dz) ** 2
-    t = (np.sqrt(half**2 + square * (furthest**2 - np.abs(z) ** 2)) - half) / square
-    return float(min(t.min(initial=1.0), 1.0))
 
 
 def _places(system: MotionSystem, q: FloatArray) -> ComplexArray:

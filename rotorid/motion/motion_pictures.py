@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _TURNS = 12
 """Turns of an orbit that is drawn."""
 _LARGEST_ORDER = 4.0
-_STEADY = 600
+_STEADY = 1000
 """Speeds of the steady response."""
 _PANELS = 4
 _MARKED = 0.3
@@ -91,9 +91,7 @@ def bode_figure(motion: MotionRun) -> Figure:
             (steady_at, steady, ":", f"{name}, steady, linear"),
         ):
             above.plot(at * RPM, 1e6 * np.abs(value), style, color=color, label=words)
-            phase = np.degrees(np.unwrap(np.angle(value)))
-            phase -= 360 * np.round(phase[-1:] / 360)
-            below.plot(at * RPM, phase, style, color=color)
+            below.plot(at * RPM, np.degrees(np.unwrap(np.angle(value))), style, color=color)
     above.set(ylabel="1× of x, µm", ylim=(0, None))
     below.set(xlabel="speed, rpm", ylabel="phase lead, °")
     for ax in (above, below):

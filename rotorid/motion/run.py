@@ -132,12 +132,17 @@ def run(
         raise ValueError("time must be above 0 s")
     if not 1e-13 <= tolerance <= 1e-2:
         raise ValueError(f"tolerance must be from 1e-13 to 1e-2, not {tolerance:g}")
+    for speed in (first, last):
+        system.linear(speed)  # refuses what lies outside the knots
     _check_journals(system, first, last)
     reference = max(first, last) or 2 * np.pi / time
-    rate = A_TURN * reference / (2 * np.pi) if rate is None and max(first, last) else rate or 10_000 / time
+    if rate is None:
+        rate = A_TURN * reference / (2 * np.pi) if max(first, last) else 10_000 / time
+    elif not number(rate, "rate") > 0:
+        raise ValueError("rate must be above 0 samples a second")
     names = system.nodes if nodes is None else tuple(nodes)
     places = np.array([system.index(node) for node in names], dtype=np.intp).reshape(-1, 2)
-    count = int(np.ceil(number(rate, "rate") * time * (1 - 1e-12))) or 1
+    count = int(np.ceil(rate * time * (1 - 1e-12))) or 1
     if count * max(len(names), 1) > _MOST:
         raise ValueError(
             f"{count:,} samples at {len(names)} nodes are more than memory should hold: give fewer nodes, a "

@@ -18,7 +18,7 @@ from rotorid.base.text import counted, listing
 from rotorid.motion.rotor_system import bow_forces, weight_along
 from rotorid.motion.system import MotionSystem, system
 
-_NOT_SYMMETRIC = 1e-9  # share of the largest entry
+_ROUNDING = 1e-9  # share of the largest entry
 _zero = np.array(0.0).copy  # a new one each time
 _MATRICES = ("stiffness", "material_damping", "gyroscopic", "damping")
 
@@ -41,10 +41,10 @@ class SmallModel(Answered):
     weight
         N at 9.80665 m/s², shape (k,).
     stiffness
-        K of the shaft, N/m, symmetric, shape (k, k).
+        K of the shaft, N/m, shape (k, k); symmetric and not negative, as the others.
     material_damping, gyroscopic, damping
-        B, N·s/m, which turns with the shaft, G, kg, and C, N·s/m, of the surroundings; symmetric, shape
-        (k, k), or the number 0.
+        B, N·s/m, which turns with the shaft, G, kg, and C, N·s/m, of the surroundings, shape (k, k), or
+        the number 0.
     supports, forces
         At these nodes.
     unbalance
@@ -233,7 +233,11 @@ def _array(name: str, value: FloatArray, k: int) -> FloatArray:
         raise ValueError(f"{name}: {' × '.join(map(str, shape))} numbers for {counted(k, 'node')}")
     if not np.isfinite(array).all():
         raise ValueError(f"{name}: finite numbers")
-    if name in _MATRICES and np.abs(array - array.T).max() > _NOT_SYMMETRIC * np.abs(array).max():
+    if name in _MATRICES and np.abs(array - array.T).max() > _ROUNDING * np.abs(array).max():
         raise ValueError(f"{name}: a symmetric matrix")
+    if name in _MATRICES and np.linalg.eigvalsh(array)[0] < -_ROUNDING * np.abs(array).max():
+        raise ValueError(
+            f"{name}: a matrix that no motion makes negative; what pushes outwards is a [[seal]]"
+        )
     read_only(array)
     return array

@@ -14,11 +14,7 @@ from rotorid.base.arrays import FloatArray
 def critical_mass(eccentricity: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Where a rigid rotor in a short journal bearing begins to whirl, from Routh and Hurwitz.
 
-    With K and C of the film at the equilibrium, made dimensionless by the load W, clearance c and speed Ω,
-    the rotor of mass m whirls steadily at γ Ω where
-
-        M γ² = κ = (C_xx K_yy + C_yy K_xx − C_xy K_yx − C_yx K_xy) / (C_xx + C_yy),
-        γ² = ((K_xx − κ)(K_yy − κ) − K_xy K_yx) / (C_xx C_yy − C_xy C_yx),  M = m c Ω² / W.
+    K in W / c and C in W / (c Ω), of load W, clearance c and speed Ω, at the equilibrium: docs/theory/motion.
 
     Parameters
     ----------
@@ -28,8 +24,8 @@ def critical_mass(eccentricity: ArrayLike) -> tuple[FloatArray, FloatArray]:
     Returns
     -------
     M, γ
-        Critical mass number, infinite where the rotor is stable at every speed, and whirl frequency by speed,
-        NaN there.
+        Critical mass number m c Ω² / W, infinite where the rotor is stable at every speed; frequency of the
+        whirl by Ω, NaN there.
 
     Raises
     ------

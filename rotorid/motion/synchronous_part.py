@@ -16,14 +16,14 @@ _OF_A_TURN, _A_TURN = 64, 8
 def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, ComplexArray]:
     """Follow the synchronous part of the deflections in x, that of x(t) = Re(X e^{iφ}) + the rest.
 
-    Each value is that of so many whole turns.
+    Each value is a mean over so many whole turns, which fades at both ends.
 
     Parameters
     ----------
     motion
         With eight samples a turn at least.
     turns
-        Averaged over, 1 or more.
+        Averaged over, 2 or more.
 
     Returns
     -------
@@ -35,6 +35,7 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
         For fewer samples a turn, or fewer turns.
     """
     from scipy.interpolate import CubicSpline
+    from scipy.signal import fftconvolve
 
     angle = motion.turned - motion.turned[0]
     whole = int(angle[-1] / (2 * np.pi))
@@ -48,8 +49,7 @@ def synchronous_part(motion: MotionRun, turns: int = 4) -> tuple[FloatArray, Com
     rising = np.concatenate([[True], np.diff(angle) > 0])
     x = CubicSpline(angle[rising], motion.z.real[rising])(even)
     turning = 2 * x * np.exp(-1j * (motion.turned[0] + even))[:, None]
-    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(turning, axis=0)])
-    width = turns * _OF_A_TURN
-    mean = (total[width:-1] - total[: -1 - width]) / width
+    window = np.hanning(turns * _OF_A_TURN + 1)[:-1]
+    mean = fftconvolve(turning, window[:, None] / window.sum(), mode="valid", axes=0)
     each = slice(None, None, _OF_A_TURN // _A_TURN)
     return np.interp(even[: len(mean)] + turns * np.pi, angle, motion.speed)[each], mean[each]

@@ -12,6 +12,7 @@ from rotorid.workflows.identify import Coefficients, IdentifyOptions, identify
 from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influence
 from rotorid.workflows.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
+from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
@@ -39,6 +40,8 @@ __all__ = [
     "InfluenceOptions",
     "ModesOfReadings",
     "ModesOptions",
+    "Motion",
+    "MotionOptions",
     "Outcome",
     "PermissibleUnbalance",
     "RecordFit",
@@ -65,6 +68,7 @@ __all__ = [
     "identify",
     "influence",
     "modes",
+    "motion",
     "reduce",
     "response",
     "simulate",

@@ -64,6 +64,17 @@ PINNED = {
         "slowest_decay": -1.35235759,
         "largest_response_error": 0.0471078292,
     },
+    "reduce_and_run_up": {
+        "mass_kg": 558.534651,
+        "load_N": 2789.69582,
+        "threshold_rpm": 6407.82,
+        "rotor_threshold_rpm": 6407.0,
+        "damped_threshold_rpm": 11748.1,
+        "whip_rpm": 1302,
+        "whip_eccentricity": 0.91,
+        "first_critical_rpm": 1416,
+        "second_critical_rpm": 5413,
+    },
     "identify_bearings": {
         "kxx": 89446567.2,
         "kxy": 30189073.8,
@@ -216,6 +227,15 @@ def test_the_page_of_the_rig_shows_what_the_example_prints(ran):
     all_others = ["A001", "A002", "A007", "A008", "A009", "A015", "A017", "A018", "A019", "A020"]
     assert runs == [*all_others, *(run for run in all_others if run not in ("A007", "A015"))]
     assert len([line for line in text.splitlines() if "regions that hold the truth" in line]) == 2
+
+
+def test_the_page_on_the_masses_in_motion_shows_what_its_example_prints(ran):
+    _, text, _ = ran("reduce_and_run_up")
+    (shown,) = [
+        b for b in blocks(FOLDER.parent / "docs" / "book" / "motion.md") if b.kind == "{code-block} text"
+    ]
+    assert len(shown.text.splitlines()) >= 8
+    assert first_difference(["...", *shown.text.splitlines()], text) is None
 
 
 def test_the_methods_of_the_rig(capsys):

@@ -54,6 +54,9 @@ TOLERANCES: tuple[Tolerance, ...] = (
     Tolerance(
         "campbell-*", "rotorid: estimated_relative_error = #", "a change near rounding itself", absolute=1e-12
     ),
+    Tolerance(
+        "bearings", "stability.smallest_log_decrement", "0 where the mode begins to grow", absolute=1e-10
+    ),
     Tolerance("bk*", "*chi_square*", "as many readings as weights leave nothing", absolute=1e-20),
     # certificates, and what an iterative solver leaves
     Tolerance("*", "*duality_gap*", _CERTIFICATE, absolute=1e-7),

@@ -126,9 +126,11 @@ def read_small_model(path: str | Path) -> SmallModel:
 
     def node(section: Section) -> int | None:
         value = section.take("node")
-        if found is not None and (isinstance(value, bool) or value not in nodes):
+        if type(value) is int and value in nodes:
+            return value
+        if found is not None:
             section.complain("node", f"one of the nodes {listing(map(str, nodes))}")
-        return value if value in nodes else None
+        return None
 
     def vectors(key: str, keys: Sequence[Key]) -> dict[int, complex]:
         total: dict[int, complex] = {}

@@ -84,7 +84,7 @@ class MotionOptions:
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
     tolerance : T
-        Error of one step by the largest deflection; default: 1e-6.
+        Error of one step by the largest deflection.
     """
 
     speed: str | float | None = None
@@ -315,7 +315,8 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
             for one in (tolerance, min(_LOOSER * tolerance, 1e-2))
         )
     if found.stopped:
-        raise ValueError(f"{found.stopped} (--time {0.999 * found.time[-1]:.4g} shows the motion until then)")
+        until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
+        raise ValueError(found.stopped + until)
     k = min(found.time.size, rough.time.size)
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / (np.abs(found.z).max() or 1.0))
     constant = ends[0] == ends[1] and found.time.size >= LEAST_SAMPLES
@@ -347,7 +348,10 @@ def _course(options: MotionOptions) -> tuple[tuple[float, float], float]:
             )
         ends = (found[0], found[1])
     if (options.time is None) == (options.acceleration is None):
-        raise ValueError("--time is needed" + (", or --acceleration" if options.run_up is not None else ""))
+        one = (
+            "--time is needed" if options.speed is not None else "one of --time and --acceleration is needed"
+        )
+        raise ValueError(one)
     if options.time is None:
         return ends, abs(ends[1] - ends[0]) / _acceleration(options.acceleration or 0.0)
     time = number(str(options.time).strip().removesuffix("s"))

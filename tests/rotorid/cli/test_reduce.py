@@ -306,6 +306,9 @@ def test_the_sample_small_model_is_what_its_command_makes(cli, tmp_path, monkeyp
     assert made.read_text(encoding="utf-8").splitlines()[0] == f"# rotorid {command}"
     assert mine.nodes == theirs.nodes == (2, 7, 12, 18, 22)
     assert mine.forces == theirs.forces
+    unbalanced = (MOTION / "unbalanced.toml").read_text(encoding="utf-8")
+    assert unbalanced.startswith(stored.read_text(encoding="utf-8"))
+    assert list(read_small_model(MOTION / "unbalanced.toml").unbalance) == [7, 18]
     for name in ("masses", "weight", "stiffness", "damping"):
         stated = getattr(theirs, name)
         np.testing.assert_allclose(getattr(mine, name), stated, rtol=1e-7, atol=1e-9 * np.abs(stated).max())

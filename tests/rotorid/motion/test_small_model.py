@@ -16,7 +16,7 @@ from rotorid.motion.rotor_system import rotor_system
 from rotorid.motion.small_model import SmallModel
 from rotorid.reduction import reduce, small_rotor
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor, read_small_model
+from rotorid.tables import read_rotor
 from tests.helpers.cases import each_of
 from tests.helpers.fem_rotors import rotor23
 
@@ -117,7 +117,7 @@ def test_frequencies_from_soft_to_stiff_bearings():
 def test_threshold_and_static_loads_in_journal_bearings_are_the_rotor_s():
     """At each speed the equilibrium, then all eigenvalues of what is linear about it, of both."""
     rotor = read_rotor(sample_data() / "motion" / "rotor.toml")
-    model = read_small_model(sample_data() / "motion" / "small.toml")
+    model = reduced(rotor)
     band = 600.0, 720.0
     both = [rotor_system(rotor, *band), model.system(*band)]
 

@@ -56,7 +56,7 @@ def written(tmp_path, text):
 def some(seed):
     rng = np.random.default_rng(seed)
     half = rng.normal(size=(4, 3, 3))
-    K, B, G, C = half + half.swapaxes(1, 2)
+    K, B, G, C = half @ half.swapaxes(1, 2)
     return SmallModel(
         nodes=(2, 7, 30),
         masses=rng.uniform(0, 100, 3),
@@ -143,6 +143,9 @@ def test_a_bearing_over_speed_stands_in_a_table_of_its_own(tmp_path):
         ),
         ("node = 9\n", "", r"key journal_bearing\[1\].node: expected one of the nodes 1, 5 or 9"),
         ("node = 9\n", "node = [9]\n", r"key journal_bearing\[1\].node: found"),
+        ("[-2e6, 4e6", "[-2e6, -4e6", r"key shaft_stiffness_N_per_m: expected a matrix that no motion makes"),
+        ("node = 1\n", "node = 1.0\n", r"key bearing\[1\].node: found '1.0', expected one of the nodes"),
+        ("node = 5\n", "node = true\n", r"key unbalance\[1\].node: found 'true', expected one of the nodes"),
         ("clearance_um = 150", "clearance_um = 0", r"clearance_um.*above 0"),
         ("angle_deg = 90", "", r"unbalance\[1\].angle_deg: expected the angle"),
         ("nodes", "gyroscopics_kg = [[1]]\nnodes", r"a known key \(gyroscopic_kg\?\)|did you mean"),

@@ -1,0 +1,161 @@
+"""`rotorid motion`: what it prints, writes, draws and refuses."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import fem
+from fem.model.node_forces import JournalBearing
+from rotorid.samples import sample_data
+from rotorid.tables import read_rotor
+from rotorid.workflows import MotionOptions, motion
+
+ROTOR = sample_data() / "motion" / "rotor.toml"
+SHORT = ("--speed", "4000rpm", "--time", "0.3s")
+
+
+@pytest.fixture
+def unbalance(tmp_path):
+    path = tmp_path / "unbalance.csv"
+    path.write_text("plane,unbalance_g_mm,angle_deg\n12,5000,30\n")
+    return path
+
+
+def test_the_document(cli, unbalance):
+    found = cli("motion", ROTOR, *SHORT, "--unbalance", unbalance, "--sensors", "12", "--json").json
+    assert list(found["positions_m"]) == ["12", "2", "22"]
+    z = np.array(found["positions_m"]["2"])
+    assert z.shape == (len(found["time_s"]), 2)
+    assert found["time_s"][-1] == 0.3
+    assert found["speed_rad_s"][0] == found["speed_rad_s"][-1] == pytest.approx(4000 * np.pi / 30)
+    assert found["angle_rad"][-1] == pytest.approx(0.3 * 4000 * np.pi / 30)
+    least, most = found["eccentricity"]["left"]
+    last = np.hypot(*z[found["time_s"].index(max(found["time_s"])) // 2 :].T) / 1.5e-4
+    assert last.min() - 1e-3 < least < most < last.max() + 1e-3
+    assert found["steady"] is False  # 20 turns
+    assert found["multipliers"] is None
+    assert found["position_error"] < 1e-4
+    assert found["reduction"]["frequency_error"] < 0.01
+
+
+def test_the_table_agrees_with_the_document(cli, unbalance, tmp_path):
+    given = (
+        "motion",
+        ROTOR,
+        "--run-up",
+        "3000:1000rpm",
+        "--acceleration",
+        "4000rpm/s",
+        "--unbalance",
+        unbalance,
+    )
+    document = cli(*given, "--json").json
+    told = cli(*given, "--output", tmp_path / "m.csv")
+    table = pd.read_csv(tmp_path / "m.csv")
+    assert told.out.startswith("From 3000 rpm to 1000 rpm in 0.5000 s")
+    np.testing.assert_allclose(table["t_s"], document["time_s"], rtol=1e-12)
+    np.testing.assert_allclose(table["speed_rpm"], np.linspace(3000, 1000, len(table)))
+    np.testing.assert_allclose(np.radians(table["angle_deg"]), document["angle_rad"], rtol=1e-12)
+    for k, axis in enumerate("xy"):
+        z = np.array(document["positions_m"]["22"])[:, k]
+        np.testing.assert_allclose(table[f"{axis}_22_um"], 1e6 * z, rtol=1e-12)
+
+
+def test_more_modes_change_little(unbalance):
+    options = {"speed": "4000rpm", "time": 0.1, "unbalance": unbalance, "sensors": "12", "rate": 2000.0}
+    few, many, all_of_them = (motion(ROTOR, MotionOptions(**options, modes=modes)) for modes in (4, 12, 24))
+    z = all_of_them.motion.z
+    assert np.abs(many.motion.z - z).max() < 1e-3 * np.abs(z - z[0]).max()
+    assert np.abs(few.motion.z - z).max() < 3e-2 * np.abs(z - z[0]).max()
+    assert all_of_them.reduced.error < many.reduced.error < few.reduced.error < 0.01
+    assert few.reduced.first_left_out < many.reduced.first_left_out
+
+
+def test_at_rest_it_stays_and_says_so(cli):
+    told = cli("motion", ROTOR, *SHORT)
+    assert told.out.startswith("At 4000 rpm it comes to rest.")
+    assert "nothing excites it" in told.out
+    assert len(told.out.splitlines()) <= 24
+    assert max(map(len, told.out.splitlines())) <= 100
+
+
+def test_a_start_in_steady_motion_has_no_transient(unbalance):
+    options = {"speed": "4000rpm", "time": 0.4, "unbalance": unbalance, "start": "steady"}
+    end = motion(ROTOR, MotionOptions(**options)).end
+    assert end.periodic
+    assert end.period == 1
+
+
+@pytest.mark.parametrize("view", ["motion", "orbits"])
+def test_pictures_of_a_motion(cli, tmp_path, view):
+    picture = tmp_path / "p.png"
+    cli("motion", ROTOR, *SHORT, "--displaced", "12=20um@45", "--view", view, "--plot", picture)
+    assert picture.stat().st_size > 10_000
+
+
+def test_pictures_of_a_run_up(unbalance):
+    options = MotionOptions(run_up="1000:3000rpm", time=2.0, unbalance=unbalance, sensors="12")
+    found = motion(ROTOR, options)
+    above, below = found.figure("bode").axes
+    assert above.get_ylabel() == "1× of x, µm"
+    assert below.get_xlabel() == "speed, rpm"
+    run, steady = above.get_lines()[:2]
+    # far above the critical speed the run-up follows the steady response
+    speed, size = run.get_data()
+    far = speed > 2500
+    at = np.interp(speed[far], *steady.get_data())
+    np.testing.assert_allclose(size[far], at, rtol=0.15)
+    assert len(found.figure("polar").axes) == 1
+    for view in ("bode", "polar"):
+        with pytest.raises(ValueError, match="--run-up has one"):
+            motion(ROTOR, MotionOptions(speed="4000rpm", time=0.1)).figure(view)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--speed", "0", "--time", "1"), "speed 0: the journal bearing 'left' at node 2"),
+        (("--speed", "4000rpm"), "--time is needed"),
+        (("--time", "1"), "one of --speed and --run-up is needed"),
+        (("--run-up", "4000rpm", "--time", "1"), "use FIRST:LAST"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "3rpm"), "300rpm/s"),
+        (("--run-up", "1000:2000rpm", "--time", "1", "--acceleration", "3rpm/s"), "one of --time and --acc"),
+        (("--run-up", "1000:2000rpm", "--acceleration", "0rpm/s"), "must be above 0"),
+        ((*SHORT, "--acceleration", "3rpm/s"), "belongs to --run-up"),
+        (("--speed", "4000rpm", "--time", "-1"), "seconds above 0"),
+        ((*SHORT, "--displaced", "12=3"), "a number with its unit"),
+        ((*SHORT, "--displaced", "99=3um"), "node 99 does not exist"),
+        (
+            (*SHORT, "--displaced", "2=300um"),
+            "touches the wall of the journal bearing 'left' at node 2 after 0 s",
+        ),
+        ((*SHORT, "--sensors", "77"), "node 77 does not exist"),
+        ((*SHORT, "--modes", "500"), "from 0 to 92"),
+        ((*SHORT, "--rate", "0"), "rate must be above 0"),
+    ],
+)
+def test_what_is_impossible(cli, given, message):
+    told = cli("motion", ROTOR, *given, status=2)
+    assert message in told.err
+    assert len(told.err.strip().splitlines()) == 1
+
+
+def test_a_journal_that_touches_its_wall(tmp_path):
+    # an unbalance that no film holds
+    rotor = read_rotor(ROTOR)
+    with pytest.raises(
+        ValueError, match=r"touches the wall of the journal bearing '.*' at node .* after .* s, at"
+    ):
+        motion(rotor, MotionOptions(speed="6000rpm", time=1.0, unbalance={12: 2.0}))
+
+
+def test_a_bearing_table_that_ends(cli):
+    table = fem.Support(1, np.array([3e7, 4e7])[:, None, None] * np.eye(2), 1e3, speeds=(100.0, 200.0))
+    rotor = fem.Rotor(
+        length=[0.3, 0.3],
+        outer_diameter=0.1,
+        supports=[table],
+        forces=[JournalBearing(3, "", 0.05, 0.1, 1e-4, 0.02)],
+    )
+    with pytest.raises(ValueError, match="its table holds"):
+        motion(rotor, MotionOptions(run_up=(150.0, 250.0), time=1.0))
