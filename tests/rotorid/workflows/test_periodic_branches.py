@@ -17,7 +17,7 @@ def test_rest_loses_stability_where_the_linear_rotor_does(cli, tmp_path):
     (hopf,) = found["bifurcations"]
     assert hopf["bifurcation"] == "Hopf"
     linear = cli("bearings", ROTOR, "--speeds", "5500:7000:100rpm", "--json").json["stability"]
-    assert hopf["speed_rad_s"] == pytest.approx(linear["threshold_speed_rad_s"], rel=2e-3)
+    assert hopf["speed_rad_s"] == pytest.approx(linear["threshold_rad_s"], rel=1e-5)
     assert hopf["whirl_ratio"] == pytest.approx(0.19, abs=0.002)
     (rest,) = found["branches"]
     assert rest["kind"] == "rest"
@@ -46,16 +46,17 @@ def test_the_answer_and_the_picture(cli, tmp_path):
         ((*RANGE, "--steps", "100000"), "--steps takes a whole number from 4"),
         ((*RANGE, "--subsynchronous", "99"), "from 2 to 12"),
         ((*RANGE, "--sensors", "99"), "node 99 does not exist"),
-        (("--speeds", "1:20rpm"), "node"),
     ],
 )
 def test_what_is_impossible(cli, given, message):
-    told = cli("periodic", ROTOR, *given, status=2)
+    told = cli("periodic", ROTOR, *given)
+    assert told.code == 2
     assert message in told.err
     assert len(told.err.strip().splitlines()) == 1
 
 
 def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
     (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n12,5000,30\n")
-    told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv", status=2)
+    told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv")
+    assert told.code == 2
     assert "a period of its own" in told.err
