@@ -187,14 +187,6 @@ GALLERY = (
         "to 9000 rpm, this one, which bends, up to 6407 rpm.",
     ),
     Picture(
-        "motion",
-        "rotors",
-        "motion sample_data/motion/unbalanced.toml --run-up 1000:6000rpm --time 10s "
-        "--sensors 12 --view bode",
-        "In a run-up of 10 s the first critical speed comes later and lower than in steady motion, and the rotor "
-        "rings after it; further up it follows the steady response.",
-    ),
-    Picture(
         "reduction",
         "reduction",
         f"{THREE} --modes 2",
