@@ -29,8 +29,7 @@ _S = 4
 
 def _radau() -> tuple[FloatArray, FloatArray]:
     """Points c, shape (s,), and coefficients a, shape (s, s), of Radau IIA."""
-    P = np.polynomial
-    c = np.sort(P.Legendre([0] * (_S - 1) + [-1, 1]).roots() / 2 + 0.5)
+    c = np.sort(np.real(np.polynomial.legendre.legroots([0.0] * (_S - 1) + [-1.0, 1.0]))) / 2 + 0.5
     c[-1] = 1.0
     powers = np.arange(1, _S + 1)
     a = (c[:, None] ** powers / powers) @ np.linalg.inv(c[:, None] ** (powers - 1))
@@ -326,15 +325,14 @@ class Linearised:
     @cached_property
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers, the largest first, shape (2 n,)."""
-        n = self.orbit.start.size
         scale = self.orbit.scale
         values = np.linalg.eigvals(self.monodromy * scale / scale[:, None])
-        return values[np.argsort(-np.abs(values), kind="stable")].astype(complex)[: 2 * n]
+        return values[np.argsort(-np.abs(values), kind="stable")].astype(complex)
 
     @property
     def monodromy(self) -> FloatArray:
         """Derivative of the state after one period by that before, shape (2 n, 2 n)."""
-        return self.states[-1][:, : 2 * self.orbit.start.size]
+        return np.asarray(self.states[-1][:, : 2 * self.orbit.start.size])
 
     @property
     def scale(self) -> FloatArray:

@@ -278,7 +278,7 @@ class _Walk:
         value = self.point(at).multipliers[which]
         scale = at.orbit.scale
         values, vectors = np.linalg.eig(at.monodromy * scale / scale[:, None])
-        direction = vectors[:, np.abs(values - value).argmin()] * scale
+        direction = vectors[:, np.abs(values - value).argmin()].astype(complex) * scale
         alone = abs(value.imag) < 1e-6
         if self.kind == "rest" and not (alone and value.real > 0):
             return HOPF, direction

@@ -387,7 +387,9 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports]
     chosen = (
-        {*map(source.node, stations), *walled, *supports} if stations or len(system.nodes) > _SMALL else ()
+        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
+        if stations or system.size > _SMALL
+        else ()
     )
     return tuple(sorted(chosen)) or system.nodes
 

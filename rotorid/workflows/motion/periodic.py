@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from rotorid.base.answer import COLUMNS, Answer
 from rotorid.base.result import frame, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
 from rotorid.base.text import listing
-from rotorid.workflows.motion.moving_system import Moving, Table, moving
+from rotorid.workflows.motion.moving_system import Moving, moving
 from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
 from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
 
@@ -47,6 +47,13 @@ class PeriodicOptions:
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     steps : N
         Steps in time of one revolution or cycle; default: 16 or more, as the motion needs them.
+    unbalance : FILE
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+    bow : FILE
+        Table of the shaft's bow at rest; a small model has its own.
+    modes : N
+        Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
+        default: those up to 4 times the highest speed, all of a small model.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     """
@@ -56,6 +63,9 @@ class PeriodicOptions:
     subsynchronous: int | None = None
     limit_cycle: bool = False
     steps: int | None = None
+    unbalance: Path | str | Mapping[int, complex] | None = None
+    bow: Path | str | Mapping[int, complex] | None = None
+    modes: int | None = None
     gravity_direction: float = -90.0
 
 
@@ -125,12 +135,7 @@ def _stable_ranges(branch: Branch) -> list[tuple[float, float]]:
 
 
 @workflow
-def periodic(
-    model: Rotor | SmallModel | Path | str,
-    options: PeriodicOptions,
-    unbalance: Table | None = None,
-    bow: Table | None = None,
-) -> PeriodicMotions:
+def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -> PeriodicMotions:
     """Find periodic motions of a rotor over a range of speeds, their stability and bifurcations.
 
     Parameters
@@ -139,8 +144,6 @@ def periodic(
         A rotor, a rotor table or file, or a small model.
     options
         The speeds, and what differs from the defaults.
-    unbalance, bow
-        Of a rotor: tables, or kg·m and m by node.
 
     Raises
     ------
@@ -160,12 +163,14 @@ def periodic(
         raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 12")
     if options.steps is not None and not 4 <= options.steps <= _MOST_STEPS:
         raise ValueError(f"--steps takes a whole number from 4 to {_MOST_STEPS}")
-    what = moving(model, unbalance, bow, degrees(options.gravity_direction, "--gravity-direction"))
+    direction = degrees(options.gravity_direction, "--gravity-direction")
+    what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
-    system = full if full.size <= _SMALL else reduced_system(full, kept).system
+    few = full.size <= _SMALL and options.modes is None
+    system = full if few else reduced_system(full, kept, options.modes).system
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
