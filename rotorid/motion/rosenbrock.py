@@ -319,13 +319,14 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
             vain += 1
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
             continue
-        while written < len(times) and times[written] <= t + step:
+        then = end if step == end - t else t + step
+        while written < len(times) and times[written] <= then:
             between(state[0], now[0], stages[0], (times[written] - t) / step, out[written])
             written += 1
         state[:] = now
         q[:], v[:] = now[0], now[1]
         largest[:] = sizes
-        t = end if step == end - t else t + step
+        t = then
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)
     return DONE, -1, t, h, done, vain, written

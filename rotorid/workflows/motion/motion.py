@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -309,11 +310,11 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     tolerance = options.tolerance
     with phase("start"):
         start = begin(system, ends[0], options.start, shift, tolerance)
+    move = partial(run, system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate)
     with phase("motion"):
-        found, rough = (
-            run(system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate, tolerance=one)
-            for one in (tolerance, min(_LOOSER * tolerance, 1e-2))
-        )
+        found = move(tolerance=tolerance)
+    with phase(f"motion with {_LOOSER:g} times the tolerance"):
+        rough = move(tolerance=min(_LOOSER * tolerance, 1e-2))
     if found.stopped:
         until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
         raise ValueError(found.stopped + until)
@@ -386,7 +387,9 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports]
     chosen = (
-        {*map(source.node, stations), *walled, *supports} if stations or len(system.nodes) > _SMALL else ()
+        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
+        if stations or system.size > _SMALL
+        else ()
     )
     return tuple(sorted(chosen)) or system.nodes
 
