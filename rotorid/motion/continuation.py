@@ -12,6 +12,7 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
+_CORNER = 1e-4  # a shorter step may turn sharply: where a shaft meets its stop, the branch has a corner
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
 _NEAR = 0.999  # of a clearance is at the wall
 _LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
@@ -215,7 +216,8 @@ class _Walk:
         weights, y = self.weights(at), self.problem.unknowns(at.orbit)
         aside = weights * (self.problem.unknowns(new.orbit) - y - tangent * length)
         turn = (weights * tangent) @ (weights * onwards) / np.linalg.norm(weights * onwards)
-        if np.linalg.norm(aside) > 0.5 * length or turn < 0.9:
+        far = np.linalg.norm(aside) > 0.5 * length or turn < 0.9
+        if far and length > _CORNER:
             raise np.linalg.LinAlgError("the branch turns too sharply")
         end = min(max(new.orbit.speed, self.low), self.high)
         if end != new.orbit.speed:
@@ -278,7 +280,7 @@ class _Walk:
         value = self.point(at).multipliers[which]
         scale = at.orbit.scale
         values, vectors = np.linalg.eig(at.monodromy * scale / scale[:, None])
-        direction = vectors[:, np.abs(values - value).argmin()].astype(complex) * scale
+        direction = np.asarray(vectors[:, np.abs(values - value).argmin()] * scale, dtype=np.complex128)
         alone = abs(value.imag) < 1e-6
         if self.kind == "rest" and not (alone and value.real > 0):
             return HOPF, direction

@@ -150,7 +150,7 @@ class _Search:
         for speed in np.linspace(self.low, self.high, 9)[1:-1] if not found else ():
             try:
                 guess = settled(problem, float(speed), turns * self.count, _at_rest(self.system, speed), 0)
-                for _ in range(60):
+                for _ in range(30):
                     guess = problem.marched(guess)
                 begin = at_speed(problem, guess)
                 guess = problem.solve(guess, begin.rows, begin.values)[0].orbit
