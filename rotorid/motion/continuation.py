@@ -12,10 +12,11 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
+_UNITY = 1.0 + 1e-9  # a multiplier up to this is not outside the unit circle: rounding
 _CORNER = 1e-4  # a shorter step may turn sharply: where a shaft meets its stop, the branch has a corner
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
 _NEAR = 0.999  # of a clearance is at the wall
-_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
+_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 32, 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -38,7 +39,7 @@ class Point:
     @property
     def outside(self) -> int:
         """How many multipliers are outside the unit circle."""
-        return int((np.abs(self.multipliers) > 1.0).sum())
+        return int((np.abs(self.multipliers) > _UNITY).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +268,8 @@ class _Walk:
 
         def test(s: float) -> float:
             there, direction, _ = self.corrected(at, tangent, s)
-            return float(direction[-1] if fold else np.log(np.abs(self.point(there).multipliers[few])))
+            size = np.abs(self.point(there).multipliers[few])
+            return float(direction[-1] if fold else np.log(size / _UNITY))
 
         there = self.corrected(at, tangent, _root(test, length))[0]
         kind, eigenvector = (FOLD, tangent[: -at.free].astype(complex)) if fold else self._kind(there, few)

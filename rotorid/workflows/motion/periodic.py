@@ -46,7 +46,7 @@ class PeriodicOptions:
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     steps : N
-        Steps in time of one revolution or cycle; default: 16 or more, as the motion needs them.
+        Steps in time of one revolution or cycle; default: 32 or more, as the motion needs them.
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
     bow : FILE

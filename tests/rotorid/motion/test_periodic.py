@@ -326,7 +326,7 @@ def test_a_journal_without_mass_against_long_integration():
 
 
 def test_a_stop_is_met_where_the_free_orbit_is_as_large_as_its_gap():
-    """Above the resonance the branch folds there: the free orbit, u Ω² / |1 − Ω² + 2 i ζ Ω|, grazes the ring."""
+    """Above the resonance the branch folds there: the free orbit, u Ω² / |1 − Ω² + 2 i ζ Ω|, grazes it."""
     ring = Stop(1, "", gap=1.0, stiffness=10.0, damping=0.1, diameter=1.0)
     problem = disc(1.0, [ring], damping=0.1, stiffness=(1.0, 1.0), unbalance=0.3)
     found = periodic_motion(problem, 0.5, 2.0)
