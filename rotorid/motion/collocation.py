@@ -363,6 +363,8 @@ class Linearised:
 
 def wall_met(system: MotionSystem, q: FloatArray, near: float = 1.0) -> str:
     """The node that is nearer to its wall than 1 − `near` of its clearance, in words; q (…, n)."""
+    if not system.forces:
+        return ""
     places = system.law_tables[2]
     walls = np.array([force.wall for force in system.forces])
     share = np.hypot(q[..., places[:, 0]], q[..., places[:, 1]]).reshape(-1, len(walls)).max(axis=0) / walls

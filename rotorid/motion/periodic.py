@@ -28,7 +28,7 @@ _STEPS = 32  # in one revolution, or one period of a motion's own, to begin with
 _COARSE = 1e-3
 """Of `Orbit.roughness`."""
 _SAME = 0.02  # of the motion: what differs by less is no other motion
-_CYCLES = 100  # of motion in time, before it is taken for a limit cycle
+_CYCLES = 60  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
 

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from rotorid.samples import sample_data
+from rotorid.workflows import PeriodicOptions, ResponseOptions, periodic, response
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
 RANGE = ("--speeds", "6200:6600rpm")
@@ -60,3 +61,19 @@ def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
     told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv")
     assert told.code == 2
     assert "a period of its own" in told.err
+
+
+def test_on_linear_supports_it_is_the_response():
+    """The compressor on its table of bearings; the rotor is reduced here, which costs a thousandth."""
+    folder = sample_data() / "compressor"
+    given = PeriodicOptions(
+        speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30", modes=40
+    )
+    found = periodic(folder / "rotor.toml", given).readings
+    (branch,) = found.motion.branches
+    speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
+    options = ResponseOptions(speeds=speeds, sensors="2,12:30")
+    steady = response(folder / "rotor.toml", folder / "unbalance.csv", options)
+    size = abs(steady.response.readings(steady.sensors))
+    np.testing.assert_allclose(found.along[0][[0, -1]], size, rtol=1e-3)
+    assert branch.stable.all()
