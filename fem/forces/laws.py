@@ -19,7 +19,7 @@ from fem.model.node_forces import (
     Stop,
 )
 from rotorid.base.arrays import FloatArray, IndexArray
-from rotorid.base.compiled import compiled
+from rotorid.base.compiled import compiled_part
 
 _FILM, _SEAL, _SPRING, _STOP, _INTERNAL = range(5)
 _CODES = {
@@ -49,7 +49,7 @@ def tables(forces: Sequence[NodeForce]) -> tuple[IndexArray, FloatArray]:
     return codes, values
 
 
-@compiled
+@compiled_part
 def law(
     code: int, v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray
 ) -> None:

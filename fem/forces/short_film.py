@@ -33,12 +33,12 @@ from __future__ import annotations
 import math
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.compiled import compiled
+from rotorid.base.compiled import compiled_part
 
 _WALL = 1e-14  # of 1 − ε², below which it is rounding
 
 
-@compiled
+@compiled_part
 def short_film(  # noqa: PLR0913  what is compiled takes no objects
     C: float,
     c: float,
@@ -114,7 +114,7 @@ def short_film(  # noqa: PLR0913  what is compiled takes no objects
         _at_the_line(C, c, x, y, vx, vy, omega, out)
 
 
-@compiled
+@compiled_part
 def _at_the_line(
     C: float, c: float, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray
 ) -> None:

@@ -12,10 +12,10 @@ from __future__ import annotations
 import math
 
 from rotorid.base.arrays import FloatArray
-from rotorid.base.compiled import compiled
+from rotorid.base.compiled import compiled_part
 
 
-@compiled
+@compiled_part
 def stop(v: FloatArray, x: float, y: float, vx: float, vy: float, omega: float, out: FloatArray) -> None:
     """Force on the shaft and its derivatives.
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
-
-import numpy as np
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -24,17 +21,25 @@ def compiled(function: _F) -> _F:
     return Compiled(function) if COMPILED else function  # type: ignore[return-value, arg-type]
 
 
+def compiled_part(function: _F) -> _F:
+    """The same for what compiled functions call: called from Python, a few times, it runs as Python does.
+
+    To load numba takes longer than some thousand such calls.
+    """
+    return Part(function) if COMPILED else function  # type: ignore[return-value, arg-type]
+
+
 class Compiled:
     """A function that numba compiles at its first call: until then numba is not imported.
 
-    Machine code is kept beside the module for the next start, as long as this function and all that it calls
-    are what they were: numba alone looks at the file of the function only, and would go on with old code of
-    functions that it takes from other files.
+    Machine code is kept beside the module for the next start as long as its `stamp` is the same: numba alone
+    would look at the file of the function only, and go on with old code of what it takes from other files.
 
     Parameters
     ----------
     function
-        As Python has it, later `py_func`; it may call others of this class by their global names.
+        As Python has it, later `py_func`. It may call others of this class by their global names; constants
+        stand in the modules of these functions.
     """
 
     def __init__(self, function: FunctionType) -> None:
@@ -45,45 +50,33 @@ class Compiled:
         """As the function."""
         return self.machine(*arguments)
 
-    @property
-    def uses(self) -> dict[str, Any]:
-        """Global names in its body with what they mean."""
-        known = self.py_func.__globals__
-        return {name: known[name] for name in self.py_func.__code__.co_names if name in known}
-
     @cached_property
     def machine(self) -> Callable[..., Any]:
         """What numba makes of it."""
         from numba import njit
 
-        function = self.py_func
-        called = {name: used.machine for name, used in self.uses.items() if isinstance(used, Compiled)}
-        own = FunctionType(function.__code__, {**function.__globals__, **called}, function.__name__)
-        update_wrapper(own, function)
-        made: Any = njit(cache=True, error_model="numpy")(own)
+        code, known = self.py_func.__code__, self.py_func.__globals__
+        used = {name: known.get(name) for name in code.co_names}
+        called = {name: each.machine for name, each in used.items() if isinstance(each, Compiled)}
+        own = FunctionType(code, {**known, **called}, code.co_name)
+        made: Any = njit(cache=True, error_model="numpy")(update_wrapper(own, self.py_func))
         made._cache._cache_file._source_stamp = self.stamp
         return made  # type: ignore[no-any-return]
 
     @cached_property
     def stamp(self) -> str:
-        """Digest of the sources of this function and of all that it calls, and of constants in them."""
-        digest = hashlib.sha256()
-        for each in sorted(
-            _reached(self), key=lambda one: (one.py_func.__module__, one.py_func.__qualname__)
-        ):
-            digest.update(Path(each.py_func.__code__.co_filename).read_bytes())
-            for name, value in each.uses.items():
-                if isinstance(value, (int, float, complex, tuple, np.ndarray)):
-                    digest.update(name.encode() + pickle.dumps(value))
+        """Digest of the source of its module, and of those whose functions of this class that one imports."""
+        known = self.py_func.__globals__
+        imported = {each.py_func.__module__: each for each in known.values() if isinstance(each, Compiled)}
+        digest = hashlib.sha256(Path(self.py_func.__code__.co_filename).read_bytes())
+        for name in sorted(imported.keys() - {self.py_func.__module__}):
+            digest.update(imported[name].stamp.encode())
         return digest.hexdigest()
 
 
-def _reached(first: Compiled) -> Iterator[Compiled]:
-    found, left = {id(first)}, [first]
-    while left:
-        one = left.pop()
-        yield one
-        for used in one.uses.values():
-            if isinstance(used, Compiled) and id(used) not in found:
-                found.add(id(used))
-                left.append(used)
+class Part(Compiled):
+    """One that Python calls as it is."""
+
+    def __call__(self, *arguments: Any) -> Any:  # noqa: ANN401  as the function has them
+        """As the function."""
+        return self.py_func(*arguments)

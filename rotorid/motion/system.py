@@ -19,7 +19,7 @@ import fem
 from fem.forces.laws import law, tables
 from fem.model.node_forces import NodeForce
 from rotorid.base.arrays import ComplexArray, FloatArray, IndexArray
-from rotorid.base.compiled import compiled
+from rotorid.base.compiled import compiled_part
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ def system(
     return made
 
 
-@compiled
+@compiled_part
 def add_forces(  # noqa: PLR0913  what is compiled takes no objects
     codes: IndexArray,
     values: FloatArray,

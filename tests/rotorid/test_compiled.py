@@ -9,7 +9,13 @@ import pytest
 
 from rotorid.base.compiled import COMPILED, compiled
 
-INNER = "from rotorid.base.compiled import compiled\n\n@compiled\ndef inner(x):\n    return {} * x\n"
+INNER = """
+from rotorid.base.compiled import compiled_part
+
+@compiled_part
+def inner(x):
+    return {} * x
+"""
 OUTER = """
 import sys
 from inner import inner
@@ -19,7 +25,7 @@ from rotorid.base.compiled import compiled
 def outer(x):
     return inner(x) + 0.5
 
-print("numba" in sys.modules, outer(3.0), sum(outer.machine.stats.cache_hits.values()))
+print(inner(3.0), "numba" in sys.modules, outer(3.0), sum(outer.machine.stats.cache_hits.values()))
 """
 
 
@@ -54,4 +60,8 @@ def test_machine_code_is_kept_until_what_it_calls_changes(tmp_path):
             text=True,
         )
         runs.append(made.stdout.split())
-    assert runs == [["False", "6.5", "0"], ["False", "6.5", "1"], ["False", "12.5", "0"]]
+    assert runs == [
+        ["6.0", "False", "6.5", "0"],
+        ["6.0", "False", "6.5", "1"],
+        ["12.0", "False", "12.5", "0"],
+    ]

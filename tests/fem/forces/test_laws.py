@@ -6,7 +6,6 @@ from cases import each_of
 
 import fem
 from fem.forces.laws import law, tables
-from fem.forces.stop import stop
 
 STOP = {"gap": 0.2, "stiffness": 50.0, "damping": 3.0, "friction": 0.3, "diameter": 0.4, "slip_speed": 0.5}
 SEAL = {"stiffness": 4.0, "damping": 3.0, "fluid_mass": 0.5, "swirl_ratio": 0.45, "clearance": 1.2}
@@ -23,10 +22,10 @@ FORCES = {
 STATES = [(0.3, 0.4, 0.2, -0.5, 1.5), (-0.6, 0.2, 0.4, 0.3, 0.7), (0.1, -0.7, -0.2, -0.4, 2.5)]
 
 
-def act(force, state, *, interpreted=False):
+def act(force, state, *, machine=False):
     (code,), (values,) = tables([force])
     out = np.empty((2, 6))
-    function = getattr(law, "py_func", law) if interpreted else law
+    function = getattr(law, "machine", law) if machine else law
     function(code, values, *map(float, state), out)
     return out
 
@@ -51,7 +50,7 @@ def test_derivatives(name):
 @each_of("name", FORCES)
 def test_interpreted_and_compiled_agree(name):
     for state in STATES:
-        found = act(FORCES[name], state, interpreted=True)
+        found = act(FORCES[name], state, machine=True)
         np.testing.assert_allclose(found, act(FORCES[name], state), rtol=1e-12, atol=1e-13)
 
 
@@ -77,8 +76,8 @@ def test_a_seal_after_muszynska(state):
 def test_a_seal_at_its_centre_and_at_its_wall():
     assert np.isfinite(act(FORCES["seal"], (0.0, 0.0, 0.1, 0.2, 3.0))).all()
     for x in (1.2, 2.0):
-        for interpreted in (False, True):
-            assert np.isnan(act(FORCES["seal"], (x, 0.0, 0.0, 0.0, 1.0), interpreted=interpreted)).all()
+        for machine in (False, True):
+            assert np.isnan(act(FORCES["seal"], (x, 0.0, 0.0, 0.0, 1.0), machine=machine)).all()
 
 
 def test_a_cubic_spring():
@@ -103,11 +102,3 @@ def test_a_stop():
     assert rolls == pytest.approx(-50 * 0.3), "backward whirl that rolls has no friction"
     faster = force_of(FORCES["stop"], (0.5, 0.0, 0.1, -100.0, 7.0))
     assert faster == pytest.approx(complex(-1, 0.3) * (50 * 0.3 + 3 * 0.1))
-
-
-def test_a_stop_that_is_interpreted_agrees():
-    (_,), (values,) = tables([FORCES["stop"]])
-    out, expected = np.empty((2, 6)), np.empty((2, 6))
-    getattr(stop, "py_func", stop)(values, *STATES[0], out)
-    stop(values, *STATES[0], expected)
-    np.testing.assert_allclose(out, expected, rtol=1e-13)
