@@ -13,7 +13,11 @@ from rotorid.base.arrays import FloatArray
 from rotorid.motion.equilibrium import Equilibrium, each_force, equilibria
 from rotorid.motion.system import MotionSystem
 
-_AROUND = (2e-2, 1e-3, 1e-4)
+_STEP = 0.05
+"""Between speeds at which coefficients are known, by the speed."""
+_MANY = 200
+"""Of the speeds asked for, between which stability is looked for."""
+_AROUND = (1e-2, 1e-4)
 """How far from the threshold, by its speed, the equilibria beside it are, time after time."""
 
 
@@ -49,14 +53,14 @@ def linear_rotor(rotor: fem.Rotor, found: Sequence[Equilibrium]) -> fem.Rotor:
         At ascending speeds; of one alone the coefficients are constant.
     """
     speeds = tuple(one.speed for one in found) if len(found) > 1 else ()
+    K, C = coefficients(found)
     supports, fluids = [], []
     for k, force in enumerate(rotor.forces):
-        K, C = (each[:, k] for each in coefficients(found))
         name = force.name or kind_of(force).replace("_", " ")
-        outwards = min(np.einsum("sii->si", K).min(), np.einsum("sii->si", C).min()) < 0
-        stiffness, damping = ((each if speeds else each[0]).tolist() for each in (K, C))
-        kind = "seal" if outwards else "bearing"
+        both = [each[:, k] if speeds else each[0, k] for each in (K, C)]
+        kind = "seal" if min(each.diagonal(axis1=-2, axis2=-1).min() for each in both) < 0 else "bearing"
         if not isinstance(force, Stop):
+            stiffness, damping = (each.tolist() for each in both)
             supports.append(fem.Support(force.node, stiffness, damping, name, speeds=speeds, kind=kind))
         if force.mass:
             fluids.append(fem.Disc(force.node, force.mass, name=f"fluid of {name}"))
@@ -66,15 +70,22 @@ def linear_rotor(rotor: fem.Rotor, found: Sequence[Equilibrium]) -> fem.Rotor:
 def threshold(rotor: fem.Rotor, system: MotionSystem, found: Sequence[Equilibrium]) -> fem.Stability:
     """Where the linear rotor loses stability, between the speeds of two equilibria or more.
 
-    Coefficients are linear between these speeds; equilibria near the threshold are added, nearer each time.
+    Coefficients are linear between the speeds where they are known: at those of the equilibria, at further
+    ones wherever these are far apart, and in the end close beside the threshold.
     """
-    known = list(found)
-    for share in (*_AROUND, None):
-        stable = fem.stability_threshold(linear_rotor(rotor, known), known[-1].speed, lowest=known[0].speed)
-        if stable.threshold is None or share is None:
+    lowest, highest = found[0].speed, found[-1].speed
+    start = max(lowest, 1e-3 * highest)
+    more = np.geomspace(start, highest, 2 + int(np.log(highest / start) / _STEP))[1:-1]
+    known = {one.speed: one for one in (*found[:: 1 + len(found) // _MANY], found[-1])}
+    known |= {one.speed: one for one in equilibria(system, more)}
+    every = [known[speed] for speed in sorted(known)]
+    stable = fem.stability_threshold(linear_rotor(rotor, every), highest, lowest=lowest)
+    for share in _AROUND:
+        if stable.threshold is None:
             break
-        beside = {stable.threshold * (1 - share), stable.threshold * (1 + share)}
-        added = [speed for speed in beside if found[0].speed < speed < found[-1].speed]
-        every = {one.speed: one for one in (*found, *equilibria(system, added))}
-        known = [every[speed] for speed in sorted(every)]
+        a, b = (float(np.clip(stable.threshold * (1 + s), lowest, highest)) for s in (-share, share))
+        near = fem.stability_threshold(linear_rotor(rotor, equilibria(system, (a, b))), b, lowest=a, steps=1)
+        if near.threshold is None:
+            break
+        stable = replace(near, lowest=lowest, highest=highest, margin=stable.margin, rotor=stable.rotor)
     return stable

@@ -25,7 +25,7 @@ def periodic(
     options: PeriodicOptions,
     to: Destination,
 ) -> None:
-    """Periodic motion over speed: branches past folds, stability, bifurcations, limit cycles.
+    """Periodic motion over speed: stability, bifurcations, self-excited motion.
 
     Example: rotorid periodic sample_data/motion/rotor.toml --speeds 5000:8000rpm --limit-cycle
     --plot bifurcations.png

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import cell
 from rotorid.base.result import frame, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.text import listing
+from rotorid.base.text import counted, listing, percent
 from rotorid.workflows.motion.moving_system import Moving, moving
 from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
 from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
@@ -22,12 +23,13 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.motion.continuation import Branch
     from rotorid.motion.periodic_table import Readings
+    from rotorid.motion.reduced_system import ReducedSystem
     from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
 
 _MOST_STEPS = 4096
 _SMALL = 24
-"""Unknowns above which a rotor is reduced."""
+"""Unknowns above which a rotor is reduced, to so many or more."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +48,14 @@ class PeriodicOptions:
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     steps : N
-        Steps in time of one revolution or cycle; default: 16 or more, as the motion needs them.
+        Steps in time of one revolution or cycle; default: 32 or more, as the motion needs them.
     unbalance : FILE
         Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
     bow : FILE
         Table of the shaft's bow at rest; a small model has its own.
     modes : N
         Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
-        default: those up to 4 times the highest speed, all of a small model.
+        default: those up to 4 times the highest speed, up to 24 unknowns at least; all of a small model.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     """
@@ -71,13 +73,16 @@ class PeriodicOptions:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicMotions(Outcome):
-    """Branches of periodic motion as sensors read them."""
+    """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced."""
 
     readings: Readings
+    reduced: ReducedSystem | None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-        return self.readings.to_dict()
+        few = self.reduced
+        costs = few and {"modes": few.modes, "frequency_error": cell(few.error)}
+        return {**self.readings.to_dict(), "reduction": costs}
 
     @property
     def answer(self) -> Answer:
@@ -88,12 +93,24 @@ class PeriodicMotions(Outcome):
             "\n".join(told),
             text(bifurcations, width=COLUMNS) if bifurcations[0].values else "No bifurcation.",
             motion.warnings,
-            tuple(
-                f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
-                f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
-                for speed, at, to in self.readings.jumps
+            (
+                *self._reduction(),
+                *(
+                    f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
+                    f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
+                    for speed, at, to in self.readings.jumps
+                ),
             ),
         )
+
+    def _reduction(self) -> tuple[str, ...]:
+        if self.reduced is None:
+            return ()
+        size, modes = counted(self.reduced.system.size, "unknown"), counted(self.reduced.modes, "mode")
+        high = f"natural frequencies without films are high by {percent(self.reduced.error)} % at most"
+        if self.reduced.error == float("inf"):
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        return (f"of the rotor {size} move, {modes} among them; {high}",)
 
     def _judgement(self, k: int) -> str:
         branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
@@ -170,7 +187,10 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
     few = full.size <= _SMALL and options.modes is None
-    system = full if few else reduced_system(full, kept, options.modes).system
+    reduced = None if few else reduced_system(full, kept, options.modes)
+    if reduced is not None and options.modes is None and reduced.system.size < _SMALL:
+        reduced = reduced_system(full, kept, reduced.modes + _SMALL - reduced.system.size)
+    system = full if reduced is None else reduced.system
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -183,9 +203,8 @@ def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -
             limit_cycle=options.limit_cycle,
             steps=options.steps,
         )
-    return PeriodicMotions(
-        readings=Readings(motion, labels, directions), provenance=provenance(what.files, options)
-    )
+    readings = Readings(motion, labels, directions)
+    return PeriodicMotions(readings=readings, reduced=reduced, provenance=provenance(what.files, options))
 
 
 def _sensors(

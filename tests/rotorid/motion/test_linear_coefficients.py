@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.optimize import approx_fprime
+from scipy.optimize import approx_fprime, brentq
 
 import fem
 from fem.forces.short_film import short_film
@@ -176,3 +176,31 @@ def test_one_speed_gives_constant_coefficients():
     assert linear.constant
     assert linear.supports[1].name == "journal bearing"
     assert dataclasses.replace(linear, supports=rotor.supports) == rotor.linear
+
+
+@pytest.mark.parametrize("speeds", [(20.0, 1500.0), np.linspace(20.0, 1500.0, 6)])
+def test_the_threshold_of_a_flexible_rotor_by_dense_eigenvalues(speeds):
+    """Coefficients change most at low speeds: between a few speeds they are not linear."""
+    bearings = [JournalBearing(node, "", 0.03, 0.1, 1.2e-4, 0.01) for node in (1, 5)]
+    rotor = fem.Rotor(
+        length=[0.25] * 4,
+        outer_diameter=0.06,
+        discs=[fem.Disc(2, 30.0), fem.Disc(4, 60.0, 0.4, 0.2)],
+        supports=[fem.Support(3, [[4e5, 0.0], [0.0, 3e6]], 200.0)],
+        forces=[*bearings, InternalDamping(3, "", 600.0)],
+        model=fem.Model(gyroscopic=True),
+    )
+    made = rotor_system(rotor, 20.0, 1500.0)
+
+    def growth(speed):
+        q = equilibrium(made, speed).q
+        (C, K), (_, F_q, F_v, _) = made.linear(speed), made.acting(q, 0 * q, speed)
+        lower = -np.linalg.solve(made.M, np.hstack([K - F_q, C - F_v]))
+        return np.linalg.eigvals(np.vstack([np.eye(made.size, 2 * made.size, made.size), lower])).real.max()
+
+    scan = np.linspace(20.0, 1500.0, 75)
+    first = next(k for k, speed in enumerate(scan) if growth(speed) > 0)
+    there = brentq(growth, scan[first - 1], scan[first], xtol=1e-9)
+    stable = threshold(rotor, made, equilibria(made, speeds))
+    np.testing.assert_allclose(stable.threshold, there, rtol=1e-7)
+    assert (stable.lowest, stable.highest) == (20.0, 1500.0)

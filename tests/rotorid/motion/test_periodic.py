@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from fem.forces.laws import law, tables
 from fem.matrices.equations_of_motion import Motion
-from fem.model.node_forces import CubicSpring, InternalDamping, JournalBearing, SqueezeFilm
+from fem.model.node_forces import CubicSpring, InternalDamping, JournalBearing, SqueezeFilm, Stop
 from rotorid.motion.bifurcation_diagram import draw_bifurcations
 from rotorid.motion.continuation import DOUBLING, FOLD, HOPF, TORUS
 from rotorid.motion.periodic import periodic_motion
@@ -323,6 +323,17 @@ def test_a_journal_without_mass_against_long_integration():
     run = solve_ivp(rate, (0, times[-1]), begin, "LSODA", rtol=1e-9, atol=1e-12, t_eval=times).y[:4].T
     ends = point.orbit.ends[:-1]
     np.testing.assert_allclose(run, ends[:: len(ends) // 8], atol=1e-4 * np.ptp(ends) / 2)
+
+
+def test_a_stop_is_met_where_the_free_orbit_is_as_large_as_its_gap():
+    """Above the resonance the branch folds there: the free orbit, u Ω² / |1 − Ω² + 2 i ζ Ω|, grazes it."""
+    ring = Stop(1, "", gap=1.0, stiffness=10.0, damping=0.1, diameter=1.0)
+    problem = disc(1.0, [ring], damping=0.1, stiffness=(1.0, 1.0), unbalance=0.3)
+    found = periodic_motion(problem, 0.5, 2.0)
+    graze = brentq(lambda s: 0.3 * s**2 - abs(1 - s**2 + 0.1j * s), 1.05, 2.0, xtol=1e-12)
+    folds = [b.point.orbit.speed for branch in found.branches for b in branch.bifurcations if b.kind == FOLD]
+    assert folds == [pytest.approx(graze, abs=1e-6)]
+    assert not any("stopped" in warning for warning in found.warnings)
 
 
 @pytest.mark.parametrize(
