@@ -20,6 +20,8 @@ from rotorid.motion.system import MotionSystem
 TOLERANCE = 1e-6
 A_TURN = 64
 """Samples a turn at the highest speed, where no rate is given."""
+LEAST_A_TURN = 8
+"""Samples a turn below which what the shaft does in a turn is not seen."""
 _BLOCK = 10_000
 """Samples that are computed at once: the memory that all unknowns take."""
 _MOST = 50_000_000
@@ -79,6 +81,11 @@ class MotionRun:
     def turned(self) -> FloatArray:
         """Angle of rotation at the samples, rad, shape (k,)."""
         return np.asarray(self.angle + (self.speeds[0] + self.speed) / 2 * self.time)
+
+    @property
+    def resolved(self) -> bool:
+        """Whether each turn has `LEAST_A_TURN` samples."""
+        return self.time.size > 1 and max(self.speeds) * self.time[1] * LEAST_A_TURN <= 2 * np.pi
 
     @property
     def bearings(self) -> tuple[tuple[NodeForce, int], ...]:

@@ -196,7 +196,7 @@ class Motion(Outcome):
         if end is None:
             first, last = motion.speeds
             if first == last:
-                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say more."
+                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
             size = abs(motion.z)
             k, i = divmod(int(size.argmax()), len(motion.nodes))
             return (
@@ -321,11 +321,11 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     k = min(found.time.size, rough.time.size)
     moved = np.abs(found.z - found.z[0]).max()
     error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
-    constant = ends[0] == ends[1] and found.time.size >= LEAST_SAMPLES
+    enough = found.time.size >= LEAST_SAMPLES and found.resolved
     return Motion(
         motion=found,
         reduced=reduced,
-        end=steady_end(found) if constant else None,
+        end=steady_end(found) if enough and ends[0] == ends[1] else None,
         error=error,
         warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
         provenance=provenance(source.files, options),
@@ -428,6 +428,8 @@ def _ranges(found: MotionRun) -> FloatArray:
 
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
+    if not found.resolved:
+        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
         said.append(
             f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "

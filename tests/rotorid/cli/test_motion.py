@@ -171,3 +171,10 @@ def test_a_bearing_table_that_ends(cli):
     )
     with pytest.raises(ValueError, match="its table holds"):
         motion(rotor, MotionOptions(run_up=(150.0, 250.0), time=1.0))
+
+
+def test_few_samples_a_turn_are_not_judged(cli):
+    # 100 a second at 66.7 turns a second: 1 x would look like 0.5 x
+    told = cli("motion", sample_data() / "motion" / "unbalanced.toml", *SHORT, "--rate", "100")
+    assert "too few samples a turn (--rate)" in told.out
+    assert "steady" not in told.out.lower()
