@@ -406,7 +406,14 @@ EXACT_ONLY = {"fit-limit-cycle-shooting", "validate-all", "fit-starts"}
 the best and how many iterations it took is rounding."""
 
 
-TEXT_ONLY = ("response-compressor", "fit-run-down-plot", "holes-plot", "influence-rotor23", "validate", "motion-bode")
+TEXT_ONLY = (
+    "response-compressor",
+    "fit-run-down-plot",
+    "holes-plot",
+    "influence-rotor23",
+    "validate",
+    "motion-bode",
+)
 """Cases whose document is long, or that of another case."""
 
 
