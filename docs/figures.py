@@ -180,20 +180,6 @@ GALLERY = (
         "the probe DE near 5500 rpm.",
     ),
     Picture(
-        "bearings",
-        "rotors",
-        "bearings sample_data/motion/rotor.toml --speeds 1000:9000:250rpm",
-        "The journals rise with the speed, aside with the rotation; a rigid rotor would be stable nearly up "
-        "to 9000 rpm, this one, which bends, up to 6407 rpm.",
-    ),
-    Picture(
-        "motion",
-        "rotors",
-        "motion sample_data/motion/small.toml --speed 8000rpm --time 20s --displaced 12=20um --view orbits",
-        "Above its threshold, 6407 rpm, the rotor whirls of itself, ever wider at first: the marks of its turns "
-        "do not come to the same place.",
-    ),
-    Picture(
         "reduction",
         "reduction",
         f"{THREE} --modes 2",
@@ -279,11 +265,18 @@ GALLERY = (
         dense=True,
     ),
     Picture(
+        "bearings",
+        "motion",
+        f"bearings {MOTION}/rotor.toml --speeds 1000:9000:250rpm",
+        "The journals rise with the speed, aside with the rotation; a rigid rotor would be stable nearly up "
+        "to 9000 rpm, this one, which bends, up to 6407 rpm.",
+    ),
+    Picture(
         "run-up",
         "motion",
         f"motion {MOTION}/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode",
-        "The run-up passes the first critical speed later and lower than in steady motion, and the second one, "
-        "which the bearings damp well, as in steady motion.",
+        "The run-up passes the first critical speed later and lower than in steady motion, and the second "
+        "one, which the bearings damp well, as in steady motion.",
         dense=True,
     ),
     Picture(
@@ -294,6 +287,21 @@ GALLERY = (
         "After a push the rotor whips at 1302 rpm: its journals go round near their clearance circle, its "
         "middle with 5.6 mm.",
         dense=True,
+    ),
+    Picture(
+        "jumps",
+        "motion",
+        f"periodic {MOTION}/damper.toml --speeds 1000:5000rpm",
+        "A squeeze-film damper: between 2663 and 3056 rpm there are two stable motions; a run-up jumps "
+        "down, a run-down up.",
+        dense=True,
+    ),
+    Picture(
+        "cycle",
+        "motion",
+        f"periodic {MOTION}/small.toml --speeds 11000:13000rpm --limit-cycle",
+        "At 11748 rpm the rotor begins to whirl of itself, at 0.37 of its speed; that whirl is stable up to "
+        "11868 rpm only, and beyond its fold grows while the speed falls.",
     ),
 )
 FIGURES = {one.name: one for one in GALLERY}

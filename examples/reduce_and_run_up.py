@@ -44,14 +44,21 @@ def main() -> dict[str, float]:
     thresholds = lost.point.orbit.speed / RPM, (whole.stability.threshold or np.nan) / RPM
     print("stable up to {:.1f} rpm; the rotor up to {:.1f} rpm".format(*thresholds), end="\n\n")
 
-    # Half a percent of external damping moves the threshold far up, and yet a push makes it whip.
+    # Half a percent of external damping moves the threshold far up. There a limit cycle begins.
     damped = reduce(
         ROTOR, ReduceOptions(nodes="7,12,18", keep_supports=True, damping=[0.005] * 3)
     ).motion_model
     assert damped is not None
     system, speed = damped.system(500 * RPM, 13000 * RPM), 9000 * RPM
-    (lost,) = periodic_motion(system, 9000 * RPM, 13000 * RPM).branches[0].bifurcations
-    print(f"with 0.5 % of damping: stable up to {lost.point.orbit.speed / RPM:.0f} rpm")
+    rest, cycle = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
+    (lost,) = rest.bifurcations
+    print(f"with 0.5 % of damping: stable up to {lost.point.orbit.speed / RPM:.0f} rpm; its limit cycle:")
+    for one in cycle.bifurcations:
+        orbit = one.point.orbit
+        whirl = 2 * np.pi / orbit.period / orbit.speed
+        print(f"  {one.kind} at {orbit.speed / RPM:.0f} rpm, whirl at {whirl:.3f} of the speed")
+
+    # And yet, far below, a push makes it whip.
     whirls = []
     for push in (0.1e-3, 0.5e-3):
         q = at_rest(system, speed)
@@ -75,6 +82,10 @@ def main() -> dict[str, float]:
         at, node = np.unravel_index(np.argmax(np.abs(swing)), swing.shape)
         peaks[low] = motion.speed[there][at] / RPM, 1e6 * abs(swing[at, node])
         print(f"largest at {peaks[low][0]:.0f} rpm: {peaks[low][1]:.0f} µm at node {motion.nodes[node]}")
+    speed = 5400 * RPM
+    q = at_rest(system, speed)
+    end = steady_end(run(system, (speed, speed), 30.0, (q, np.zeros_like(q))))
+    print(f"staying at 5400 rpm: {1e3 * end.amplitude[3]:.1f} mm at node 18 after 30 s")
     return {
         "mass_kg": float(small.masses.sum()),
         "load_N": float(loads[0][0]),

@@ -6,8 +6,9 @@ s = 4 points c h of Radau IIA (order 7 at the ends of the steps), c_s = 1, and t
     Q_j = q_i + h Σ a_jl V_l,   M Σ (a⁻¹)_jl (V_l − v_i) / h + C V_j + K Q_j = forces(Q_j, V_j, φ_j, Ω).
 
 Nothing is divided by M: nodes without mass that a film or damper holds are no special case, and what is stiff
-in a film does not limit h. Newton's method eliminates the V of each step; what is left is the map of the
-state (q, v) over one period, whose derivative Φ, the monodromy matrix, has the Floquet multipliers as its
+in a film does not limit h. What makes more than about N / 4 cycles in a period is damped by the method: it
+would not show that it is unstable. Newton's method eliminates the V of each step; what is left is the map of
+the state (q, v) over one period, whose derivative Φ, the monodromy matrix, has the Floquet multipliers as its
 eigenvalues. Unknowns are then the state at the beginning, the speed and, of motion with a period of its own,
 the period. Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (1996), IV.5; E. J.
 Doedel, H. B. Keller, J. P. Kernévez, Int. J. Bifurcation Chaos 1 (1991) 745.
@@ -29,8 +30,7 @@ _S = 4
 
 def _radau() -> tuple[FloatArray, FloatArray]:
     """Points c, shape (s,), and coefficients a, shape (s, s), of Radau IIA."""
-    P = np.polynomial
-    c = np.sort(P.Legendre([0] * (_S - 1) + [-1, 1]).roots() / 2 + 0.5)
+    c = np.sort(np.real(np.polynomial.legendre.legroots([0.0] * (_S - 1) + [-1.0, 1.0]))) / 2 + 0.5
     c[-1] = 1.0
     powers = np.arange(1, _S + 1)
     a = (c[:, None] ** powers / powers) @ np.linalg.inv(c[:, None] ** (powers - 1))
@@ -164,28 +164,13 @@ class Periodic:
         """Of rotation at Radau's points of a period, rad, shape (N, 4)."""
         return 2 * np.pi * self.turns / steps * (np.arange(steps)[:, None] + POINTS)
 
-    def step_equations(
+    def _equations(
         self, q: FloatArray, v: FloatArray, V: FloatArray, h: float, speed: float, angles: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Equations of steps for themselves.
+        """Equations of N steps for themselves: what is left, (N, 4 n), and its derivatives.
 
-        Parameters
-        ----------
-        q, v
-            At their beginnings, shape (N, n).
-        V
-            Velocities at Radau's points, shape (N, 4, n).
-        h
-            Length of a step, s.
-        speed
-            rad/s.
-        angles
-            Of rotation at Radau's points, rad, shape (N, 4).
-
-        Returns
-        -------
-        What is left, shape (N, 4 n); the derivatives by V, shape (N, 4 n, 4 n), and by q, v, h and Ω, the
-        angle of rotation held, shape (N, 4 n, 2 n + 2).
+        From q and v at their beginnings, (N, n), the velocities V, (N, 4, n), and the angles of rotation at
+        Radau's points, (N, 4). Derivatives are by V, (N, 4 n, 4 n), and by q, v, h and Ω, (N, 4 n, 2 n + 2).
         """
         system = self.system
         N, _, n = V.shape
@@ -223,7 +208,7 @@ class Periodic:
         V, h, n = orbit.velocities, orbit.step, orbit.start.size
         N = len(V)
         angles = self.angles(N)
-        R, J, others = self.step_equations(
+        R, J, others = self._equations(
             orbit.ends[:-1], np.roll(V[:, -1], 1, axis=0), V, h, orbit.speed, angles
         )
         by_h, by_speed = others[..., -2:-1], others[..., -1:]
@@ -259,7 +244,7 @@ class Periodic:
         for i, angles in enumerate(self.angles(len(V))):
             V[i] = v
             for _ in range(_NEWTON):
-                R, J, _ = self.step_equations(q[None], v[None], V[i : i + 1], h, orbit.speed, angles[None])
+                R, J, _ = self._equations(q[None], v[None], V[i : i + 1], h, orbit.speed, angles[None])
                 if not np.isfinite(R).all():
                     met = wall_met(self.system, q + h * np.einsum("jl,lk->jk", _A, V[i]))
                     raise np.linalg.LinAlgError(met or "the forces overflow")
@@ -326,15 +311,14 @@ class Linearised:
     @cached_property
     def multipliers(self) -> ComplexArray:
         """Floquet multipliers, the largest first, shape (2 n,)."""
-        n = self.orbit.start.size
         scale = self.orbit.scale
         values = np.linalg.eigvals(self.monodromy * scale / scale[:, None])
-        return values[np.argsort(-np.abs(values), kind="stable")].astype(complex)[: 2 * n]
+        return values[np.argsort(-np.abs(values), kind="stable")].astype(complex)
 
     @property
     def monodromy(self) -> FloatArray:
         """Derivative of the state after one period by that before, shape (2 n, 2 n)."""
-        return self.states[-1][:, : 2 * self.orbit.start.size]
+        return np.asarray(self.states[-1][:, : 2 * self.orbit.start.size])
 
     @property
     def scale(self) -> FloatArray:
@@ -379,6 +363,8 @@ class Linearised:
 
 def wall_met(system: MotionSystem, q: FloatArray, near: float = 1.0) -> str:
     """The node that is nearer to its wall than 1 − `near` of its clearance, in words; q (…, n)."""
+    if not system.forces:
+        return ""
     places = system.law_tables[2]
     walls = np.array([force.wall for force in system.forces])
     share = np.hypot(q[..., places[:, 0]], q[..., places[:, 1]]).reshape(-1, len(walls)).max(axis=0) / walls

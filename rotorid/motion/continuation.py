@@ -12,9 +12,11 @@ from rotorid.motion.collocation import Linearised, Orbit, Periodic, wall_met
 
 _LONGEST, _SHORTEST = 0.04, 1e-7
 """Of a step along the branch, by the size of the motion and the range of speeds."""
+_UNITY = 1.0 + 1e-9  # a multiplier up to this is not outside the unit circle: rounding
+_CORNER = 1e-4  # a shorter step may turn sharply: where a shaft meets its stop, the branch has a corner
 _ROUGH = 1e-4  # more of `Orbit.roughness` halves the steps in time
 _NEAR = 0.999  # of a clearance is at the wall
-_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 16, 256, 1500  # steps in a revolution or cycle
+_LEAST_STEPS, _MOST_STEPS, _MOST_POINTS = 32, 256, 1500  # steps in a revolution or cycle
 FOLD, BRANCH, DOUBLING, TORUS, HOPF = "fold", "branch point", "period doubling", "Neimark–Sacker", "Hopf"
 
 
@@ -37,7 +39,7 @@ class Point:
     @property
     def outside(self) -> int:
         """How many multipliers are outside the unit circle."""
-        return int((np.abs(self.multipliers) > 1.0).sum())
+        return int((np.abs(self.multipliers) > _UNITY).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +217,8 @@ class _Walk:
         weights, y = self.weights(at), self.problem.unknowns(at.orbit)
         aside = weights * (self.problem.unknowns(new.orbit) - y - tangent * length)
         turn = (weights * tangent) @ (weights * onwards) / np.linalg.norm(weights * onwards)
-        if np.linalg.norm(aside) > 0.5 * length or turn < 0.9:
+        far = np.linalg.norm(aside) > 0.5 * length or turn < 0.9
+        if far and length > _CORNER:
             raise np.linalg.LinAlgError("the branch turns too sharply")
         end = min(max(new.orbit.speed, self.low), self.high)
         if end != new.orbit.speed:
@@ -265,7 +268,8 @@ class _Walk:
 
         def test(s: float) -> float:
             there, direction, _ = self.corrected(at, tangent, s)
-            return float(direction[-1] if fold else np.log(np.abs(self.point(there).multipliers[few])))
+            size = np.abs(self.point(there).multipliers[few])
+            return float(direction[-1] if fold else np.log(size / _UNITY))
 
         there = self.corrected(at, tangent, _root(test, length))[0]
         kind, eigenvector = (FOLD, tangent[: -at.free].astype(complex)) if fold else self._kind(there, few)
@@ -278,7 +282,7 @@ class _Walk:
         value = self.point(at).multipliers[which]
         scale = at.orbit.scale
         values, vectors = np.linalg.eig(at.monodromy * scale / scale[:, None])
-        direction = vectors[:, np.abs(values - value).argmin()] * scale
+        direction = np.asarray(vectors[:, np.abs(values - value).argmin()] * scale, dtype=np.complex128)
         alone = abs(value.imag) < 1e-6
         if self.kind == "rest" and not (alone and value.real > 0):
             return HOPF, direction

@@ -91,7 +91,10 @@ def bode_figure(motion: MotionRun) -> Figure:
             (steady_at, steady, ":", f"{name}, steady, linear"),
         ):
             above.plot(at * RPM, 1e6 * np.abs(value), style, color=color, label=words)
-            below.plot(at * RPM, np.degrees(np.unwrap(np.angle(value))), style, color=color)
+            phase = np.degrees(np.unwrap(np.angle(value)))
+            if value is X and steady.size:  # as many turns as the steady response, at the end
+                phase -= 360 * np.round((phase[-1] - np.degrees(np.unwrap(np.angle(steady)))[-1]) / 360)
+            below.plot(at * RPM, phase, style, color=color)
     above.set(ylabel="1× of x, µm", ylim=(0, None))
     below.set(xlabel="speed, rpm", ylabel="phase lead, °")
     for ax in (above, below):

@@ -24,11 +24,11 @@ from rotorid.motion.continuation import (
 from rotorid.motion.equilibrium import equilibrium
 from rotorid.motion.system import MotionSystem
 
-_STEPS = 16  # in one revolution, or one period of a motion's own, to begin with
+_STEPS = 32  # in one revolution, or one period of a motion's own, to begin with
 _COARSE = 1e-3
 """Of `Orbit.roughness`."""
 _SAME = 0.02  # of the motion: what differs by less is no other motion
-_CYCLES = 100  # of motion in time, before it is taken for a limit cycle
+_CYCLES = 60  # of motion in time, before it is taken for a limit cycle
 _FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
 
 
@@ -78,7 +78,7 @@ def periodic_motion(
     limit_cycle
         Self-excited motions from the Hopf points of the rotor at rest.
     steps
-        In time, in a revolution or a cycle, kept; default: from 16 up, as the motion needs them.
+        In time, in a revolution or a cycle, kept; default: from 32 up, as the motion needs them.
 
     Raises
     ------
@@ -150,7 +150,7 @@ class _Search:
         for speed in np.linspace(self.low, self.high, 9)[1:-1] if not found else ():
             try:
                 guess = settled(problem, float(speed), turns * self.count, _at_rest(self.system, speed), 0)
-                for _ in range(60):
+                for _ in range(30):
                     guess = problem.marched(guess)
                 begin = at_speed(problem, guess)
                 guess = problem.solve(guess, begin.rows, begin.values)[0].orbit
@@ -208,6 +208,8 @@ class _Search:
         problem, found = Periodic(self.system, 0), list[Branch]()
         for point in hopf:
             found += self._try(problem, self.cycle(point), [])
+        if any(b.stable[-1] and b.points[-1].orbit.speed >= self.high * (1 - 1e-9) for b in found):
+            return found
         try:
             guess = self.whirling(problem)
             row = at_speed(problem, guess, -1.0)
@@ -218,7 +220,7 @@ class _Search:
         except np.linalg.LinAlgError:
             return found
         rest = np.abs(cycle.ends - cycle.start).max() < 0.1 * _FIRST * _length(self.system, cycle.start)
-        if not rest and not any(_same_cycle(cycle, branch) for branch in found):
+        if not rest:
             found.append(self.follow(problem, start, "limit cycle"))
         return found
 
@@ -227,7 +229,7 @@ class _Search:
         rest = _at_rest(self.system, self.high)
         whirl, shape = whirl_at_rest(self.system, rest, self.high)
         start = rest + _FIRST * _length(self.system, rest) * shape.real / np.abs(shape).max()
-        steps, n = max(32, self.count), rest.size
+        steps, n = self.count, rest.size
         orbit = Orbit(self.high, 2 * np.pi / whirl, start, np.zeros((steps, 4, n)))
         for _ in range(_CYCLES):
             orbit = problem.marched(orbit)
@@ -281,14 +283,6 @@ def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
     except ValueError:
         q = np.zeros(system.size)
     return q if q.any() else np.full(system.size, 1e-4 * _length(system, q))
-
-
-def _same_cycle(cycle: Orbit, branch: Branch) -> bool:
-    """Whether a limit cycle at one end of the range of speeds is that of a branch."""
-    last = branch.points[-1].orbit
-    sizes = [np.ptp(orbit.ends, axis=0) for orbit in (cycle, last)]
-    same = np.abs(sizes[0] - sizes[1]) <= 0.02 * sizes[0].max()
-    return bool(abs(last.speed / cycle.speed - 1) < 1e-6 and same.all())
 
 
 def _doubts(branches: list[Branch]) -> list[str]:

@@ -14,6 +14,7 @@ from rotorid.base.arrays import FloatArray
 from rotorid.base.json import plain
 from rotorid.base.result import Column, rows
 from rotorid.base.rpm import RPM
+from rotorid.base.text import ROUNDING
 from rotorid.motion.continuation import FOLD, HOPF, TORUS, Bifurcation, Branch, Point
 from rotorid.motion.periodic import PeriodicMotion, whirl_at_rest
 
@@ -38,7 +39,9 @@ class Readings:
 
     def amplitudes(self, point: Point) -> FloatArray:
         """Half of what each sensor reads from peak to peak, m, shape (k,)."""
-        return np.asarray(np.ptp(point.orbit.readings(self.directions), axis=0) / 2)
+        read = point.orbit.readings(self.directions)
+        size = np.ptp(read, axis=0) / 2
+        return np.where(size > 1e3 * ROUNDING * np.abs(read).max(axis=0), size, 0.0)
 
     @cached_property
     def along(self) -> tuple[FloatArray, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 from rotorid.base.arrays import FloatArray
 from rotorid.motion.system import MotionSystem
 
-BEYOND = 4.0
+BEYOND = 8.0
 """Modes between the kept nodes stay up to this many times the highest speed."""
 _RIGID = 1e-6
 _COMPARED = 2.0
@@ -37,6 +37,7 @@ class ReducedSystem:
     error
         Largest relative error of the natural frequencies without damping, those below twice the highest speed
         or at least the first two that bend the shaft, at the lowest speed; bearings with films left out.
+        Infinite where fewer unknowns move.
     """
 
     system: MotionSystem
@@ -55,7 +56,7 @@ def reduced_system(system: MotionSystem, nodes: Sequence[int], modes: int | None
     nodes
         To be kept, besides those of forces.
     modes
-        In both planes together; None: those up to four times the highest speed, two at least.
+        In both planes together; None: those up to eight times the highest speed, two at least.
 
     Raises
     ------
@@ -104,6 +105,8 @@ def _error(K: FloatArray, M: FloatArray, T: FloatArray, highest: float) -> float
 
     full, few = frequencies(K, M), frequencies(T.T @ K @ T, T.T @ M @ T)
     bends = int((full <= _RIGID * full[-1]).sum())
-    end = min(max(int((full <= _COMPARED * highest).sum()), bends + 2), few.size)
+    end = max(int((full <= _COMPARED * highest).sum()), min(bends + 2, full.size))
+    if end > few.size:
+        return np.inf
     compared = slice(bends, end)
     return float(np.max(few[compared] / full[compared] - 1.0, initial=0.0))

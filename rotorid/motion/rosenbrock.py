@@ -222,12 +222,12 @@ def attempt(
 
 @compiled
 def error_of(
-    error: FloatArray, new: FloatArray, largest: FloatArray, groups: IndexArray, sizes: FloatArray
+    error: FloatArray, way: FloatArray, largest: FloatArray, groups: IndexArray, sizes: FloatArray
 ) -> float:
-    """Largest error by the size of its unknown; `sizes`, written: see `tolerance` of `advance`."""
+    """Largest error by the way of its unknown, see `tolerance` of `advance`; the largest ways are written."""
     top = np.full(2, 1e-300)
     for i in range(len(error)):
-        sizes[i] = max(largest[i], abs(new[i]))
+        sizes[i] = max(largest[i], abs(way[i]))
         top[groups[i]] = max(top[groups[i]], sizes[i])
     worst = 0.0
     for i in range(len(error)):
@@ -254,6 +254,7 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     steps: tuple[float, float],
     tolerance: float,
     groups: IndexArray,
+    origin: FloatArray,
     q: FloatArray,
     v: FloatArray,
     largest: FloatArray,
@@ -276,14 +277,16 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
     steps
         First and least step, s.
     tolerance
-        Of the error of q in one step: of a deflection by the largest size that it has had, or by a hundredth
-        of the largest deflection; of other unknowns by the largest of them.
+        Of the error of q in one step: of a deflection by how far it has been from `origin`, or by a hundredth
+        of the largest such way; of other unknowns by the largest of theirs.
     groups
         0 for deflections, 1 for other unknowns, (n,).
+    origin
+        Where the motion began, (n,).
     q, v
-        Where it begins and then where it ends, (n,).
+        Where it begins now and then where it ends, (n,).
     largest
-        Largest sizes of q so far, (n,); changed.
+        How far each of q has been from its origin, (n,); changed.
     times, out
         When the motion is wanted, s, ascending, above the beginning, (k,); and q then, (k, n), written.
 
@@ -311,18 +314,19 @@ def advance(  # noqa: PLR0913  what is compiled takes no objects
         step = end - t if t + 1.0001 * h >= end else h
         error = math.inf
         if attempt(equations, turning, t, step, state, now, stages, scratch):
-            error = error_of(stages[0, 7], now[0], largest, groups, sizes) / tolerance
+            error = error_of(stages[0, 7], now[0] - origin, largest, groups, sizes) / tolerance
         if not error <= 1.0:
             vain += 1
             h = step * max(0.2, 0.9 * error**-0.2 if error < 1e9 else 0.2)
             continue
-        while written < len(times) and times[written] <= t + step:
+        then = end if step == end - t else t + step
+        while written < len(times) and times[written] <= then:
             between(state[0], now[0], stages[0], (times[written] - t) / step, out[written])
             written += 1
         state[:] = now
         q[:], v[:] = now[0], now[1]
         largest[:] = sizes
-        t = end if step == end - t else t + step
+        t = then
         done += 1
         h = max(step * min(5.0, 0.9 * max(error, 1e-9) ** -0.2), h if step < h else 0.0)
     return DONE, -1, t, h, done, vain, written

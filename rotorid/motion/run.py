@@ -20,11 +20,15 @@ from rotorid.motion.system import MotionSystem
 TOLERANCE = 1e-6
 A_TURN = 64
 """Samples a turn at the highest speed, where no rate is given."""
+LEAST_A_TURN = 8
+"""Samples a turn below which what the shaft does in a turn is not seen."""
 _BLOCK = 10_000
 """Samples that are computed at once: the memory that all unknowns take."""
 _MOST = 50_000_000
 """Positions that are kept, x and y of one node counted as one: 800 MB."""
 _MASSLESS = 1e-12
+_SMALLEST = 1e-4
+"""Way that a tolerance refers to at least, by the largest deflection at the beginning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +83,11 @@ class MotionRun:
         return np.asarray(self.angle + (self.speeds[0] + self.speed) / 2 * self.time)
 
     @property
+    def resolved(self) -> bool:
+        """Whether each turn has `LEAST_A_TURN` samples."""
+        return self.time.size > 1 and max(self.speeds) * self.time[1] * LEAST_A_TURN <= 2 * np.pi
+
+    @property
     def bearings(self) -> tuple[tuple[NodeForce, int], ...]:
         """Forces with a wall, each with the column of its node in `z`; those whose node is known here."""
         return tuple(
@@ -117,7 +126,7 @@ def run(
     rate
         Samples a second; None: 64 a turn at the highest speed, and 10,000 in all where nothing turns.
     tolerance
-        Of the error of one step, by the largest size so far of what is in error.
+        Of the error of one step, by how far the rotor has moved from where it began.
     angle
         Of rotation at the beginning, rad.
 
@@ -153,8 +162,9 @@ def run(
     q, v = (np.array(part, dtype=float) for part in start)
     v = consistent(system, q, v, (angle, first, (last - first) / time))
     z[0] = q[places[:, 0]] + 1j * q[places[:, 1]]
-    largest = np.abs(q)
     groups = np.array([name[0] not in "xy" for name in system.coordinates], dtype=np.intp)
+    origin = q.copy()
+    largest = np.array([_SMALLEST * np.abs(q[groups == group]).max() for group in groups])
     walls = np.array([force.wall for force in system.forces])
     h, least = 1e-3 * min(time, 2 * np.pi / reference), 1e-10 * min(time, 2 * np.pi / reference)
     done, steps, vain, stopped = 1, 0, 0, ""
@@ -163,7 +173,7 @@ def run(
         out = np.empty((at.size, system.size))
         how, force, now, h, good, bad, written = advance(
             *(equations, turning, walls, (0.0, end - begin), (max(h, least), least), tolerance, groups),
-            *(q, v, largest, np.minimum(at, end) - begin, out),
+            *(origin, q, v, largest, np.minimum(at, end) - begin, out),
         )
         z[done : done + written] = out[:written, places[:, 0]] + 1j * out[:written, places[:, 1]]
         done, steps, vain = done + written, steps + good, vain + bad

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.motion.run import MotionRun
+from rotorid.motion.run import LEAST_A_TURN, MotionRun
 
 _SHARE = 0.2
 """Part of the time that is looked at, its last."""
@@ -82,13 +82,17 @@ def steady_end(motion: MotionRun) -> SteadyEnd:
     Raises
     ------
     ValueError
-        If the speed changes, or for fewer than 64 samples.
+        If the speed changes, for fewer than 64 samples, or fewer than 8 a turn.
     """
     first, last = motion.speeds
     if first != last:
         raise ValueError("the speed changes: there is no steady end")
     if motion.time.size < LEAST_SAMPLES:
         raise ValueError(f"{LEAST_SAMPLES} samples are needed at least to tell whether the end is steady")
+    if not motion.resolved:
+        raise ValueError(
+            f"{LEAST_A_TURN} samples a turn are needed at least to tell whether the end is steady"
+        )
     whole = float(motion.time[-1])
     window = max(_SHARE * whole, min(_LEAST_TURNS * 2 * np.pi / last, whole) if last else 0.0)
     k = int(np.searchsorted(motion.time, whole - window))

@@ -13,6 +13,7 @@ from rotorid.workflows.influence import InfluenceOptions, RotorInfluence, influe
 from rotorid.workflows.modes import ModesOfReadings, ModesOptions, modes
 from rotorid.workflows.motion.bearings import BearingEquilibria, BearingsOptions, bearings
 from rotorid.workflows.motion.motion import Motion, MotionOptions, motion
+from rotorid.workflows.motion.periodic import PeriodicMotions, PeriodicOptions, periodic
 from rotorid.workflows.reduce import ReduceOptions, reduce
 from rotorid.workflows.reduce_result import ReducedRotor
 from rotorid.workflows.response import ResponseOptions, RotorResponse, response
@@ -43,6 +44,8 @@ __all__ = [
     "Motion",
     "MotionOptions",
     "Outcome",
+    "PeriodicMotions",
+    "PeriodicOptions",
     "PermissibleUnbalance",
     "RecordFit",
     "ReduceOptions",
@@ -69,6 +72,7 @@ __all__ = [
     "influence",
     "modes",
     "motion",
+    "periodic",
     "reduce",
     "response",
     "simulate",

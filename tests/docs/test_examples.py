@@ -14,6 +14,7 @@ import pytest
 from docs_blocks import blocks, first_difference
 
 from rotorid import read_ode_model
+from rotorid.base.compiled import COMPILED
 
 FOLDER = Path(__file__).parents[2] / "examples"
 PINNED = {
@@ -171,6 +172,8 @@ def ran(tmp_path_factory):
 
     @functools.cache
     def run(name):
+        if name == "reduce_and_run_up" and not COMPILED:
+            pytest.skip("hours without the extra rotorid[fast]")
         folder, printed = tmp_path_factory.mktemp(name), io.StringIO()
         with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
             found = load(name).main()

@@ -15,28 +15,21 @@ from rotorid.workflows.motion.periodic import periodic as work
 
 @command(
     PeriodicOptions,
-    least={"subsynchronous": 2, "steps": 4},
-    panels={"Method": "subsynchronous limit_cycle steps"},
+    least={"subsynchronous": 2, "steps": 4, "modes": 0},
+    panels={"Motion": "subsynchronous limit_cycle", "Method": "steps modes"},
 )
 def periodic(
     model: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="Rotor file, rotor table, or small model (.toml).")
+        Path, typer.Argument(metavar="MODEL", help="Rotor file (.toml, .csv, .xlsx) or small model (.toml).")
     ],
-    unbalance: Annotated[
-        Path | None,
-        typer.Option("--unbalance", metavar="FILE", help="Table of a rotor's unbalance, as of response."),
-    ] = None,
-    bow: Annotated[
-        Path | None, typer.Option("--bow", metavar="FILE", help="Table of a rotor's bow at rest.")
-    ] = None,
-    *,
     options: PeriodicOptions,
     to: Destination,
 ) -> None:
-    """Periodic motion over speed: branches past folds, stability, bifurcations, limit cycles.
+    """Periodic motion over speed: stability, bifurcations, self-excited motion.
 
-    Example: rotorid periodic damper.toml --unbalance unbalance.csv --speeds 2000:10000rpm --plot jumps.png
+    Example: rotorid periodic sample_data/motion/rotor.toml --speeds 5000:8000rpm --limit-cycle
+    --plot bifurcations.png
 
-    Example: rotorid periodic journals.toml --speeds 1000:6000rpm --limit-cycle
+    Example: rotorid periodic sample_data/motion/unbalanced.toml --speeds 1000:6000rpm --output branches.csv
     """
-    to.deliver("periodic motion", lambda: work(model, options, unbalance, bow))
+    to.deliver("periodic motion", lambda: work(model, options))

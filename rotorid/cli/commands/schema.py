@@ -15,7 +15,7 @@ def schema(
     kind: Annotated[str, typer.Argument(metavar="KIND", help="What file: job, rotor or small (model).")],
     to: Destination,  # a schema is JSON with or without --json
 ) -> None:
-    """JSON schema of a job, a rotor file or a small model, for editors that complete and check keys.
+    """JSON schema of a job, a rotor file or a small model, for editors to check keys.
 
     Example: rotorid schema job
     """

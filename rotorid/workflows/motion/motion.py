@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -80,11 +81,11 @@ class MotionOptions:
         Where the motion is told: nodes or stations with commas; default: stations and bearings, or all.
     modes : N
         Modes that a rotor keeps between these nodes and its bearings (Craig and Bampton), in both planes
-        together; default: those up to 4 times the highest speed; small models keep all.
+        together; default: those up to 8 times the highest speed; small models keep all.
     rate : N
         Samples a second; default: 64 a turn at the highest speed.
     tolerance : T
-        Error of one step by the largest deflection.
+        Error of one step, by how far the rotor has moved from where it began.
     """
 
     speed: str | float | None = None
@@ -115,8 +116,8 @@ class Motion(Outcome):
     end
         What it has come to; None where the speed changes or too little is known.
     error
-        Largest difference of positions from those with a tolerance thirty times as large, by the largest
-        deflection; the error itself is smaller, except where two motions part.
+        Largest difference of positions from those with a tolerance thirty times as large, by its way;
+        the error itself is smaller, except where two motions part.
     warnings
         What the reader must know.
     """
@@ -195,7 +196,7 @@ class Motion(Outcome):
         if end is None:
             first, last = motion.speeds
             if first == last:
-                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too short to say more."
+                return f"At {rpm_text(first)} for {figures(motion.time[-1])} s: too few samples to say more."
             size = abs(motion.z)
             k, i = divmod(int(size.argmax()), len(motion.nodes))
             return (
@@ -255,16 +256,16 @@ class Motion(Outcome):
     def _notes(self) -> tuple[str, ...]:
         motion, reduced = self.motion, self.reduced
         found = (
-            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of the largest deflection; "
-            f"positions differ by {self.error:.1g} of it from those with {_LOOSER:g} times this tolerance",
+            f"{counted(motion.steps, 'step')}, each to {motion.tolerance:g} of how far the rotor moves; "
+            f"positions differ by {self.error:.1g} of that from those with {_LOOSER:g} times this tolerance",
         )
         if reduced is None:
             return found
-        return (
-            *found,
-            f"of the rotor {counted(reduced.system.size, 'unknown')} move, {counted(reduced.modes, 'mode')} "
-            f"among them; natural frequencies without films are high by {percent(reduced.error)} % at most",
-        )
+        high = f"natural frequencies without films are high by {percent(reduced.error)} % at most"
+        if reduced.error == float("inf"):
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        size, modes = counted(reduced.system.size, "unknown"), counted(reduced.modes, "mode")
+        return (*found, f"of the rotor {size} move, {modes} among them; {high}")
 
     def figure(self, view: View = "motion") -> Figure:
         """Orbits, time and spectrum, Bode or polar picture of a run-up, loci in the clearance circles."""
@@ -309,21 +310,22 @@ def motion(model: Rotor | SmallModel | Path | str, options: MotionOptions) -> Mo
     tolerance = options.tolerance
     with phase("start"):
         start = begin(system, ends[0], options.start, shift, tolerance)
+    move = partial(run, system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate)
     with phase("motion"):
-        found, rough = (
-            run(system, ends, time, (start.q, start.v), nodes=shown, rate=options.rate, tolerance=one)
-            for one in (tolerance, min(_LOOSER * tolerance, 1e-2))
-        )
+        found = move(tolerance=tolerance)
+    with phase(f"motion with {_LOOSER:g} times the tolerance"):
+        rough = move(tolerance=min(_LOOSER * tolerance, 1e-2))
     if found.stopped:
         until = f" (--time {0.999 * found.time[-1]:.4g} shows it until then)" if found.time[-1] else ""
         raise ValueError(found.stopped + until)
     k = min(found.time.size, rough.time.size)
-    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / (np.abs(found.z).max() or 1.0))
-    constant = ends[0] == ends[1] and found.time.size >= LEAST_SAMPLES
+    moved = np.abs(found.z - found.z[0]).max()
+    error = float(np.abs(found.z[:k] - rough.z[:k]).max() / max(moved, 1e-4 * np.abs(found.z).max(), 1e-300))
+    enough = found.time.size >= LEAST_SAMPLES and found.resolved
     return Motion(
         motion=found,
         reduced=reduced,
-        end=steady_end(found) if constant else None,
+        end=steady_end(found) if enough and ends[0] == ends[1] else None,
         error=error,
         warnings=(*start.warnings, *_warnings(found, error, bool(shift))),
         provenance=provenance(source.files, options),
@@ -385,7 +387,9 @@ def _shown(source: Moving, system: MotionSystem, given: Nodes | None) -> tuple[i
     stations = list(getattr(source.model, "stations", {}))
     supports = [support.node for support in source.model.supports]
     chosen = (
-        {*map(source.node, stations), *walled, *supports} if stations or len(system.nodes) > _SMALL else ()
+        {*map(source.node, stations), *walled, *supports, *_loaded(system)}
+        if stations or system.size > _SMALL
+        else ()
     )
     return tuple(sorted(chosen)) or system.nodes
 
@@ -424,10 +428,12 @@ def _ranges(found: MotionRun) -> FloatArray:
 
 def _warnings(found: MotionRun, error: float, shifted: bool) -> tuple[str, ...]:
     said = []
+    if not found.resolved:
+        said.append("too few samples a turn (--rate): what the shaft does between them is not told")
     if error > _UNSURE:
         said.append(
-            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of the largest "
-            "deflection: where a rotor whips, amplitude and frequency of the whirl count, not its phase"
+            f"positions with {_LOOSER:g} times the tolerance differ by {percent(error)} % of how far "
+            "the rotor moves: where it whips, amplitude and frequency of the whirl count, not its phase"
         )
     if not shifted and not found.system.unbalance.any() and not found.system.bow.any():
         said.append("nothing excites it: no unbalance, no bow (--unbalance)")

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotorid.base.answer import COLUMNS, Answer
+from rotorid.base.json import cell
 from rotorid.base.result import frame, text
 from rotorid.base.rpm import RPM, range_text, rpm_text
-from rotorid.base.text import listing
-from rotorid.workflows.motion.moving_system import Moving, Table, moving
+from rotorid.base.text import counted, listing, percent
+from rotorid.workflows.motion.moving_system import Moving, moving
 from rotorid.workflows.option_values import Band, Sensor, band, degrees, sensors
 from rotorid.workflows.result_provenance import Outcome, phase, provenance, workflow
 
@@ -22,12 +23,13 @@ if TYPE_CHECKING:
     from fem import Rotor
     from rotorid.motion.continuation import Branch
     from rotorid.motion.periodic_table import Readings
+    from rotorid.motion.reduced_system import ReducedSystem
     from rotorid.motion.small_model import SmallModel
     from rotorid.motion.system import MotionSystem
 
 _MOST_STEPS = 4096
 _SMALL = 24
-"""Unknowns above which a rotor is reduced."""
+"""Unknowns above which a rotor is reduced, to so many or more."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,14 @@ class PeriodicOptions:
     limit_cycle
         Also self-excited motions with a period of their own; of a rotor without unbalance.
     steps : N
-        Steps in time of one revolution or cycle; default: 16 or more, as the motion needs them.
+        Steps in time of one revolution or cycle; default: 32 or more, as the motion needs them.
+    unbalance : FILE
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+    bow : FILE
+        Table of the shaft's bow at rest; a small model has its own.
+    modes : N
+        Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
+        default: those up to 4 times the highest speed, up to 24 unknowns at least; all of a small model.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     """
@@ -56,18 +65,24 @@ class PeriodicOptions:
     subsynchronous: int | None = None
     limit_cycle: bool = False
     steps: int | None = None
+    unbalance: Path | str | Mapping[int, complex] | None = None
+    bow: Path | str | Mapping[int, complex] | None = None
+    modes: int | None = None
     gravity_direction: float = -90.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PeriodicMotions(Outcome):
-    """Branches of periodic motion as sensors read them."""
+    """Branches of periodic motion as sensors read them, of a rotor that is perhaps reduced."""
 
     readings: Readings
+    reduced: ReducedSystem | None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON types, without the provenance."""
-        return self.readings.to_dict()
+        few = self.reduced
+        costs = few and {"modes": few.modes, "frequency_error": cell(few.error)}
+        return {**self.readings.to_dict(), "reduction": costs}
 
     @property
     def answer(self) -> Answer:
@@ -78,12 +93,24 @@ class PeriodicMotions(Outcome):
             "\n".join(told),
             text(bifurcations, width=COLUMNS) if bifurcations[0].values else "No bifurcation.",
             motion.warnings,
-            tuple(
-                f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
-                f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
-                for speed, at, to in self.readings.jumps
+            (
+                *self._reduction(),
+                *(
+                    f"at {rpm_text(speed)} the motion jumps {'up' if to[0] > at[0] else 'down'} at "
+                    f"{self.readings.labels[0]}, from {1e6 * at[0]:.4g} to {1e6 * to[0]:.4g} µm"
+                    for speed, at, to in self.readings.jumps
+                ),
             ),
         )
+
+    def _reduction(self) -> tuple[str, ...]:
+        if self.reduced is None:
+            return ()
+        size, modes = counted(self.reduced.system.size, "unknown"), counted(self.reduced.modes, "mode")
+        high = f"natural frequencies without films are high by {percent(self.reduced.error)} % at most"
+        if self.reduced.error == float("inf"):
+            high = "NOT ENOUGH for its natural frequencies up to twice the speed (--modes)"
+        return (f"of the rotor {size} move, {modes} among them; {high}",)
 
     def _judgement(self, k: int) -> str:
         branch, sizes = self.readings.motion.branches[k], 1e6 * self.readings.along[k][:, 0]
@@ -125,12 +152,7 @@ def _stable_ranges(branch: Branch) -> list[tuple[float, float]]:
 
 
 @workflow
-def periodic(
-    model: Rotor | SmallModel | Path | str,
-    options: PeriodicOptions,
-    unbalance: Table | None = None,
-    bow: Table | None = None,
-) -> PeriodicMotions:
+def periodic(model: Rotor | SmallModel | Path | str, options: PeriodicOptions) -> PeriodicMotions:
     """Find periodic motions of a rotor over a range of speeds, their stability and bifurcations.
 
     Parameters
@@ -139,8 +161,6 @@ def periodic(
         A rotor, a rotor table or file, or a small model.
     options
         The speeds, and what differs from the defaults.
-    unbalance, bow
-        Of a rotor: tables, or kg·m and m by node.
 
     Raises
     ------
@@ -160,12 +180,17 @@ def periodic(
         raise ValueError("--subsynchronous takes a whole number of revolutions from 2 to 12")
     if options.steps is not None and not 4 <= options.steps <= _MOST_STEPS:
         raise ValueError(f"--steps takes a whole number from 4 to {_MOST_STEPS}")
-    what = moving(model, unbalance, bow, degrees(options.gravity_direction, "--gravity-direction"))
+    direction = degrees(options.gravity_direction, "--gravity-direction")
+    what = moving(model, options.unbalance, options.bow, direction)
     full = what.system(low, high)
     labels, sensed = _sensors(what, full, options.sensors)
     mounted = [node for node in full.nodes if full.unbalance[full.index(node)[0]]]
     kept = [node for node, _ in sensed] + (mounted if len(mounted) <= _SMALL // 2 else [])
-    system = full if full.size <= _SMALL else reduced_system(full, kept).system
+    few = full.size <= _SMALL and options.modes is None
+    reduced = None if few else reduced_system(full, kept, options.modes)
+    if reduced is not None and options.modes is None and reduced.system.size < _SMALL:
+        reduced = reduced_system(full, kept, reduced.modes + _SMALL - reduced.system.size)
+    system = full if reduced is None else reduced.system
     directions = np.zeros((len(sensed), system.size))
     for row, (node, angle) in zip(directions, sensed, strict=True):
         row[[*system.index(node)]] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
@@ -178,9 +203,8 @@ def periodic(
             limit_cycle=options.limit_cycle,
             steps=options.steps,
         )
-    return PeriodicMotions(
-        readings=Readings(motion, labels, directions), provenance=provenance(what.files, options)
-    )
+    readings = Readings(motion, labels, directions)
+    return PeriodicMotions(readings=readings, reduced=reduced, provenance=provenance(what.files, options))
 
 
 def _sensors(

@@ -1,13 +1,16 @@
 """`rotorid motion`: what it prints, writes, draws and refuses."""
 
+import dataclasses
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
 
 import fem
-from fem.model.node_forces import JournalBearing
+from fem.model.node_forces import JournalBearing, MuszynskaSeal
 from rotorid.samples import sample_data
-from rotorid.tables import read_rotor
+from rotorid.tables import read_rotor, write_rotor
 from rotorid.workflows import MotionOptions, motion
 
 ROTOR = sample_data() / "motion" / "rotor.toml"
@@ -65,10 +68,12 @@ def test_more_modes_change_little(unbalance):
     options = {"speed": "4000rpm", "time": 0.1, "unbalance": unbalance, "sensors": "12", "rate": 2000.0}
     few, many, all_of_them = (motion(ROTOR, MotionOptions(**options, modes=modes)) for modes in (4, 12, 24))
     z = all_of_them.motion.z
-    assert np.abs(many.motion.z - z).max() < 1e-3 * np.abs(z - z[0]).max()
-    assert np.abs(few.motion.z - z).max() < 3e-2 * np.abs(z - z[0]).max()
+    assert np.abs(many.motion.z - z).max() < 2e-3 * np.abs(z - z[0]).max()
+    assert np.abs(few.motion.z - z).max() < 1e-2 * np.abs(z - z[0]).max()
     assert all_of_them.reduced.error < many.reduced.error < few.reduced.error < 0.01
     assert few.reduced.first_left_out < many.reduced.first_left_out
+    none = motion(ROTOR, MotionOptions(**options, modes=0))
+    assert "NOT ENOUGH" in none.answer.brief()
 
 
 def test_at_rest_it_stays_and_says_so(cli):
@@ -135,18 +140,25 @@ def test_pictures_of_a_run_up(unbalance):
     ],
 )
 def test_what_is_impossible(cli, given, message):
-    told = cli("motion", ROTOR, *given, status=2)
+    told = cli("motion", ROTOR, *given)
+    assert told.code == 2
     assert message in told.err
     assert len(told.err.strip().splitlines()) == 1
 
 
-def test_a_journal_that_touches_its_wall(tmp_path):
-    # an unbalance that no film holds
+def test_a_shaft_that_touches_a_seal_in_a_run_up(cli, tmp_path, unbalance):
+    # the middle comes to 1.16 mm from the line of bearings near 1400 rpm
     rotor = read_rotor(ROTOR)
-    with pytest.raises(
-        ValueError, match=r"touches the wall of the journal bearing '.*' at node .* after .* s, at"
-    ):
-        motion(rotor, MotionOptions(speed="6000rpm", time=1.0, unbalance={12: 2.0}))
+    seal = MuszynskaSeal(12, "balance piston", 1e3, 1.0, 0.1, 0.4, 1e-3, 0.5, 0.2)
+    path = tmp_path / "rotor.toml"
+    write_rotor(path, dataclasses.replace(rotor, forces=[*rotor.forces, seal]))
+    told = cli("motion", path, "--run-up", "1000:2000rpm", "--time", "3.3s", "--unbalance", unbalance)
+    assert told.code == 2
+    where = r"rotorid: the shaft touches the wall of the annular seal 'balance piston' at node 12 after "
+    found = re.match(where + r"(.*) s, at (.*) rpm: .* \(--time .* shows it until then\)\n$", told.err)
+    time, speed = map(float, found.groups())
+    assert 1200 < speed < 1500
+    assert speed == pytest.approx(1000 + 1000 * time / 3.3, rel=1e-5)
 
 
 def test_a_bearing_table_that_ends(cli):
@@ -159,3 +171,10 @@ def test_a_bearing_table_that_ends(cli):
     )
     with pytest.raises(ValueError, match="its table holds"):
         motion(rotor, MotionOptions(run_up=(150.0, 250.0), time=1.0))
+
+
+def test_few_samples_a_turn_are_not_judged(cli):
+    # 100 a second at 66.7 turns a second: 1 x would look like 0.5 x
+    told = cli("motion", sample_data() / "motion" / "unbalanced.toml", *SHORT, "--rate", "100")
+    assert "too few samples a turn (--rate)" in told.out
+    assert "steady" not in told.out.lower()

@@ -1,5 +1,7 @@
 """Motion in time against closed forms, printed numbers and integrations by scipy that are written here."""
 
+import importlib.util
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -303,3 +305,20 @@ def test_what_has_neither_mass_nor_damping():
     made = system(lambda speed: fem.Motion(M, C, K, ("x1", "x2", "y1", "y2"), speed), np.array([0.0, 1.0]))
     with pytest.raises(ValueError, match=r"[xy]2 has neither mass nor damping"):
         run(made, (0.0, 0.0), 1.0, (np.ones(4), np.zeros(4)))
+
+
+def test_interpreted_and_compiled_agree(monkeypatch):
+    import rotorid.base.compiled
+    import rotorid.motion.rosenbrock as compiled
+
+    monkeypatch.setattr(rotorid.base.compiled, "COMPILED", False)
+    spec = importlib.util.spec_from_file_location("plain_rosenbrock", compiled.__file__)
+    plain = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(plain)
+    made = rigid(7.5, "pressure", unbalance={1: 1e-3})
+    start = begin(made, SPEED)
+    found = [run(made, (SPEED, 2 * SPEED), 0.1, (start.q, start.v))]
+    monkeypatch.setattr("rotorid.motion.run.advance", plain.advance)
+    found.append(run(made, (SPEED, 2 * SPEED), 0.1, (start.q, start.v)))
+    assert found[0].steps == found[1].steps
+    np.testing.assert_allclose(found[0].z, found[1].z, rtol=1e-9)

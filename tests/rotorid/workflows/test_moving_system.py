@@ -29,7 +29,9 @@ def test_a_rotor_with_its_tables(tmp_path):
     system = found.system(10.0, 500.0)
     x, y = system.index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4j, 1e-4], rtol=1e-12, atol=1e-20)
-    assert system.bow[x].real > 0 and system.weight[x] < 0 and system.weight[y] == 0
+    assert system.bow[x].real > 0
+    assert system.weight[x] < 0
+    assert system.weight[y] == 0
     assert (found.node("disc"), found.node("4")) == (3, 4)
 
 
@@ -37,7 +39,9 @@ def test_a_small_model_has_its_own(tmp_path):
     path = tmp_path / "small.toml"
     path.write_bytes(small_model_bytes(SMALL))
     found = moving(path)
-    assert isinstance(found.model, SmallModel) and found.files == (path,) and found.node("3") == 3
+    assert isinstance(found.model, SmallModel)
+    assert found.files == (path,)
+    assert found.node("3") == 3
     x, y = (system := found.system(10.0, 500.0)).index(3)
     np.testing.assert_allclose(system.unbalance[[x, y]], [1e-4 + 2e-5j, 2e-5 - 1e-4j])
     with pytest.raises(ValueError, match="no node 2: the small model has 1, 3, 5"):

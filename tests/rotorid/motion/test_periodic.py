@@ -1,0 +1,355 @@
+"""Periodic motion against closed forms, printed digits, and integration in time by scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from fem.forces.laws import law, tables
+from fem.matrices.equations_of_motion import Motion
+from fem.model.node_forces import CubicSpring, InternalDamping, JournalBearing, SqueezeFilm, Stop
+from rotorid.motion.bifurcation_diagram import draw_bifurcations
+from rotorid.motion.continuation import DOUBLING, FOLD, HOPF, TORUS
+from rotorid.motion.periodic import periodic_motion
+from rotorid.motion.periodic_table import Readings
+from rotorid.motion.system import system
+
+SPEEDS = np.array([0.01, 1e4])
+
+
+def disc(mass, forces, *, damping=0.0, stiffness=(0.0, 0.0), weight=0.0, unbalance=0.0):
+    """A mass at one node."""
+    matrices = {"M": mass * np.eye(2), "C": damping * np.eye(2), "K": np.diag(stiffness)}
+    return system(
+        lambda speed: Motion(**matrices, coordinates=("x1", "y1"), speed=speed),
+        SPEEDS,
+        forces=forces,
+        weight={"y1": -weight},
+        unbalance={1: unbalance} if unbalance else {},
+    )
+
+
+def damper(B, u):
+    """A rigid rotor in a squeeze film with its centring spring, all in the units c = m = k = 1.
+
+    B = η R L³ / (m c³ ω_n) and u = e / c, with the ω_n of the centring spring, r = Ω / ω_n.
+    """
+    film = SqueezeFilm(1, "", length=1.0, diameter=2.0, clearance=1.0, viscosity=B, centring_stiffness=1.0)
+    return disc(1.0, [film], unbalance=u)
+
+
+def crossings(found, speed):
+    """Largest deflection and stability of all motions at a speed, by linear interpolation, ascending."""
+    there = []
+    for branch in found.branches:
+        for a, b, p in zip(branch.speeds, branch.speeds[1:], branch.points, strict=False):
+            if (a - speed) * (b - speed) <= 0:
+                there.append((np.hypot(*p.orbit.readings(np.eye(2)).T).max(), p.outside == 0))
+    return sorted(there)
+
+
+def exact(problem, found, speed, near):
+    """The motion at a speed that is nearest to an amplitude: Newton's method from the branch's own point."""
+    from rotorid.motion.collocation import Periodic
+    from rotorid.motion.continuation import at_speed
+
+    points = [p for branch in found.branches for p in branch.points]
+    sizes = [abs(np.hypot(*p.orbit.ends.T).max() - near) + abs(p.orbit.speed - speed) for p in points]
+    guess = points[int(np.argmin(sizes))].orbit
+    start = at_speed(Periodic(problem, 1), guess)
+    return Periodic(problem, 1).solve(guess, start.rows, np.array([speed]))[0]
+
+
+def test_three_circular_orbits_in_a_squeeze_film():
+    """Digits of the issue for B 0.05, u 0.30, r 2; the one in the middle is unstable."""
+    problem = damper(0.05, 0.30)
+    found = periodic_motion(problem, 0.4, 3.0)
+    known = (0.41579958, 0.84178208, 0.87387530)
+    for eccentricity, stable in zip(known, (True, False, True), strict=True):
+        at = exact(problem, found, 2.0, eccentricity)
+        orbit = np.hypot(*at.orbit.ends.T)
+        np.testing.assert_allclose([orbit.min(), orbit.max()], eccentricity, rtol=3e-8)
+        assert (abs(at.multipliers) < 1).all() == stable
+    assert [stable for _, stable in crossings(found, 2.0)] == [True, False, True]
+
+
+def circle(B, u, r):
+    """What a centred circular orbit must fulfil: zeros over its eccentricity (short film, half circle)."""
+
+    def left(e):
+        radial = e * (1 - r * r) + 2 * B * r * e**2 / (1 - e * e) ** 2
+        return radial**2 + (np.pi / 2 * B * r * e / (1 - e * e) ** 1.5) ** 2 - (u * r * r) ** 2
+
+    e = np.linspace(1e-6, 1 - 1e-6, 20001)
+    value = left(e)
+    return [brentq(left, e[k], e[k + 1], xtol=1e-13) for k in np.flatnonzero(value[1:] * value[:-1] < 0)]
+
+
+def test_jumps_of_a_squeeze_film_up_and_down():
+    """Between the folds there are three circular orbits, outside one; arrows go to the other stable one."""
+    B, u = 0.02, 0.2
+    found = periodic_motion(damper(B, u), 0.5, 2.0)
+    (branch,) = found.branches
+    folds = sorted(b.point.orbit.speed for b in branch.bifurcations)
+    assert {b.kind for b in branch.bifurcations} == {FOLD}
+    for fold, inside in zip(folds, (1e-5, -1e-5), strict=True):
+        assert len(circle(B, u, fold + inside)) == 3
+        assert len(circle(B, u, fold - inside)) == 1
+    readings = Readings(found, ("1",), np.eye(2)[:1])
+    for speed, before, after in readings.jumps:
+        other = circle(B, u, speed + (1e-9 if speed == folds[0] else -1e-9))
+        far = max(other, key=lambda e: abs(e - before[0]))
+        np.testing.assert_allclose(after, far, rtol=3e-3)
+    assert sorted(after[0] > before[0] for _, before, after in readings.jumps) == [False, True]
+    ax = draw_bifurcations(readings)
+    assert {text.get_text() for text in ax.texts} >= {"jump up", "jump down"}
+    labels = {line.get_label() for line in ax.lines}
+    assert {"synchronous, stable", "synchronous, unstable", "fold"} <= labels
+
+
+def amplitudes(zeta, cubic, u, speed):
+    """|z| of circular orbits: (a (1 − Ω²) + k₃ a³)² + (2 ζ Ω a)² = (u Ω²)², a cubic equation in a²."""
+    detuned = 1 - speed**2
+    squares = np.roots(
+        [cubic**2, 2 * cubic * detuned, detuned**2 + (2 * zeta * speed) ** 2, -((u * speed**2) ** 2)]
+    )
+    return np.sort(np.sqrt(squares[(abs(squares.imag) < 1e-9) & (squares.real > 0)].real))
+
+
+def test_a_cubic_spring_has_the_amplitudes_and_folds_of_its_cubic_equation():
+    zeta, cubic, u = 0.05, 0.1, 0.2
+    found = periodic_motion(disc(1.0, [CubicSpring(1, "", 1.0, cubic)], damping=0.1, unbalance=u), 0.3, 3.0)
+    (branch,) = found.branches
+    for point in branch.points[::9]:
+        size = np.hypot(*point.orbit.ends.T)
+        near = amplitudes(zeta, cubic, u, point.orbit.speed)
+        assert abs(size.max() / near - 1).min() < 1e-7
+        assert size.max() - size.min() < 1e-7 * size.max()
+
+    def discriminant(speed):
+        detuned = 1 - speed**2
+        p = np.poly1d(
+            [cubic**2, 2 * cubic * detuned, detuned**2 + (2 * zeta * speed) ** 2, -((u * speed**2) ** 2)]
+        )
+        low, high = np.sort(p.deriv().roots.real)
+        return p(low), p(high)
+
+    for bifurcation in branch.bifurcations:
+        assert bifurcation.kind == FOLD
+        speed = bifurcation.point.orbit.speed
+        which = int(abs(discriminant(speed)[0]) > abs(discriminant(speed)[1]))
+        root = brentq(lambda s, k=which: discriminant(s)[k], speed - 1e-4, speed + 1e-4, xtol=1e-14)
+        assert speed == pytest.approx(root, abs=1e-8)
+        assert min(abs(bifurcation.point.multipliers - 1)) < 1e-6
+    assert len(branch.bifurcations) == 2
+
+
+SAGGING = {"stiffness": (0.2, 0.0), "weight": 1.0, "unbalance": 0.3}
+"""A disc that sags in a cubic spring, stiffer in x: its period doubles near twice the resonance."""
+
+
+def duffing(t, s, speed, given, damping):
+    """The same as first-order equations, and with 16 more unknowns their variation."""
+    x, y, vx, vy = s[:4]
+    k3, r2 = 0.1, x * x + y * y
+    drive = given["unbalance"] * speed**2
+    ax = drive * np.cos(speed * t) - damping * vx - (1 + given["stiffness"][0] + k3 * r2) * x
+    ay = drive * np.sin(speed * t) - damping * vy - (1 + k3 * r2) * y - given["weight"]
+    if s.size == 4:
+        return [vx, vy, ax, ay]
+    A = np.zeros((4, 4))
+    A[0, 2] = A[1, 3] = 1
+    A[2] = -(1 + given["stiffness"][0] + k3 * (r2 + 2 * x * x)), -2 * k3 * x * y, -damping, 0
+    A[3] = -2 * k3 * x * y, -(1 + k3 * (r2 + 2 * y * y)), 0, -damping
+    return np.concatenate([[vx, vy, ax, ay], (A @ s[4:].reshape(4, 4)).ravel()])
+
+
+def monodromy(orbit, given, damping):
+    """By integration: how far the state is from periodic, and the multipliers."""
+    begin = np.concatenate([orbit.state, np.eye(4).ravel()])
+    end = solve_ivp(
+        duffing,
+        (0, orbit.period),
+        begin,
+        "DOP853",
+        rtol=1e-11,
+        atol=1e-12,
+        args=(orbit.speed, given, damping),
+    ).y[:, -1]
+    return abs(end[:4] - orbit.state).max(), np.linalg.eigvals(end[4:].reshape(4, 4))
+
+
+def by_size(values):
+    return np.sort_complex(np.where(values.imag < 0, values.conj(), values))
+
+
+def test_a_period_doubling_and_its_branch_against_integration():
+    damping = 0.04
+    problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **SAGGING)
+    found = periodic_motion(problem, 2.1, 2.7, subsynchronous=2)
+    main, double = found.branches
+    assert [b.kind for b in main.bifurcations] == [DOUBLING, DOUBLING]
+    for bifurcation in main.bifurcations:
+        away, multipliers = monodromy(bifurcation.point.orbit, SAGGING, damping)
+        assert away < 1e-7
+        assert min(abs(multipliers + 1)) < 1e-6
+    assert double.kind == "period 2"
+    assert "joins" in double.ended
+    for point in (main.points[len(main.points) // 2], *double.points[5:-5:40]):
+        away, multipliers = monodromy(point.orbit, SAGGING, damping)
+        assert away < 1e-5
+        np.testing.assert_allclose(by_size(multipliers), by_size(point.multipliers), atol=3e-5)
+    # long integration inside comes to the motion of two revolutions
+    speed = 2.25
+    end = solve_ivp(
+        duffing, (0, 800 * np.pi / speed), [1e-3, -1, 0, 0], "DOP853", rtol=1e-10, atol=1e-11,
+        args=(speed, SAGGING, damping), t_eval=np.arange(796, 801, 2) * np.pi / speed,
+    ).y.T  # fmt: skip
+    assert abs(end[0] - end[2]).max() < 1e-6
+    assert abs(end[0] - end[1]).max() > 0.1
+    stable = [p for p in double.points if p.outside == 0]
+    states = np.array([p.orbit.ends[k] for p in stable for k in (0, len(p.orbit.velocities) // 2)])
+    speeds = np.array([p.orbit.speed for p in stable for _ in (0, 1)])
+    near = np.abs(speeds - speed) < 0.03
+    assert min(np.abs(states[near] - end[0, :2]).max(axis=1)) < 0.1
+
+
+def test_a_neimark_sacker_bifurcation_against_integration():
+    damping, given = 0.06, {"stiffness": (0.0, 0.0), "weight": 2.0, "unbalance": 0.5}
+    problem = disc(1.0, [CubicSpring(1, "", 1.0, 0.1)], damping=damping, **given)
+    found = periodic_motion(problem, 2.2, 3.0)
+    torus = [b for branch in found.branches for b in branch.bifurcations if b.kind == TORUS]
+    assert len(torus) == 1
+    away, multipliers = monodromy(torus[0].point.orbit, given, damping)
+    assert away < 1e-7
+    first = multipliers[np.argmin(abs(abs(multipliers) - 1))]
+    assert abs(first) == pytest.approx(1, abs=1e-6)
+    assert abs(first.imag) > 0.1
+
+
+LOAD, CLEARANCE, NOMINAL = 525.0, 1e-4, 157.0
+
+
+def journal(critical, film="pressure", eccentricity=0.2):
+    """A rigid rotor, m c Ω² / W = `critical` and static ε = `eccentricity` at 157 rad/s."""
+    e, L, R = eccentricity, 0.03, 0.05
+    load = e / (4 * (1 - e * e) ** 2) * np.sqrt(16 * e * e + np.pi**2 * (1 - e * e))
+    viscosity = LOAD * CLEARANCE**2 / (NOMINAL * R * L**3 * load)
+    bearing = JournalBearing(
+        1, "", length=L, diameter=2 * R, clearance=CLEARANCE, viscosity=viscosity, film=film
+    )
+    return disc(critical * LOAD / (CLEARANCE * NOMINAL**2), [bearing], weight=LOAD)
+
+
+@pytest.mark.parametrize(
+    ("critical", "eccentricity", "whirl"),
+    [(7.51461, 0.1, 0.50294), (7.18997, 0.2, 0.51056), (6.46040, 0.5, 0.51464)],
+)
+def test_hopf_point_of_a_rigid_rotor_in_a_short_bearing(critical, eccentricity, whirl):
+    found = periodic_motion(journal(critical, eccentricity=eccentricity), 120.0, 200.0)
+    (point,) = found.branches[0].bifurcations
+    assert point.kind == HOPF
+    assert point.point.orbit.speed == pytest.approx(NOMINAL, rel=3e-6)
+    (row,) = [
+        c.values for c in Readings(found, ("1",), np.eye(2)[:1]).bifurcations() if c.name == "whirl_ratio"
+    ]
+    assert row[0] == pytest.approx(whirl, abs=1e-5)
+    assert any("no unbalance" in warning for warning in found.warnings)
+
+
+def test_limit_cycle_of_a_rigid_rotor_in_a_short_bearing():
+    """Digits of the issue, M = 8.0: largest and smallest ε 0.8411 and 0.8287, whirl 0.4982 Ω."""
+    found = periodic_motion(journal(8.0), 140.0, NOMINAL, limit_cycle=True)
+    (cycle,) = found.branches[1:]
+    last = cycle.points[-1]
+    e = np.hypot(*last.orbit.readings(np.eye(2)).T) / CLEARANCE
+    assert [f"{v:.4f}" for v in (e.max(), e.min(), 2 * np.pi / last.orbit.period / NOMINAL)] == [
+        "0.8411", "0.8287", "0.4982",
+    ]  # fmt: skip
+    assert last.outside == 0
+    assert abs(last.phase - 1) < 1e-4  # the multiplier of the phase
+    assert [b.kind for b in cycle.bifurcations] == [FOLD, FOLD]
+
+
+def test_rotating_damping_against_its_threshold():
+    """c_i (Ω − ω) > c ω ends stability: Ω = ω (1 + c / c_i); the cubic spring limits the circular whirl."""
+    c, c_i, k3 = 0.1, 0.1, 0.5
+    given = [CubicSpring(1, "", 1.0, k3), InternalDamping(1, "", c_i)]
+    found = periodic_motion(disc(1.0, given, damping=c), 1.0, 3.0, limit_cycle=True)
+    (hopf,) = found.branches[0].bifurcations
+    assert hopf.point.orbit.speed == pytest.approx(1 + c / c_i, abs=1e-7)
+    cycle = found.branches[1].points[-1].orbit
+    whirl = 2 * np.pi / cycle.period  # c ω = c_i (Ω − ω), ω² = 1 + k₃ a²
+    assert whirl == pytest.approx(c_i * cycle.speed / (c + c_i), rel=1e-8)
+    assert np.hypot(*cycle.ends.T).max() == pytest.approx(np.sqrt((whirl**2 - 1) / k3), rel=1e-7)
+
+
+def test_a_journal_without_mass_against_long_integration():
+    """A disc on a flexible shaft in a film, with unbalance and weight: the branch to 1e-4 of its size."""
+    m, k, u, W = 30.0, 5e6, 30.0 * 2e-5, 300.0
+    bearing = JournalBearing(1, "", length=0.03, diameter=0.1, clearance=1e-4, viscosity=0.03)
+    K = k * np.kron([[1, -1], [-1, 1]], np.eye(2))
+    matrices = {"M": np.diag([0.0, 0.0, m, m]), "C": 20.0 * np.diag([0.0, 0.0, 1, 1]), "K": K}
+    problem = system(
+        lambda speed: Motion(**matrices, coordinates=("x1", "y1", "x2", "y2"), speed=speed),
+        np.array([50.0, 500.0]),
+        forces=[bearing],
+        weight={"y2": -W},
+        unbalance={2: u},
+    )
+    found = periodic_motion(problem, 100.0, 300.0)
+    point = found.branches[0].points[len(found.branches[0].points) // 2]
+    speed, (codes, values) = point.orbit.speed, tables([bearing])
+    out, v = np.zeros((2, 6)), np.zeros(2)
+
+    def rate(t, s):
+        """The film's force and the shaft's are in balance: that gives the journal's velocity."""
+        pull = k * (s[2:4] - s[:2])
+        for _ in range(30):
+            law(codes[0], values[0], *s[:2], *v, speed, out)
+            step = np.linalg.solve(out[:, 3:5], out[:, 0] + pull)
+            v[:] -= step
+            if abs(step).max() < 1e-12:
+                break
+        turning = u * speed**2 * np.array([np.cos(speed * t), np.sin(speed * t)])
+        return [*v, *s[4:], *((-pull - 20.0 * s[4:] + turning - [0, W]) / m)]
+
+    assert point.outside == 0
+    period, n = point.orbit.period, 40
+    begin = np.concatenate([point.orbit.start * 0.9, point.orbit.state[6:]])
+    times = (n + np.arange(8) / 8) * period
+    run = solve_ivp(rate, (0, times[-1]), begin, "LSODA", rtol=1e-9, atol=1e-12, t_eval=times).y[:4].T
+    ends = point.orbit.ends[:-1]
+    np.testing.assert_allclose(run, ends[:: len(ends) // 8], atol=1e-4 * np.ptp(ends) / 2)
+
+
+def test_a_stop_is_met_where_the_free_orbit_is_as_large_as_its_gap():
+    """Above the resonance the branch folds there: the free orbit, u Ω² / |1 − Ω² + 2 i ζ Ω|, grazes it."""
+    ring = Stop(1, "", gap=1.0, stiffness=10.0, damping=0.1, diameter=1.0)
+    problem = disc(1.0, [ring], damping=0.1, stiffness=(1.0, 1.0), unbalance=0.3)
+    found = periodic_motion(problem, 0.5, 2.0)
+    graze = brentq(lambda s: 0.3 * s**2 - abs(1 - s**2 + 0.1j * s), 1.05, 2.0, xtol=1e-12)
+    folds = [b.point.orbit.speed for branch in found.branches for b in branch.bifurcations if b.kind == FOLD]
+    assert folds == [pytest.approx(graze, abs=1e-6)]
+    assert not any("stopped" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "options", "words"),
+    [
+        (0.0, 2.0, {}, "speeds above 0"),
+        (2.0, 1.0, {}, "the lower one first"),
+        (1.0, 2.0, {"limit_cycle": True}, "a period of its own"),
+    ],
+)
+def test_what_cannot_be_sought_is_refused(low, high, options, words):
+    with pytest.raises(ValueError, match=words):
+        periodic_motion(damper(0.05, 0.3), low, high, **options)
+
+
+def test_too_few_steps_are_said():
+    found = periodic_motion(damper(0.05, 0.3), 0.5, 1.5, steps=4)
+    assert any("too few steps" in warning for warning in found.warnings)
+    assert all(len(p.orbit.velocities) == 4 for p in found.branches[0].points)

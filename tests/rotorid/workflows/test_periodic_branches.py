@@ -1,0 +1,79 @@
+"""`rotorid periodic`: document, table, answer, picture, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rotorid.samples import sample_data
+from rotorid.workflows import PeriodicOptions, ResponseOptions, periodic, response
+
+ROTOR = sample_data() / "motion" / "rotor.toml"
+RANGE = ("--speeds", "6200:6600rpm")
+
+
+def test_rest_loses_stability_where_the_linear_rotor_does(cli, tmp_path):
+    found = cli("periodic", ROTOR, *RANGE, "--json", "--output", tmp_path / "p.csv").json
+    (hopf,) = found["bifurcations"]
+    assert hopf["bifurcation"] == "Hopf"
+    linear = cli("bearings", ROTOR, "--speeds", "6200:6600:100rpm", "--json").json["stability"]
+    assert hopf["speed_rad_s"] == pytest.approx(linear["threshold_rad_s"], rel=1e-5)
+    assert hopf["whirl_ratio"] == pytest.approx(0.19, abs=0.002)
+    (rest,) = found["branches"]
+    assert rest["kind"] == "rest"
+    stable = np.array(rest["speeds_rad_s"]) < hopf["speed_rad_s"]
+    assert rest["stable"] == stable.tolist()
+    table = pd.read_csv(tmp_path / "p.csv")
+    np.testing.assert_allclose(table["speed_rad_s"], rest["speeds_rad_s"])
+    assert table["stable"].tolist() == rest["stable"]
+    assert {"amplitude_2_m", "amplitude_22_m", "largest_multiplier"} <= {*table.columns}
+
+
+def test_the_answer_and_the_picture(cli, tmp_path):
+    told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--plot", tmp_path / "p.png")
+    assert "limit cycle" in told.out
+    assert "Hopf" in told.out
+    assert "no unbalance" in told.out
+    assert len(told.out.splitlines()) <= 24
+    assert (tmp_path / "p.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--speeds", "0:3000rpm"), "speeds above 0"),
+        (("--speeds", "3000rpm"), "is not a range"),
+        ((*RANGE, "--steps", "100000"), "--steps takes a whole number from 4"),
+        ((*RANGE, "--subsynchronous", "99"), "from 2 to 12"),
+        ((*RANGE, "--sensors", "99"), "node 99 does not exist"),
+    ],
+)
+def test_what_is_impossible(cli, given, message):
+    told = cli("periodic", ROTOR, *given)
+    assert told.code == 2
+    assert message in told.err
+    assert len(told.err.strip().splitlines()) == 1
+
+
+def test_a_limit_cycle_of_an_unbalanced_rotor_is_refused(cli, tmp_path):
+    (tmp_path / "u.csv").write_text("plane,unbalance_g_mm,angle_deg\n12,5000,30\n")
+    told = cli("periodic", ROTOR, *RANGE, "--limit-cycle", "--unbalance", tmp_path / "u.csv")
+    assert told.code == 2
+    assert "a period of its own" in told.err
+
+
+def test_on_linear_supports_it_is_the_response():
+    """The compressor on its table of bearings; the rotor is reduced here, which costs a thousandth."""
+    folder = sample_data() / "compressor"
+    given = PeriodicOptions(
+        speeds="2900:3000rpm", unbalance=folder / "unbalance.csv", sensors="2,12:30", modes=40
+    )
+    found = periodic(folder / "rotor.toml", given).readings
+    (branch,) = found.motion.branches
+    speeds = [float(speed) for speed in branch.speeds[[0, -1]]]
+    options = ResponseOptions(speeds=speeds, sensors="2,12:30")
+    steady = response(folder / "rotor.toml", folder / "unbalance.csv", options)
+    size = abs(steady.response.readings(steady.sensors))
+    np.testing.assert_allclose(found.along[0][[0, -1]], size, rtol=1e-3)
+    assert branch.stable.all()
