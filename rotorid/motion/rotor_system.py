@@ -46,27 +46,25 @@ def rotor_system(
     if not lowest < highest:
         raise ValueError(f"the speeds must ascend, not from {lowest:.6g} to {highest:.6g} rad/s")
     inside = {s for support in rotor.supports for s in support.speeds if lowest < s < highest}
-    knots = np.array([lowest, *sorted(inside), highest])
+    motion = fem.equations_of_motion(rotor.linear, speed=lowest)
+    down = dict(zip("xy", weight_along(gravity, direction), strict=True))
+    weight = motion.M @ [down.get(name[0], 0.0) for name in motion.coordinates]
     straight = dataclasses.replace(
         rotor.linear, supports=(), material_damping=np.zeros_like(rotor.material_damping)
     )
     plane = fem.equations_of_motion(straight, plane="x")
-    deflections = np.array([name[:1] == "x" for name in plane.coordinates], dtype=float)
-    load = plane.M @ deflections
-    weight: dict[str, float] = {}
-    for axis, part in zip("xy", weight_along(gravity, direction), strict=True):
-        weight |= {_in(name, axis): part * mass for name, mass in zip(plane.coordinates, load, strict=True)}
-    at = np.array([plane.index(f"x{rotor.node(node)}") for node in bow or {}], dtype=np.intp)
-    bent = bow_forces(plane.K, at, np.array(list((bow or {}).values()), dtype=complex))
+    bent = {rotor.node(node): value for node, value in (bow or {}).items()}
+    at = np.array([plane.index(f"x{node}") for node in bent], dtype=np.intp)
+    pull = bow_forces(plane.K, at, np.array(list(bent.values()), dtype=complex))
     return system(
         lambda speed: fem.equations_of_motion(rotor.linear, speed=speed),
-        knots,
+        np.array([lowest, *sorted(inside), highest]),
         forces=rotor.forces,
-        weight=weight,
+        weight=dict(zip(motion.coordinates, weight.tolist(), strict=True)),
         unbalance=unbalance,
         bow={
-            _in(plane.coordinates[i], axis): turned * force
-            for i, force in zip(at, bent, strict=True)
+            f"{axis}{node}": turned * force
+            for node, force in zip(bent, pull, strict=True)
             for axis, turned in (("x", 1), ("y", -1j))
         },
     )
@@ -104,8 +102,3 @@ def bow_forces(stiffness: FloatArray, at: IndexArray, bow: ComplexArray) -> Comp
         across = stiffness[np.ix_(others, at)]
         K = K - across.T @ np.linalg.solve(stiffness[np.ix_(others, others)], across)
     return np.asarray(K @ bow)
-
-
-def _in(name: str, axis: str) -> str:
-    """The same unknown of the plane x in x or in y."""
-    return name.replace("x", axis, 1) if name[0] == "x" else name.replace("_x", f"_{axis}", 1)
