@@ -23,7 +23,12 @@ centres bounds, on the side where a steady journal's pressure is positive (the t
 
 @dataclass(frozen=True)
 class NodeForce:
-    """What all of them have: a node, from 1, a name for messages, numbers that are finite and not negative.
+    """What all of them have; their numbers are finite and not negative.
+
+    Attributes
+    ----------
+    node, name
+        From 1; for messages and drawings.
 
     Raises
     ------
@@ -69,12 +74,10 @@ class ShortFilm(NodeForce):
 
     Attributes
     ----------
-    length, diameter
-        Along the shaft, and of the journal, m.
-    clearance
-        Radial, m.
-    viscosity
-        Pa·s.
+    node, name
+        As of `NodeForce`.
+    length, diameter, clearance, viscosity
+        Along the shaft, and of the journal; radial, m; Pa·s.
     """
 
     length: float = 0.0
@@ -91,6 +94,8 @@ class JournalBearing(ShortFilm):
 
     Attributes
     ----------
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
     film
         Where it carries, see `Film`.
     """
@@ -108,6 +113,8 @@ class SqueezeFilm(ShortFilm):
 
     Attributes
     ----------
+    node, name, length, diameter, clearance, viscosity
+        As of `ShortFilm`.
     centring_stiffness
         N/m, of the spring that centres it; 0 for none.
     """
@@ -128,8 +135,8 @@ class MuszynskaSeal(NodeForce):
 
     Attributes
     ----------
-    stiffness, damping, fluid_mass
-        K₀ N/m, D₀ N·s/m, m kg.
+    node, name, stiffness, damping, fluid_mass
+        As of `NodeForce`; K₀ N/m, D₀ N·s/m, m kg.
     swirl_ratio
         τ₀, fluid's mean speed by the shaft's, about 0.5 or less.
     clearance
@@ -155,8 +162,8 @@ class CubicSpring(NodeForce):
 
     Attributes
     ----------
-    stiffness, cubic_stiffness
-        k, N/m, and k₃, N/m³.
+    node, name, stiffness, cubic_stiffness
+        As of `NodeForce`; k, N/m, and k₃, N/m³.
     """
 
     stiffness: float = 0.0
@@ -172,14 +179,10 @@ class Stop(NodeForce):
 
     Attributes
     ----------
-    gap
-        m.
-    stiffness, damping
-        N/m, N·s/m of the contact.
-    friction
-        µ.
-    diameter
-        2 R of the shaft where it rubs, m.
+    node, name, gap, stiffness, damping
+        As of `NodeForce`; m; N/m and N·s/m of the contact.
+    friction, diameter
+        µ; 2 R of the shaft where it rubs, m.
     slip_speed
         v₀, m/s, below which friction grows with the slip.
     """
@@ -202,8 +205,8 @@ class InternalDamping(NodeForce):
 
     Attributes
     ----------
-    damping
-        c, N·s/m.
+    node, name, damping
+        As of `NodeForce`; c, N·s/m.
     """
 
     damping: float = 0.0

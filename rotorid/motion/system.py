@@ -105,7 +105,7 @@ def system(
     unbalance: Mapping[int, complex] | None = None,
     bow: Mapping[str, complex] | None = None,
 ) -> MotionSystem:
-    """Put together what moves.
+    """Put together what moves; ValueError as `linear`, and for nodes that do not move.
 
     Parameters
     ----------
@@ -117,11 +117,6 @@ def system(
         N by coordinate.
     unbalance
         m e e^{iβ} by node, kg·m, β with the rotation.
-
-    Raises
-    ------
-    ValueError
-        As `linear`, and for nodes that do not move.
     """
     motions = [linear(float(speed)) for speed in knots]
     names = motions[0].coordinates

@@ -27,10 +27,8 @@ def read_bow(path: str | Path, rotor: Rotor) -> dict[int, complex]:
 
     Parameters
     ----------
-    path
-        The file; in a workbook the sheet `bow`, or else the first one.
-    rotor
-        Knows the nodes and the names of stations.
+    path, rotor
+        The file, in a workbook the sheet `bow`, or else the first one; whose nodes and stations it names.
 
     Returns
     -------

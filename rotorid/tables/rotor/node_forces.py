@@ -94,19 +94,7 @@ KEYS_OF_FORCE: dict[str, tuple[Key, ...]] = {
 def read_force(section: Section, node: Callable[[Section], int | None], kind: str) -> NodeForce | None:
     """Read one table of a kind of `FORCES`, such as `[[journal_bearing]]`, or None and problems.
 
-    Parameters
-    ----------
-    section
-        Its settings.
-    node
-        Reads its node.
-    kind
-        Which of them.
-
-    Warns
-    -----
-    TableWarning
-        About values that are no machine's, probably in a wrong unit.
+    `node` reads its node. A `TableWarning` is given of values that are no machine's.
     """
     said = take(section, KEYS_OF_FORCE[kind])
     where = node(section)
