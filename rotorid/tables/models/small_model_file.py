@@ -132,10 +132,11 @@ def read_small_model(path: str | Path) -> SmallModel:
     said = take(top, SMALL_MODEL)
 
     def node(section: Section) -> int | None:
-        value = section.take("node")
-        if said["nodes"] is None or (type(value) is int and value in said["nodes"]):
+        value, nodes = section.take("node"), said["nodes"] or ()
+        if type(value) is int and value in nodes:
             return value
-        section.complain("node", f"one of the nodes {listing(map(str, said['nodes']))}")
+        if nodes:
+            section.complain("node", f"one of the nodes {listing(map(str, nodes))}")
         return None
 
     def vectors(key: str, keys: Sequence[Key]) -> dict[int, complex]:
