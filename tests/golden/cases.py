@@ -107,7 +107,7 @@ motion-run-up               motion sample_data/motion/unbalanced.toml --run-up 3
 motion-bode                 motion sample_data/motion/unbalanced.toml --run-up 600:6200rpm --time 10s --view bode --plot run_up.png
 motion-from-rest            motion sample_data/motion/small.toml --run-up 0:3000rpm --time 1s
 periodic-jumps              periodic sample_data/motion/damper.toml --speeds 1000:5000rpm --plot jumps.png
-reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --motion-model motion.toml
+reduce-keep-supports        reduce {MOTION} --nodes 7,12,18 --damping 0.5,0.5,0.5 --keep-supports --model motion.toml
 influence-rotor23           influence {ROTOR23} --planes 7,12,18 --sensors 2,22 --speeds 100:600:5 --output w.csv
 influence-coarse            influence {ROTOR23} --planes 7,12,18 --sensors 2:45,22:45 --speeds 100,120 --verbose
 influence-compressor        influence {COMPRESSOR} --planes "impeller 1,impeller 5" {PROBES} --speeds 4000:6000:1000rpm --output w.xlsx --plot w.png
