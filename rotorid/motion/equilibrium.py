@@ -108,11 +108,13 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
         raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
     resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
+    J = _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1]
     if start is None:
-        _check_held(system, _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1], speed)
+        _check_held(system, J, speed)
     q = _condensed(resting, K, speed, start)
     _check_walls(system, q, speed)
     if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= _LOST * np.abs(system.weight).sum():
+        _check_held(system, J, speed)
         raise ValueError(
             f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
