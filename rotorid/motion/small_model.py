@@ -111,18 +111,19 @@ class SmallModel(Answered):
             For an impossible speed or one outside the table of a support.
         """
         speed = number(speed, "speed")
-        k = len(self.nodes)
-        stands = [i for i, support in enumerate(self.supports) if support.pedestal is not None]
         names = [f"{axis}{node}" for axis in "xy" for node in self.nodes]
-        names += [f"foot_{axis}{i + 1}" for axis in "xy" for i in stands]
-        M, C, K = (np.zeros((len(names), len(names))) for _ in range(3))
-        x, y = slice(k), slice(k, 2 * k)
-        for own, other, sign in ((x, y, 1.0), (y, x, -1.0)):
-            M[own, own] = np.diag(self.masses)
-            C[own, own] = self.material_damping + self.damping
-            C[own, other] = sign * speed * self.gyroscopic
-            K[own, own] = self.stiffness
-            K[own, other] = sign * speed * self.material_damping
+        stands = [i for i, support in enumerate(self.supports) if support.pedestal is not None]
+        feet = [f"foot_{axis}{i + 1}" for axis in "xy" for i in stands]
+        along, across = np.eye(2), np.array([[0.0, speed], [-speed, 0.0]])
+        M, C, K = (
+            np.pad(matrix, (0, len(feet)))
+            for matrix in (
+                np.kron(along, np.diag(self.masses)),
+                np.kron(along, self.material_damping + self.damping) + np.kron(across, self.gyroscopic),
+                np.kron(along, self.stiffness) + np.kron(across, self.material_damping),
+            )
+        )
+        names += feet
         for i, support in enumerate(self.supports):
             felt = np.zeros((2, len(names)))
             for plane, axis in enumerate("xy"):

@@ -203,7 +203,7 @@ def small_model_bytes(model: SmallModel, comments: Sequence[str] = ()) -> bytes:
                 f"the coefficients of the {support.kind} at node {support.node} depend on speed: leave it "
                 f"out, and write [[{support.kind}]] with node and table, its file, into the small model"
             )
-        tables.setdefault(support.kind, []).append(support_table(support, None, mixed=False))
+        tables.setdefault("bearing", []).append(support_table(support, None, mixed=True))
     tables |= force_tables(model.forces)
     for name, size, vectors in (
         ("unbalance", "unbalance_kg_m", model.unbalance),

@@ -68,9 +68,9 @@ class MotionOptions:
     acceleration : A
         Of a run-up or a run-down, in place of its time: 300rpm/s.
     unbalance : FILE
-        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
-        Table of the shaft's bow at rest; a small model has its own.
+        Table of the shaft's bow at rest; in place of a small model's own.
     gravity_direction : DEGREES
         Where gravity points, from x with the rotation; default: -90, to -y.
     start

@@ -50,9 +50,9 @@ class PeriodicOptions:
     steps : N
         Steps in time of one revolution or cycle; default: 32 or more, as the motion needs them.
     unbalance : FILE
-        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; a small model has its own.
+        Table: plane, unbalance_g_mm (or mass_g and radius_mm), angle_deg; in place of a small model's own.
     bow : FILE
-        Table of the shaft's bow at rest; a small model has its own.
+        Table of the shaft's bow at rest; in place of a small model's own.
     modes : N
         Modes that a rotor keeps between sensors and bearings (Craig and Bampton), in both planes together;
         default: those up to 4 times the highest speed, up to 24 unknowns at least; all of a small model.

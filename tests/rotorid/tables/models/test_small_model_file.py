@@ -70,7 +70,8 @@ def some(seed):
             fem.Support(
                 2, ((1e7, 2e5), (-2e5, 3e7)), 1e3, "drive", pedestal=fem.Pedestal(5.0, (1e8, 2e8), 10.0)
             ),
-            fem.Support(7, -1e5, kind="seal"),
+            fem.Support(7, -1e5, kind="seal", pedestal=fem.Pedestal(1.0, (1e6, 1e6))),
+            fem.Support(30, 1e6),
         ],
         forces=[
             JournalBearing(30, "far", 0.05, 0.11, 1.5e-4, 0.004, "line of centres"),
