@@ -217,7 +217,7 @@ class _Search:
             for speed in middles
             if not any(stable for b in branches for _, stable in b.at(speed, b.speeds[:, None]))
         ]
-        return sorted({*self.low, (self.low + self.high) / 2, self.high, *bare[:_ASKED]})
+        return sorted({self.low, (self.low + self.high) / 2, self.high, *bare[:_ASKED]})
 
     def reached(self, speed: float) -> Orbit | str:
         """What motion in time from rest comes to: one period of it, what else in words, or "" for rest."""
