@@ -347,7 +347,8 @@ def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
 
 def _doubts(branches: list[Branch]) -> list[str]:
     """What may be wrong with the branches."""
-    said = [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    stopped = [b for b in branches if b.ended.startswith("stopped")]
+    said = [f"the {b.kind} branch {b.ended} at {rpm_text(b.speeds[-1])}" for b in stopped]
     for branch in branches:
         worst = max(point.orbit.roughness for point in branch.points)
         if worst > _COARSE:
