@@ -33,7 +33,7 @@ class SteadyEnd:
     amplitude
         Largest distance from the mean, m, shape (m,).
     change
-        Of root mean square and mean between the quarters of this part, by the largest root mean square.
+        Of root mean square and mean from the first to the last half of this part, by the largest root mean square.
     trend
         Whether what changes most goes one way, up or down.
     at_rest
@@ -93,9 +93,9 @@ def steady_end(motion: MotionRun) -> SteadyEnd | None:
     largest = np.maximum(np.abs(motion.z - mean).max(axis=0), np.abs(mean))
     if (size <= _REST * largest).all():
         return SteadyEnd(mean, size, 0.0, False, True, np.nan, last, np.nan, motion.eccentricity(since))
-    quarters = np.array_split(z, 4)
-    means = np.array([_faded_mean(part) for part in quarters])
-    strength = np.sqrt([_faded_mean(np.abs(part - mean) ** 2).real for part in quarters])
+    halves = [z[k * len(z) // 8 :][: len(z) // 2] for k in range(5)]
+    means = np.array([_faded_mean(part) for part in halves])
+    strength = np.sqrt([_faded_mean(np.abs(part - mean) ** 2).real for part in halves])
     values = np.hstack([strength, means.real, means.imag])
     spread = np.ptp(values, axis=0)
     steps = np.diff(values[:, spread.argmax()])
