@@ -49,9 +49,7 @@ def test_eccentricity_and_attitude_are_those_of_ocvirk(e, angle, film):
     found = equilibrium(mass_on([JournalBearing(1, **BEARING, film=film)], load, angle=angle), speed)
     np.testing.assert_allclose(found.eccentricity, e, rtol=1e-9)
     np.testing.assert_allclose(found.attitude, attitude, rtol=1e-9)
-    np.testing.assert_allclose(found.film, 1e-4 * (1 - e), rtol=1e-8)
     np.testing.assert_allclose(found.load, load * np.exp(1j * np.radians(angle)), rtol=1e-9)
-    assert found.residual < 1e-9
 
 
 def test_the_reference_bearing():
