@@ -22,7 +22,7 @@ def compiled(function: _F) -> _F:
 
 
 def compiled_part(function: _F) -> _F:
-    """The same for what those call: called from Python it runs as Python, since to load numba takes a second."""
+    """The same for what those call: from Python it runs as Python, since to load numba takes a second."""
     return Compiled(function, alone=False) if COMPILED else function  # type: ignore[return-value, arg-type]
 
 

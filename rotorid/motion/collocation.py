@@ -128,16 +128,9 @@ class Orbit:
         weights = powers @ np.linalg.inv(np.vander(np.append(0.0, POINTS), increasing=True))
         return replace(self, velocities=np.einsum("ijl,ijlk->ijk", weights, known[step]))
 
-    def readings(self, directions: FloatArray, count: int = 2048) -> FloatArray:
-        """What sensors read over one period, shape (count, k), of directions (k, n)."""
-        from scipy.interpolate import CubicHermiteSpline
-
-        n = self.start.size
-        t = (np.arange(len(self.velocities))[:, None] + POINTS).ravel() * self.step
-        q = np.concatenate([self.start[None], self.deflections.reshape(-1, n)]) @ directions.T
-        v = np.concatenate([self.velocities[-1, -1][None], self.velocities.reshape(-1, n)]) @ directions.T
-        at = np.linspace(0.0, self.period, count, endpoint=False)
-        return np.asarray(CubicHermiteSpline(np.append(0.0, t), q, v)(at))
+    def readings(self, directions: FloatArray) -> FloatArray:
+        """What sensors read at 2048 times of a period, shape (2048, k), of directions (k, n)."""
+        return np.asarray(self.resampled(512).deflections.reshape(-1, self.start.size) @ directions.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,32 +223,6 @@ class Periodic:
             G[i + 1] = P[i, :, : 2 * n] @ G[i]
             G[i + 1, :, 2 * n :] += P[i, :, 2 * n :]
         return Linearised(orbit, self.free, S, G)
-
-    def marched(self, orbit: Orbit) -> Orbit:
-        """The next period of the motion in time that begins where an orbit, which need not be periodic, ends.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-            If a node comes to its wall, or Newton's method does not converge.
-        """
-        q, V, h = orbit.ends[-1], orbit.velocities.copy(), orbit.step
-        n, start, v = q.size, q, V[-1, -1]
-        for i, angles in enumerate(self.angles(len(V))):
-            V[i] = v
-            for _ in range(_NEWTON):
-                R, J, _ = self._equations(q[None], v[None], V[i : i + 1], h, orbit.speed, angles[None])
-                if not np.isfinite(R).all():
-                    met = wall_met(self.system, q + h * np.einsum("jl,lk->jk", _A, V[i]))
-                    raise np.linalg.LinAlgError(met or "the forces overflow")
-                change = np.linalg.solve(J[0], R[0]).reshape(_S, n)
-                V[i] -= change
-                if np.abs(change).max() <= 1e-8 * max(np.abs(V[i]).max(), 1e-300):
-                    break
-            else:
-                raise np.linalg.LinAlgError("Newton's method does not converge")
-            q, v = q + h * (_A[-1] @ V[i]), V[i, -1]
-        return replace(orbit, start=start, velocities=V)
 
     def solve(self, guess: Orbit, rows: FloatArray, values: FloatArray) -> tuple[Linearised, int]:
         """Newton's method with conditions rows · y = values on the unknowns y = `unknowns` of the orbit.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -87,6 +87,16 @@ class Branch:
         """Whether the motion returns after a small disturbance."""
         return np.array([point.outside == 0 for point in self.points])
 
+    def at(self, speed: float, values: FloatArray) -> list[tuple[FloatArray, bool]]:
+        """Values (k,) between those of the points around a speed, (points, k); whether both are stable."""
+        speeds, stable, found = self.speeds, self.stable, []
+        for k in np.flatnonzero(np.diff(speeds)):
+            share = (speed - speeds[k]) / (speeds[k + 1] - speeds[k])
+            if -1e-9 <= share <= 1 + 1e-9:
+                between = (1 - share) * values[k] + share * values[k + 1]
+                found.append((between, bool(stable[k] and stable[k + 1])))
+        return found
+
 
 @dataclass(frozen=True, eq=False)
 class Start:
@@ -102,9 +112,12 @@ class Start:
 
 def at_speed(problem: Periodic, guess: Orbit, sign: float = 1.0) -> Start:
     """The start of a branch at the speed of the guess, upwards or, sign −1, downwards."""
-    row = np.zeros((1, problem.unknowns(guess).size))
-    row[0, -1] = sign
-    return Start(guess, row, row @ problem.unknowns(guess))
+    y = problem.unknowns(guess)
+    rows = np.zeros((problem.free, y.size))
+    rows[-1, -1] = sign
+    if not problem.turns:
+        rows[0, : guess.start.size] = guess.state[guess.start.size :]
+    return Start(guess, rows, rows @ y)
 
 
 def follow(
@@ -313,28 +326,3 @@ def _solved(
             break
         at, _ = problem.solve(at.orbit.resampled(steps), rows, values)
     return at, iterations
-
-
-def settled(problem: Periodic, speed: float, steps: int, state: FloatArray, most: int = 256) -> Orbit:
-    """A periodic motion near a state at rest, or the one that the motion in time from there comes to.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If none is found in so many periods.
-    """
-    period = 2 * np.pi * problem.turns / speed
-    n = state.size
-    orbit = Orbit(speed, period, state, np.zeros((steps, 4, n)))
-    begin, count = at_speed(problem, orbit), 1
-    while True:
-        try:
-            at, _ = problem.solve(replace(orbit, start=orbit.start), begin.rows, begin.values)
-        except np.linalg.LinAlgError:
-            if count > most:
-                raise
-        else:
-            return at.orbit
-        for _ in range(count):
-            orbit = problem.marched(orbit)
-        count *= 2

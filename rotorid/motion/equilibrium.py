@@ -108,10 +108,13 @@ def equilibrium(system: MotionSystem, speed: float, start: FloatArray | None = N
         raise ValueError(f"speed 0: {named(journal)} carries nothing at rest; give speeds above 0")
     resting = replace(system, forces=tuple(map(_at_rest, system.forces)))
     K = system.linear(speed)[1]
-    _check_held(system, _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1], speed)
-    q = _solved(resting, K, speed, start)
+    J = _left_over(resting, K, np.zeros(system.size), speed, 0.0)[1]
+    if start is None:
+        _check_held(system, J, speed)
+    q = _condensed(resting, K, speed, start)
     _check_walls(system, q, speed)
     if not np.abs(_left_over(resting, K, q, speed, 1.0)[0]).max() <= _LOST * np.abs(system.weight).sum():
+        _check_held(system, J, speed)
         raise ValueError(
             f"at {speed_text(speed)} the equilibrium is lost in float64; join neighbouring elements"
         )
@@ -136,6 +139,26 @@ def _left_over(
     """Forces that are left over under a share of the weight, and minus their derivative."""
     F, F_q, *_ = system.acting(q, np.zeros(system.size), speed)
     return share * system.weight + F - K @ q, K - F_q
+
+
+def _condensed(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:
+    """The equilibrium: what has no force of its own follows the rest in a straight line."""
+    at = np.unique(system.law_tables[2])
+    others = np.setdiff1d(np.arange(system.size), at)
+    known = np.column_stack((system.weight[others], -K[np.ix_(others, at)]))
+    follow = np.linalg.solve(K[np.ix_(others, others)], known)
+    across = K[np.ix_(at, others)]
+    part = replace(
+        system,
+        coordinates=tuple(system.coordinates[i] for i in at),
+        weight=system.weight[at] - across @ follow[:, 0],
+    )
+    q = np.empty(system.size)
+    q[at] = _solved(
+        part, K[np.ix_(at, at)] + across @ follow[:, 1:], speed, None if start is None else start[at]
+    )
+    q[others] = follow[:, 0] + follow[:, 1:] @ q[at]
+    return q
 
 
 def _solved(system: MotionSystem, K: FloatArray, speed: float, start: FloatArray | None) -> FloatArray:

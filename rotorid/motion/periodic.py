@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import itertools
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
 from rotorid.base.arrays import ComplexArray, FloatArray
-from rotorid.base.rpm import rpm_text
+from rotorid.base.rpm import RPM, rpm_text
 from rotorid.base.text import listing, percent
-from rotorid.motion.collocation import POINTS, Orbit, Periodic
+from rotorid.motion.collocation import POINTS, Linearised, Orbit, Periodic
 from rotorid.motion.continuation import (
     DOUBLING,
     HOPF,
@@ -19,17 +20,27 @@ from rotorid.motion.continuation import (
     Start,
     at_speed,
     follow,
-    settled,
 )
 from rotorid.motion.equilibrium import equilibrium
+from rotorid.motion.run import run
+from rotorid.motion.start import at_rest, steady_linear
+from rotorid.motion.steady_end import steady_end
 from rotorid.motion.system import MotionSystem
 
 _STEPS = 32  # in one revolution, or one period of a motion's own, to begin with
 _COARSE = 1e-3
 """Of `Orbit.roughness`."""
 _SAME = 0.02  # of the motion: what differs by less is no other motion
-_CYCLES = 60  # of motion in time, before it is taken for a limit cycle
-_FIRST = 0.01  # amplitude at the beginning of a branch, of the smallest clearance
+_FIRST, _FAR = 0.01, 0.5  # amplitudes of what is free: where a branch begins, and motion in time
+_STILL, _FADES = (
+    1e-4,
+    0.7,
+)  # of its size at the beginning: it is at rest; of that half the time ago: it will be
+_NEAR = 0.3  # of its size: the periodic motion that a motion in time comes to
+_TURNS, _BLOCKS = 100, 8  # revolutions of motion in time, and how often so many more
+_ASKED = 8
+_NOT_AGAIN = "comes to a periodic motion that Newton's method does not find again"
+_NOTHING = f"comes to no periodic motion in {_TURNS * _BLOCKS} revolutions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,18 +103,20 @@ def periodic_motion(
         raise ValueError(
             "a limit cycle has a period of its own, which unbalance and bow do not allow: leave them out"
         )
-    search = _Search(system, low, high, steps)
-    kind = "synchronous" if forced else "rest"
-    branches = search.main(kind)
+    search = _Search(system, low, high, steps, forced)
+    branches, problems = search.main()
     warnings = [] if forced else ["there is no unbalance and no bow: what is synchronous is rest"]
-    if subsynchronous:
-        more = search.subsynchronous(subsynchronous, branches) if forced else []
-        warnings += [] if more else [f"no motion of {subsynchronous} revolutions was found"]
-        branches += more
-    if limit_cycle:
-        more = search.cycles(branches)
-        warnings += [] if more else ["no limit cycle found: no Hopf point, and motion in time comes to none"]
-        branches += more
+    turns = 0 if limit_cycle else subsynchronous if forced else None
+    if turns is not None:
+        branches += search.begun(turns, branches)
+    warnings += search.complete(branches, turns) if system.forces else []
+    if not branches:
+        equilibrium(system, low)  # its message is the better one
+        raise ValueError(f"no periodic motion was found to begin with, {listing(problems + warnings, 'and')}")
+    if limit_cycle and not any(b.turns == 0 for b in branches):
+        warnings.append("no limit cycle found: no Hopf point, and motion in time comes to none")
+    if subsynchronous and not any(b.turns == subsynchronous for b in branches):
+        warnings.append(f"no motion of {subsynchronous} revolutions was found")
     return PeriodicMotion(system, low, high, tuple(branches), tuple(warnings + _doubts(branches)))
 
 
@@ -115,79 +128,133 @@ class _Search:
     low: float
     high: float
     steps: int | None
+    forced: bool
 
     @property
     def count(self) -> int:
         """Steps in one revolution or cycle to begin with."""
         return self.steps or _STEPS
 
-    def follow(self, problem: Periodic, start: Start, kind: str) -> Branch:
-        return follow(problem, start, self.low, self.high, kind, fixed_steps=self.steps is not None)
-
-    def main(self, kind: str) -> list[Branch]:
-        """From the lowest speed upwards and, if that is another branch, from the highest downwards."""
-        problem, found = Periodic(self.system, 1), list[Branch]()
-        problems: list[str] = []
-        for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
-            try:
-                guess = settled(problem, speed, self.count, _at_rest(self.system, speed))
-                if not self.known(guess, found):
-                    found.append(self.follow(problem, at_speed(problem, guess, sign), kind))
-            except np.linalg.LinAlgError as met:
-                problems.append(f"at {rpm_text(speed)}: {met}")
-        if not found:
-            equilibrium(self.system, self.low)  # its message is the better one
-            raise ValueError(f"no periodic motion was found to begin with, {listing(problems, 'and')}")
-        return found
-
-    def subsynchronous(self, turns: int, branches: list[Branch]) -> list[Branch]:
-        """From period doublings, or else from what the motion in time comes to."""
-        problem, found = Periodic(self.system, turns), list[Branch]()
-        doublings = [b for branch in branches for b in branch.bifurcations if b.kind == DOUBLING]
-        starts = [self.doubled(b) for b in doublings] if turns == 2 else []
-        for start in starts:
-            found += self._try(problem, start, found)
-        for speed in np.linspace(self.low, self.high, 9)[1:-1] if not found else ():
-            try:
-                guess = settled(problem, float(speed), turns * self.count, _at_rest(self.system, speed), 0)
-                for _ in range(30):
-                    guess = problem.marched(guess)
-                begin = at_speed(problem, guess)
-                guess = problem.solve(guess, begin.rows, begin.values)[0].orbit
-            except np.linalg.LinAlgError:
-                continue
-            if not guess.repeats(turns) and not self.known(guess, found):
-                for sign in (1.0, -1.0):
-                    found += self._try(problem, at_speed(problem, guess, sign), [])
-        return found
-
-    def _try(self, problem: Periodic, start: Start, known: list[Branch]) -> list[Branch]:
-        """The branch, if there is one that is not known."""
+    def follow(self, problem: Periodic, start: Start) -> list[Branch]:
+        """The branch, if it begins."""
+        kind = {0: "limit cycle", 1: "synchronous" if self.forced else "rest"}.get(problem.turns)
+        kind, fixed = kind or f"period {problem.turns}", self.steps is not None
         try:
-            at, _ = problem.solve(start.guess, start.rows, start.values)
-            if self.known(at.orbit, known):
-                return []
-            kind = f"period {problem.turns}" if problem.turns else "limit cycle"
-            return [self.follow(problem, start, kind)]
+            return [follow(problem, start, self.low, self.high, kind, fixed_steps=fixed)]
         except np.linalg.LinAlgError:
             return []
 
-    def known(self, orbit: Orbit, branches: list[Branch]) -> bool:
-        """Whether a branch comes through this motion, or through the same some revolutions later."""
-        size = orbit.scale[: orbit.start.size]
+    def main(self) -> tuple[list[Branch], list[str]]:
+        """From rest at the lowest speed upwards and, if that is another branch, at the highest downwards."""
+        problem, found, said = Periodic(self.system, 1), list[Branch](), list[str]()
+        for speed, sign in ((self.low, 1.0), (self.high, -1.0)):
+            try:
+                start = at_speed(problem, self.linear(speed))
+                orbit = problem.solve(start.guess, start.rows, start.values)[0].orbit
+            except np.linalg.LinAlgError as met:
+                said.append(f"at {rpm_text(speed)} no periodic motion is found from rest: {met}")
+                continue
+            if not _known(problem.turns, orbit, found):
+                found += self.follow(problem, at_speed(problem, orbit, sign))
+        return found, said
+
+    def linear(self, speed: float) -> Orbit:
+        """Steady motion of the rotor made linear about its equilibrium; without one rest at the centres."""
+        _, rests, responses = steady_linear(self.system, [speed])
+        rest, response = (rests[0], responses[0]) if len(rests) else (np.zeros(self.system.size), 0.0)
+        turning = np.exp(2j * np.pi * (np.arange(self.count)[:, None] + POINTS) / self.count)[..., None]
+        velocities = (1j * speed * turning * response).real * np.ones(self.system.size)
+        return Orbit(speed, 2 * np.pi / speed, rest + np.real(response), velocities)
+
+    def begun(self, turns: int, branches: list[Branch]) -> list[Branch]:
+        """Limit cycles that begin at Hopf points, or motions of two revolutions at period doublings."""
+        problem, found = Periodic(self.system, turns), list[Branch]()
+        begin = {0: (HOPF, self.cycle), 2: (DOUBLING, self.doubled)}
+        kind, start = begin.get(turns, ("", self.doubled))
+        for point in (b for branch in branches for b in branch.bifurcations if b.kind == kind):
+            try:
+                first = start(point)
+                orbit = problem.solve(first.guess, first.rows, first.values)[0].orbit
+            except np.linalg.LinAlgError:
+                continue
+            if not _known(turns, orbit, found):
+                found += self.follow(problem, first)
+        return found
+
+    def complete(self, branches: list[Branch], turns: int | None) -> list[str]:
+        """Follow what motion in time comes to and no branch shows; what is not followed, in words."""
+        said: dict[str, list[str]] = {}
+        for speed in self._asked(branches):
+            end = self.reached(speed)
+            if isinstance(end, Orbit):
+                own = round(end.period * speed / (2 * np.pi)) if self.forced else 0
+                if _known(own, end, branches):
+                    continue
+                if own in (1, turns):
+                    problem = Periodic(self.system, own)
+                    ways = [sign for sign, last in ((1.0, self.high), (-1.0, self.low)) if speed != last]
+                    more = [b for way in ways for b in self.follow(problem, at_speed(problem, end, way))]
+                    branches += more
+                    end = "" if more else _NOT_AGAIN
+                elif own:
+                    end = f"comes again after {own} revolutions only (--subsynchronous {own})"
+                else:
+                    end = "comes to a whirl with a period of its own (--limit-cycle)"
+            if end:
+                said.setdefault(end, []).append(f"{speed * RPM:.6g}")
+        return [f"motion in time {end}, at {listing(at, 'and')} rpm" for end, at in said.items()]
+
+    def _asked(self, branches: list[Branch]) -> list[float]:
+        """Speeds at which motion in time is asked: three, and in the middle of where no branch is stable."""
+        edges = {self.low, self.high}
         for branch in branches:
-            later = orbit.ends[:-1][:: len(orbit.velocities) // max(branch.turns, 1)]
-            states = (
-                np.array([point.orbit.start for point in branch.points]) / orbit.scale[: orbit.start.size]
-            )
-            way = np.column_stack([states, branch.speeds / (self.high - self.low)])
-            step = np.diff(way, axis=0)
-            for state in later / size:
-                from_here = np.append(state, orbit.speed / (self.high - self.low)) - way[:-1]
-                share = np.clip((from_here * step).sum(axis=1) / (step * step).sum(axis=1), 0.0, 1.0)
-                if np.linalg.norm(from_here - share[:, None] * step, axis=1).min(initial=1.0) < _SAME:
-                    return True
-        return False
+            edges |= {*branch.speeds[[0, -1]], *(b.point.orbit.speed for b in branch.bifurcations)}
+        middles = [
+            (a + b) / 2 for a, b in itertools.pairwise(sorted(edges)) if b - a > 1e-3 * (self.high - self.low)
+        ]
+        bare = [
+            speed
+            for speed in middles
+            if not any(stable for b in branches for _, stable in b.at(speed, b.speeds[:, None]))
+        ]
+        return sorted({self.low, (self.low + self.high) / 2, self.high, *bare[:_ASKED]})
+
+    def reached(self, speed: float) -> Orbit | str:
+        """What motion in time from rest comes to: one period of it, what else in words, or "" for rest."""
+        q, v = _at_rest(self.system, speed), np.zeros(self.system.size)
+        if not self.forced:
+            q = q + _FAR * whirl_at_rest(self.system, q, speed)[1].real
+        sizes, turn = list[float](), 2 * np.pi / speed
+        for _ in range(_BLOCKS):
+            motion = run(self.system, (speed, speed), _TURNS * turn, (q, v))
+            if motion.stopped:
+                return f"from rest ends: {motion.stopped.split(' after ')[0]}"
+            q, v, end = motion.q, motion.v, steady_end(motion)
+            sizes.append(float(end.amplitude.max()))
+            if end.periodic or sizes[-1] < _STILL * sizes[0]:
+                break
+        if not self.forced and (end.at_rest or sizes[-1] < _FADES * sizes[(len(sizes) - 1) // 2]):
+            return ""
+        turns = max(round(end.period), 1) if end.periodic else 1
+        found = self._repeating(speed, turns * turn if self.forced else 2 * np.pi / abs(end.frequency), q, v)
+        if end.periodic or (found and (np.abs(found.multipliers) < 1).all()):
+            return found.orbit if found else _NOT_AGAIN
+        return _NOTHING
+
+    def _repeating(self, speed: float, period: float, q: FloatArray, v: FloatArray) -> Linearised | None:
+        """The periodic motion near that in time from a state at the angle 0; None where there is none."""
+        turns = round(period * speed / (2 * np.pi)) if self.forced else 0
+        problem = Periodic(self.system, turns)
+        try:
+            guess = _one_period(self.system, speed, period, self.count * max(turns, 1), q, v)
+            start = at_speed(problem, guess)
+            at, _ = problem.solve(guess, start.rows, start.values)
+        except np.linalg.LinAlgError:
+            return None
+        if turns > 1 and at.orbit.repeats(turns):
+            return self._repeating(speed, 2 * np.pi / speed, q, v)
+        away = np.abs(at.orbit.ends - guess.ends).max(axis=0) / at.orbit.scale[: q.size]
+        return at if away.max() < _NEAR else None
 
     def doubled(self, point: Bifurcation) -> Start:
         """Of the branch of twice the period that begins at a period doubling."""
@@ -202,63 +269,25 @@ class _Search:
         size = row[:-1] @ direction
         return Start(guess, row[None], np.array([row[:-1] @ orbit.state + amplitude * size]))
 
-    def cycles(self, branches: list[Branch]) -> list[Branch]:
-        """Those that begin at Hopf points, and what motion in time comes to at the highest speed."""
-        hopf = [b for branch in branches for b in branch.bifurcations if b.kind == HOPF]
-        problem, found = Periodic(self.system, 0), list[Branch]()
-        for point in hopf:
-            found += self._try(problem, self.cycle(point), [])
-        if any(b.stable[-1] and b.points[-1].orbit.speed >= self.high * (1 - 1e-9) for b in found):
-            return found
-        try:
-            guess = self.whirling(problem)
-            row = at_speed(problem, guess, -1.0)
-            phase = np.append(guess.state[self.system.size :], np.zeros(self.system.size + 2))
-            rows = np.array([phase, row.rows[0]])
-            start = Start(guess, rows, rows @ problem.unknowns(guess))
-            cycle = problem.solve(guess, rows, start.values)[0].orbit
-        except np.linalg.LinAlgError:
-            return found
-        rest = np.abs(cycle.ends - cycle.start).max() < 0.1 * _FIRST * _length(self.system, cycle.start)
-        if not rest:
-            found.append(self.follow(problem, start, "limit cycle"))
-        return found
-
-    def whirling(self, problem: Periodic) -> Orbit:
-        """What a disturbance at rest comes to at the highest speed, cut where it is nearly periodic."""
-        rest = _at_rest(self.system, self.high)
-        whirl, shape = whirl_at_rest(self.system, rest, self.high)
-        start = rest + _FIRST * _length(self.system, rest) * shape.real / np.abs(shape).max()
-        steps, n = self.count, rest.size
-        orbit = Orbit(self.high, 2 * np.pi / whirl, start, np.zeros((steps, 4, n)))
-        for _ in range(_CYCLES):
-            orbit = problem.marched(orbit)
-        after = problem.marched(orbit).ends
-        ends = np.concatenate([orbit.ends[:-1], after])
-        away = np.abs((ends - ends[0]) / orbit.scale[:n]).max(axis=1)
-        near = steps // 2 + int(away[steps // 2 : 3 * steps // 2 + 1].argmin())
-        return problem.marched(replace(orbit, period=orbit.period * near / steps))
-
     def cycle(self, point: Bifurcation) -> Start:
         """Of the limit cycles that begin at a Hopf point."""
         orbit = point.point.orbit
         whirl, shape = whirl_at_rest(self.system, orbit.start, orbit.speed)
-        shape *= np.exp(-0.5j * np.angle(np.sum(shape * shape))) / np.abs(shape).max()
-        amplitude = _FIRST * _length(self.system, orbit.start)
+        shape = _FIRST * shape
         t = 2 * np.pi * (np.arange(self.count)[:, None] + POINTS) / self.count
-        moved = amplitude * shape * np.exp(1j * t)[..., None]
-        guess = Orbit(
-            orbit.speed, 2 * np.pi / whirl, orbit.start + amplitude * shape.real, (1j * whirl * moved).real
-        )
+        moved = (1j * whirl * shape * np.exp(1j * t)[..., None]).real
         n = shape.size
         rows = np.zeros((2, 2 * n + 2))
         rows[0, :n], rows[1, :n] = shape.imag, shape.real
-        values = rows[:, :n] @ orbit.start + [0.0, amplitude * shape.real @ shape.real]
-        return Start(guess, rows, values)
+        values = rows[:, :n] @ orbit.start + [0.0, shape.real @ shape.real]
+        return Start(Orbit(orbit.speed, 2 * np.pi / whirl, orbit.start + shape.real, moved), rows, values)
 
 
 def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[float, ComplexArray]:
-    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,)."""
+    """Angular frequency, rad/s, and shape (n,) of the least damped whirl around a rotor at rest in q (n,).
+
+    Its size is what is free: one of the shafts comes to its wall, or deflects twice as much as at rest.
+    """
     C, K = system.linear(speed)
     _, F_q, F_v, _ = system.acting(q, np.zeros_like(q), speed)
     n, eye = q.size, np.eye(q.size)
@@ -267,27 +296,59 @@ def whirl_at_rest(system: MotionSystem, q: FloatArray, speed: float) -> tuple[fl
     values, vectors = scipy.linalg.eig(left, np.block([[eye, zero], [zero, system.M]]))
     whirls = np.isfinite(values) & (values.imag > 0)
     k = np.flatnonzero(whirls)[values[whirls].real.argmax()]
-    return float(values[k].imag), np.asarray(vectors[:n, k])
+    shape = vectors[:n, k] * np.exp(-0.5j * np.angle(np.sum(vectors[:n, k] ** 2)))
+    places = np.array([system.index(node) for node in system.nodes])
+    moved, at = np.linalg.norm(shape[places], axis=1), np.linalg.norm(q[places], axis=1)
+    free = np.full(len(places), max(float(at.max()), 1e-6))
+    for force in system.forces:
+        if np.isfinite(force.wall):
+            free[system.nodes.index(force.node)] = force.wall - at[system.nodes.index(force.node)]
+    return float(values[k].imag), np.asarray(shape * min(free / np.maximum(moved, 1e-300)))
 
 
-def _length(system: MotionSystem, q: FloatArray) -> float:
-    """The smallest clearance, or the largest deflection."""
-    walls = [force.wall for force in system.forces if np.isfinite(force.wall)]
-    return min(walls) if walls else max(float(np.abs(q).max()), 1e-6)
+def _one_period(
+    system: MotionSystem, speed: float, period: float, steps: int, q: FloatArray, v: FloatArray
+) -> Orbit:
+    """The motion in time from a state at the angle 0 as the guess of a periodic one."""
+    first, velocities = q, np.empty((steps * len(POINTS), q.size))
+    times = (np.arange(steps)[:, None] + POINTS).ravel() * (period / steps)
+    for k, (begin, end) in enumerate(itertools.pairwise([0.0, *times])):
+        part = run(system, (speed, speed), end - begin, (q, v), rate=1 / (end - begin), angle=speed * begin)
+        q, v = part.q, part.v
+        velocities[k] = v
+    return Orbit(speed, period, first, velocities.reshape(steps, len(POINTS), -1))
+
+
+def _known(turns: int, orbit: Orbit, branches: list[Branch]) -> bool:
+    """Whether a branch comes through a motion, or one as large: by largest and smallest deflections."""
+    size = orbit.scale[: orbit.start.size].max()
+    for branch in branches:
+        if branch.turns == turns:
+            extents = np.array([_extent(point.orbit) for point in branch.points])
+            for extent, _ in branch.at(orbit.speed, extents):
+                if np.abs(extent - _extent(orbit)).max() < _SAME * size:
+                    return True
+    return False
+
+
+def _extent(orbit: Orbit) -> FloatArray:
+    """Largest and smallest deflections, shape (2n,)."""
+    q = orbit.deflections
+    return np.concatenate([q.max(axis=(0, 1)), q.min(axis=(0, 1))])
 
 
 def _at_rest(system: MotionSystem, speed: float) -> FloatArray:
     """Where the rotor rests at a speed, (n,); at the centres, where it cannot."""
     try:
-        q = equilibrium(system, speed).q
+        return at_rest(system, speed)
     except ValueError:
-        q = np.zeros(system.size)
-    return q if q.any() else np.full(system.size, 1e-4 * _length(system, q))
+        return np.zeros(system.size)
 
 
 def _doubts(branches: list[Branch]) -> list[str]:
     """What may be wrong with the branches."""
-    said = [f"the {b.kind} branch {b.ended}" for b in branches if b.ended.startswith("stopped")]
+    stopped = [b for b in branches if b.ended.startswith("stopped")]
+    said = [f"the {b.kind} branch {b.ended} at {rpm_text(b.speeds[-1])}" for b in stopped]
     for branch in branches:
         worst = max(point.orbit.roughness for point in branch.points)
         if worst > _COARSE:

@@ -68,24 +68,13 @@ class Readings:
             for fold, size in zip(branch.bifurcations, sizes, strict=True):
                 if fold.kind != FOLD or not branch.stable[fold.after - 1 : fold.after + 1].any():
                     continue
-                others = self._stable_at(fold.point.orbit.speed)
+                speed = fold.point.orbit.speed
+                there = zip(self.motion.branches, self.along, strict=True)
+                others = [one for b, values in there for one, stable in b.at(speed, values) if stable]
                 far = [one for one in others if np.abs(one - size).max() > 0.02 * size.max()]
                 if far:
-                    found.append(
-                        (fold.point.orbit.speed, size, min(far, key=lambda one: np.abs(one - size).max()))
-                    )
+                    found.append((speed, size, min(far, key=lambda one: np.abs(one - size).max())))
         return tuple(found)
-
-    def _stable_at(self, speed: float) -> list[FloatArray]:
-        """Amplitudes of the stable motions at a speed, between the points of their branches."""
-        found = []
-        for branch, sizes in zip(self.motion.branches, self.along, strict=True):
-            stable = branch.stable
-            for k in np.flatnonzero(stable[1:] & stable[:-1] & (np.diff(branch.speeds) != 0)):
-                share = (speed - branch.speeds[k]) / (branch.speeds[k + 1] - branch.speeds[k])
-                if 0 <= share < 1:
-                    found.append((1 - share) * sizes[k] + share * sizes[k + 1])
-        return found
 
     def points(self) -> tuple[Column, ...]:
         """One row a point."""

@@ -24,8 +24,8 @@ LEAST_A_TURN = 8
 """Samples a turn below which what the shaft does in a turn is not seen."""
 _BLOCK = 10_000
 """Samples that are computed at once: the memory that all unknowns take."""
-_MOST = 50_000_000
-"""Positions that are kept, x and y of one node counted as one: 800 MB."""
+_MOST = 10_000_000
+"""Positions that are kept, x and y of one node counted as one: 160 MB, some times over."""
 _MASSLESS = 1e-12
 _SMALLEST = 1e-4
 """Way that a tolerance refers to at least, by the largest deflection at the beginning."""
@@ -95,6 +95,11 @@ class MotionRun:
             for force in self.system.forces
             if np.isfinite(force.wall) and force.node in self.nodes
         )
+
+    def eccentricity(self, since: int = 0) -> FloatArray:
+        """Smallest and largest by the clearance, of each bearing, from a sample on, shape (b, 2)."""
+        sizes = [np.abs(self.z[since:, i]) / force.wall for force, i in self.bearings]
+        return np.array([(size.min(), size.max()) for size in sizes]).reshape(-1, 2)
 
 
 def run(

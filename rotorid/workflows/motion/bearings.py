@@ -83,13 +83,13 @@ class BearingEquilibria(Outcome):
     @property
     def answer(self) -> Answer:
         """Stability, and the bearings at a few of the speeds; behind it at all."""
-        few, last = max(_ROWS // len(self.labels), 2) - 1, len(self.found) - 1
-        shown = [self.found[k] for k in sorted({round(i / few * last) for i in range(few + 1)})]
+        every = max(1, -(-(len(self.found) - 1) // max(_ROWS // len(self.labels) - 1, 1)))
+        shown = [*self.found[:-1:every], self.found[-1]]
         return Answer(
             capital(self.stability.summary()) if self.stability else "One speed: no threshold is sought.",
             text(self._columns(shown), width=COLUMNS),
             self.warnings,
-            tables=(text(self._columns(self.found), width=COLUMNS),) if len(shown) <= last else (),
+            tables=(text(self._columns(self.found), width=COLUMNS),) if every > 1 else (),
             more="every speed",
         )
 

@@ -273,6 +273,18 @@ def test_limit_cycle_of_a_rigid_rotor_in_a_short_bearing():
     assert [b.kind for b in cycle.bifurcations] == [FOLD, FOLD]
 
 
+def test_limit_cycle_with_the_film_at_the_line_of_centres():
+    """Digits of the issue, M = 8.0: 0.8988, 0.8945, 0.500004 Ω, where the film's law has its kink."""
+    found = periodic_motion(journal(8.0, "line of centres"), 140.0, NOMINAL, limit_cycle=True)
+    (cycle,) = [
+        p for branch in found.branches for p in branch.points[-1:] if p.orbit.speed > 156.9 and p.phase != 1
+    ]
+    e = np.hypot(*cycle.orbit.readings(np.eye(2)).T) / CLEARANCE
+    assert [f"{v:.4f}" for v in (e.max(), e.min())] == ["0.8988", "0.8945"]
+    assert f"{2 * np.pi / cycle.orbit.period / NOMINAL:.6f}" == "0.500004"
+    assert cycle.outside == 0
+
+
 def test_rotating_damping_against_its_threshold():
     """c_i (Ω − ω) > c ω ends stability: Ω = ω (1 + c / c_i); the cubic spring limits the circular whirl."""
     c, c_i, k3 = 0.1, 0.1, 0.5
