@@ -50,7 +50,7 @@ def main() -> dict[str, float]:
     ).motion_model
     assert damped is not None
     system, speed = rotor_system(damped, 500 * RPM, 13000 * RPM), 9000 * RPM
-    rest, cycle = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
+    rest, cycle, *_ = periodic_motion(system, 11000 * RPM, 13000 * RPM, limit_cycle=True).branches
     (lost,) = rest.bifurcations
     print(f"with 0.5 % of damping: stable up to {lost.point.orbit.speed / RPM:.0f} rpm; its limit cycle:")
     for one in cycle.bifurcations:
